@@ -1,0 +1,108 @@
+"""What a log line or a plot reads at each output: anything with a name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from karamelo_py.script.errors import ScriptError, nearest
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+    from karamelo_py.signature import Argument
+
+KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
+PER_POINT = frozenset({"x", "y", "z", "x0", "y0", "z0"})
+
+
+class Quantity:
+    """A named number of the running scene.
+
+    It is one of the words ``step``, ``dt``, ``time``; a variable of the script; a value published
+    by a fix or a compute (``Ek``, ``v_x``); or a formula written on the spot (``Ek + Es``).
+
+    Parameters
+    ----------
+    hub
+        The hub of the scene.
+    name
+        What the script says.
+    formula
+        The formula to evaluate when `name` is a formula written on the spot.
+
+    Raises
+    ------
+    ScriptError
+        If nothing of that name exists, or it is not a single number.
+    """
+
+    def __init__(self, hub: Hub, name: str, formula: Any = None):
+        self.hub = hub
+        self.name = name
+        self.formula = formula
+        source = formula if formula is not None else self._source()
+        if isinstance(source, str):
+            raise ScriptError(f"'{name}' is text, not a number")
+        per_point = PER_POINT & getattr(source, "names", frozenset())
+        if per_point:
+            raise ScriptError(
+                f"'{name}' depends on {min(per_point)}, which differs from point to point",
+                expected="a formula of time and of values of fixes and computes",
+            )
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Quantity:
+        """The quantity that a script's argument means; errors mark the argument."""
+        text = argument.text.strip().strip('"')
+        try:
+            if text in cls.names(hub):
+                return cls(hub, text)
+            word = argument.word()
+            if word is not None:
+                return cls(hub, word)
+            return cls(hub, text, argument.value(hub))
+        except ScriptError as error:
+            if error.place is None:
+                error.place = argument.place
+            raise
+
+    @staticmethod
+    def names(hub: Hub) -> list[str]:
+        """Every name that can be logged now."""
+        return [*KEYWORDS, *_variables(hub), *hub.values.names()]
+
+    @property
+    def heading(self) -> str:
+        """The name as it heads a column: as Karamelo writes it."""
+        return KEYWORDS.get(self.name, self.name)
+
+    def read(self) -> float | int:
+        """The number now."""
+        if self.formula is None and self.name in KEYWORDS:
+            return getattr(self.hub.update, self.name)
+        source = self.formula if self.formula is not None else self._source()
+        if isinstance(source, str):
+            raise ScriptError(f"'{self.name}' is text, not a number")
+        if hasattr(source, "evaluate"):
+            return float(source.evaluate(self.hub.values))
+        return float(source)
+
+    def _source(self) -> Any:
+        """The variable's content or the published number behind the name."""
+        if self.name in KEYWORDS:
+            return 0.0
+        variables = _variables(self.hub)
+        if self.name in variables:
+            return variables[self.name]
+        names = self.hub.values.names()
+        if self.name in names:
+            return self.hub.values.get(self.name)
+        close = nearest(self.name, self.names(self.hub))
+        raise ScriptError(
+            f"unknown quantity '{self.name}'",
+            expected="step, dt, time, a variable, or a value of a fix or compute",
+            hint=f"did you mean '{close}'?" if close else None,
+        )
+
+
+def _variables(hub: Hub) -> dict[str, Any]:
+    return getattr(hub.interpreter, "variables", None) or {}
