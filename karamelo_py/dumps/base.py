@@ -1,0 +1,75 @@
+"""What every dump has: a rhythm, a file name with the step in it, checked columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.signature import OutputFile, Positive
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+class Dump:
+    """Base of the dump styles: override `write`, which is called when the dump is due.
+
+    Parameters
+    ----------
+    every
+        Steps between two snapshots; the first and the last state of a run are always written.
+    file
+        File name; the first ``*`` becomes the step number.
+    columns
+        What to write, as the style understands it.
+    """
+
+    def __init__(
+        self,
+        hub: Hub,
+        every: Annotated[int, Positive],
+        file: OutputFile,
+        *columns: str,
+    ):
+        self.hub = hub
+        self.every = every
+        self.file = Path(file)
+        self.columns = columns
+        self.last_step: int | None = None
+
+    @property
+    def one_file_per_step(self) -> bool:
+        """Whether the name has a ``*``."""
+        return "*" in str(self.file)
+
+    def path(self) -> Path:
+        """The file of the present state."""
+        return self.hub.folder / str(self.file).replace("*", str(self.hub.update.step), 1)
+
+    def write(self) -> None:
+        """Write the present state."""
+        raise NotImplementedError
+
+    @staticmethod
+    def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
+        """Refuse names that are not `known`.
+
+        `first` is the place of the first column among the
+        arguments of the style.
+
+        Raises
+        ------
+        ScriptError
+            Naming the nearest known column.
+        """
+        for index, name in enumerate(columns):
+            if name not in known:
+                close = nearest(name, known)
+                raise ScriptError(
+                    f"unknown column '{name}'",
+                    argument=first + index,
+                    expected="one of " + " ".join(known),
+                    hint=f"did you mean '{close}'?" if close else None,
+                )

@@ -1,0 +1,98 @@
+"""Files that are whole or not there at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+from karamelo_py.script.errors import ScriptError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS = ("png", "pdf", "svg")
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[BinaryIO]:
+    """Open `path` for writing; the file appears under its name only when all of it is written.
+
+    Raises
+    ------
+    ScriptError
+        If the file cannot be written, with the system's reason.
+    """
+    temporary = path.with_name(f"{path.name}.part")
+    with _reported(path):
+        try:
+            with temporary.open("wb") as file:
+                yield file
+            os.replace(temporary, path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+
+@contextmanager
+def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
+    """Open `path` to go on at byte `start` (0: a new file).
+
+    If that breaks off, the file ends
+    there again, with `tail`.
+
+    Raises
+    ------
+    ScriptError
+        If the file cannot be written, with the system's reason.
+    """
+    with _reported(path), path.open("r+b" if start else "wb") as file:
+        try:
+            file.seek(start)
+            file.truncate()
+            yield file
+            file.flush()
+        except BaseException:
+            file.seek(start)
+            file.truncate()
+            file.write(tail)
+            raise
+
+
+def picture_format(path: Path) -> str:
+    """The format that the name of a picture asks for.
+
+    Raises
+    ------
+    ScriptError
+        If it is none of png, pdf, svg.
+    """
+    ending = path.suffix.lower().lstrip(".")
+    if ending not in FORMATS:
+        raise ScriptError(
+            f"cannot draw a picture as '{path.name}'",
+            argument="file",
+            expected="a file name ending in .png, .pdf or .svg",
+        )
+    return ending
+
+
+def savefig(figure: Figure, path: Path) -> None:
+    """Save a figure in the format of its name; the same figure gives the same bytes."""
+    import matplotlib
+
+    ending = picture_format(path)
+    # Without date and with a fixed salt for ids in the SVG, equal pictures are equal files.
+    undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending)
+    with matplotlib.rc_context({"svg.hashsalt": "karamelo-py"}), whole(path) as file:
+        figure.savefig(file, format=ending, metadata=undated)
+
+
+@contextmanager
+def _reported(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise ScriptError(f"cannot write {path}: {error.strerror or error}") from error

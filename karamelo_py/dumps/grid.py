@@ -1,0 +1,69 @@
+"""dump grid: the nodes, as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from karamelo_py.dumps.lammps import LammpsDump
+from karamelo_py.signature import OutputFile, Positive
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+class Grid(LammpsDump):
+    """Write the nodes of the background grid in LAMMPS text format, which OVITO opens.
+
+    Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the
+    number of its grid (``type``, 1). Positions are always written.
+
+    Parameters
+    ----------
+    every
+        Steps between two snapshots. The first and the last state of a run are always written.
+    file
+        File name. The first ``*`` becomes the step number; without ``*`` all snapshots follow each
+        other in one file.
+    columns
+        What to write of each node: x y z (position), vx vy vz (velocity), bx by bz (external
+        force), mass and so on. ``x, y, z`` by default.
+    occupied
+        true: leave out nodes without mass, which makes the files of a large and sparsely filled
+        domain small.
+
+    Example
+    -------
+    dump(d2, all, grid, 100, dump_g.*.LAMMPS, x, y, z, vx, vy, mass)
+    """
+
+    def __init__(
+        self,
+        hub: Hub,
+        every: Annotated[int, Positive],
+        file: OutputFile,
+        *columns: str,
+        occupied: bool = False,
+    ):
+        super().__init__(hub, every, file, *columns)
+        self.occupied = occupied
+        self._rows: np.ndarray | slice = slice(None)
+
+    @staticmethod
+    def names(hub: Hub) -> Sequence[str]:
+        """Names of the columns that can be written."""
+        return hub.fields.node_names()
+
+    def ids(self) -> tuple[np.ndarray, np.ndarray]:
+        """Number and grid of each node."""
+        ids = np.arange(self.hub.fields.node_count)
+        if self.occupied:
+            self._rows = np.flatnonzero(self.hub.fields.node("mass") > 0)
+            ids = ids[self._rows]
+        return ids, np.ones_like(ids)
+
+    def field(self, name: str) -> np.ndarray:
+        """Values of a node field, of the nodes that are written."""
+        return self.hub.fields.node(name)[self._rows]
