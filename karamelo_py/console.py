@@ -1,0 +1,275 @@
+"""What the user sees on the terminal: banner, log lines, progress, warnings, the table at the end.
+
+On a terminal Rich draws a live bar; into a pipe or a file go the same facts as plain lines. Every
+line is flushed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, TextIO
+
+# Seconds between two redraws of the bar, and between two plain progress lines in a pipe.
+REDRAW = 0.1
+REPORT = 10.0
+
+
+class Console:
+    """The one place that writes to standard output and standard error.
+
+    Parameters
+    ----------
+    out, err
+        Streams; standard output and standard error by default, looked up at each use.
+    terminal
+        Whether `out` is a terminal; found out by default.
+    quiet
+        Write warnings only.
+    """
+
+    def __init__(
+        self,
+        out: TextIO | None = None,
+        err: TextIO | None = None,
+        *,
+        terminal: bool | None = None,
+        quiet: bool = False,
+    ):
+        self._out = out
+        self._err = err
+        self._terminal = terminal
+        self.quiet = quiet
+        self._broken = False
+        self._progress: Any = None
+        self._task: Any = None
+        self._rich: Any = None
+        self._running = False
+        self._started = self._shown = 0.0
+        self._begin_step = 0
+        self._begin_fraction = 0.0
+
+    @property
+    def out(self) -> TextIO:
+        """The stream of ordinary lines."""
+        return self._out or sys.stdout
+
+    @property
+    def err(self) -> TextIO:
+        """The stream of warnings and errors."""
+        return self._err or sys.stderr
+
+    @property
+    def terminal(self) -> bool:
+        """Whether somebody looks at it live."""
+        if self._terminal is None:
+            isatty = getattr(self.out, "isatty", None)
+            self._terminal = bool(isatty and isatty()) and os.environ.get("TERM") != "dumb"
+        return self._terminal
+
+    # Lines
+
+    def say(self, text: str = "") -> None:
+        """Write a line (or several)."""
+        if self.quiet:
+            return
+        if self._progress is not None:
+            # Rich writes it above the bar.
+            self._progress.console.out(text, highlight=False)
+        else:
+            self._write(text)
+
+    def warn(self, text: str) -> None:
+        """Write a warning or an error, already rendered, to standard error."""
+        with contextlib.suppress(OSError, ValueError):
+            _print(self.err, text)
+
+    def log_line(self, text: str, header: bool = False) -> None:
+        """Write a line of the log."""
+        if header and self.terminal and not self.quiet and self._progress is None:
+            self._rich_console().print(
+                text, style="bold", markup=False, highlight=False, soft_wrap=True
+            )
+        else:
+            self.say(text)
+
+    def banner(self, title: str, facts: Mapping[str, Any]) -> None:
+        """Write what is about to run: a title and facts, one line each."""
+        self._table(title, [(name, (show(value),)) for name, value in facts.items()])
+
+    def summary(
+        self,
+        facts: Mapping[str, Any],
+        stages: Sequence[tuple[str, float]] = (),
+        title: str = "Run finished",
+    ) -> None:
+        """Write the table at the end of a run: facts, then where the time went.
+
+        Parameters
+        ----------
+        facts
+            Name and value, in order.
+        stages
+            Name and seconds of each part of the run.
+        """
+        rows = [(name, (show(value),)) for name, value in facts.items()]
+        total = sum(seconds for _, seconds in stages)
+        for name, seconds in stages:
+            share = f"{100 * seconds / total:.0f} %" if total > 0 else ""
+            rows.append((f"  {name}", (f"{seconds:.3g} s", share)))
+        self._table(title, rows)
+
+    @contextlib.contextmanager
+    def compiling(self, what: str = "kernels") -> Iterator[None]:
+        """Say that compilation goes on, and for how long it went."""
+        self.say(f"Compiling {what} (only the first time; kept for later runs) ...")
+        start = time.perf_counter()
+        yield
+        self.say(f"Compiled in {time.perf_counter() - start:.1f} s")
+
+    # Progress
+
+    def begin_run(self, step: int = 0, fraction: float = 0.0) -> None:
+        """Start to measure a run's progress from `step`."""
+        self._started = self._shown = time.perf_counter()
+        self._begin_step, self._begin_fraction = step, fraction
+        self._running = True
+        if self.terminal and not self.quiet:
+            from rich.progress import BarColumn, Progress, TextColumn
+
+            self._progress = Progress(
+                BarColumn(bar_width=30),
+                TextColumn("{task.description}"),
+                console=self._rich_console(),
+                # Redrawn from `progress`: a thread of its own would wait for compiled loops anyway.
+                auto_refresh=False,
+                transient=True,
+            )
+            self._task = self._progress.add_task("", total=1.0, completed=fraction)
+            self._progress.start()
+
+    def progress(self, step: int, time_: float, fraction: float | None = None) -> None:
+        """Show how far the run is: cheap enough to call at every step.
+
+        Parameters
+        ----------
+        step, time_
+            Where it is.
+        fraction
+            Share of the run done, or None where nobody knows (run_until, run_while).
+        """
+        now = time.perf_counter()
+        if (
+            now - self._shown < (REDRAW if self._progress is not None else REPORT)
+            or not self._running
+        ):
+            return
+        self._shown = now
+        text = self._describe(step, time_, fraction, now)
+        if self._progress is not None:
+            total = 1.0 if fraction is not None else None
+            self._progress.update(
+                self._task, total=total, completed=fraction or 0.0, description=text, refresh=True
+            )
+        else:
+            self.say(f"# {text}")
+
+    def end_run(self) -> None:
+        """Take the bar away; safe to call at any time."""
+        self._running = False
+        if self._progress is not None:
+            progress, self._progress = self._progress, None
+            progress.stop()
+
+    def _describe(self, step: int, time_: float, fraction: float | None, now: float) -> str:
+        elapsed = now - self._started
+        rate = (step - self._begin_step) / elapsed
+        parts = [f"step {step}", f"time {time_:.6g}", f"{rate:.3g} steps/s"]
+        if fraction is not None:
+            parts.insert(0, f"{100 * fraction:3.0f} %")
+            done = fraction - self._begin_fraction
+            if done > 0:
+                left = max(0.0, elapsed * (1 - fraction) / done)
+                parts.append(f"{duration(left)} left")
+        return ", ".join(parts)
+
+    # How it gets there
+
+    def _table(self, title: str, rows: Sequence[tuple[str, tuple[str, ...]]]) -> None:
+        if self.quiet:
+            return
+        if self.terminal and self._progress is None:
+            from rich.table import Table
+            from rich.text import Text
+
+            table = Table(
+                title=Text(title, style="bold"), show_header=False, box=None, title_justify="left"
+            )
+            width = max((len(cells) for _, cells in rows), default=1)
+            table.add_column(style="cyan", no_wrap=True)
+            for _ in range(width):
+                table.add_column(justify="left" if width == 1 else "right")
+            for name, cells in rows:
+                padded = [*cells, *[""] * (width - len(cells))]
+                table.add_row(Text(name), *(Text(cell) for cell in padded))
+            self._rich_console().print(table)
+            return
+        names = max((len(name) for name, _ in rows), default=0)
+        lines = [title]
+        for name, cells in rows:
+            rest = "  ".join(cell.rjust(8) if len(cells) > 1 else cell for cell in cells)
+            lines.append(f"  {name.ljust(names)}  {rest}")
+        self.say("\n".join(lines))
+
+    def _rich_console(self) -> Any:
+        if self._rich is None:
+            from rich.console import Console as RichConsole
+
+            self._rich = RichConsole(file=self._out, force_terminal=True if self._out else None)
+        return self._rich
+
+    def _write(self, text: str) -> None:
+        if self._broken:
+            return
+        try:
+            _print(self.out, text)
+        except BrokenPipeError:
+            # The reader (head, less) has gone: the run still finishes its files. The interpreter
+            # would complain when it flushes the stream on exit.
+            self._broken = True
+            with contextlib.suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
+
+
+def _print(stream: TextIO, text: str) -> None:
+    try:
+        stream.write(text + "\n")
+    except UnicodeEncodeError:
+        # A stream of an older encoding (a Windows pipe) shows what it cannot write as an escape.
+        encoding = stream.encoding or "ascii"
+        stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
+    stream.flush()
+
+
+def show(value: Any) -> str:
+    """A value as a table shows it: 1 234 567, 0.333333, text as it is."""
+    if isinstance(value, bool) or value is None:
+        return str(value)
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", " ")
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return str(value)
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people say them: 42 s, 3 min 20 s, 2 h 5 min."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
