@@ -1,0 +1,201 @@
+"""Commands about output: dump, log, plot and what belongs to them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from karamelo_py import registry, signature
+from karamelo_py.dumps.files import picture_format
+from karamelo_py.plots import Curve
+from karamelo_py.quantity import Quantity
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.signature import Argument, OutputFile, Positive
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argument) -> None:
+    """Write snapshots of the points or the nodes to files, again and again while the scene runs.
+
+    Parameters
+    ----------
+    ID
+        Name of the dump.
+    group
+        Always the word ``all``.
+    style
+        particle, particle/gz, grid, grid/gz, pyplot, or the style of a plug-in.
+    arguments
+        What the style asks for, beginning with the steps between two snapshots and the file name;
+        see the page of the style.
+
+    Example
+    -------
+    dump(d1, all, particle, 100, dump_p.*.LAMMPS, x, y, z, vx, vy, vz)
+
+    See Also
+    --------
+    delete_dump
+    """
+    target = registry.find("dump", style)
+    new = signature.call(target, hub, list(arguments), f"dump {style}")
+    for other_ID, other in hub.dumps.items():
+        if other.file == new.file and other_ID != ID:
+            raise ScriptError(
+                f"dump '{other_ID}' already writes to {new.file}",
+                expected="a file name of its own for each dump",
+            )
+    hub.dumps.add(ID, new)
+
+
+def delete_dump(hub: Hub, ID: str) -> None:
+    """Stop a dump. What it has written stays.
+
+    Parameters
+    ----------
+    ID
+        Name of the dump.
+
+    Example
+    -------
+    delete_dump(d1)
+
+    See Also
+    --------
+    dump
+    """
+    hub.dumps.remove(ID)
+
+
+def set_output(hub: Hub, every: Annotated[int, Positive]) -> None:
+    """Set how often a line is logged.
+
+    The log goes to the terminal and to log.mpm in the current folder, every line at once. The
+    first and the last state of each run are always logged. Without this command every step is.
+
+    Parameters
+    ----------
+    every
+        Steps between two lines, counted over all runs.
+
+    Example
+    -------
+    set_output(100)
+
+    See Also
+    --------
+    log_modify
+    """
+    hub.output.log.every = every
+
+
+def log(hub: Hub, every: Annotated[int, Positive]) -> None:
+    """Set how often a line is logged: the older form of set_output.
+
+    Only where it stands alone on a line; inside an expression log(x) is the natural logarithm.
+
+    Parameters
+    ----------
+    every
+        Steps between two lines, counted over all runs.
+
+    Example
+    -------
+    log(100)
+
+    See Also
+    --------
+    set_output
+    """
+    set_output(hub, every)
+
+
+def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Quantity) -> None:
+    """Choose the columns of the log.
+
+    Parameters
+    ----------
+    style
+        ``default``: step, dt and time. ``custom``: the columns that follow.
+    keys
+        ``step``, ``dt``, ``time``, a variable, a value of a fix or compute, or a formula of these.
+
+    Example
+    -------
+    log_modify(custom, step, dt, time, Ek_s, Es_s)
+
+    See Also
+    --------
+    set_output
+    """
+    if style == "default":
+        if keys:
+            raise ScriptError(
+                "log_modify: default takes no columns",
+                argument="keys",
+                expected="log_modify(default) or log_modify(custom, step, ...)",
+            )
+        hub.output.log.default()
+        return
+    if not keys:
+        raise ScriptError(
+            "log_modify: custom needs at least one column",
+            expected="log_modify(custom, step, dt, time, ...)",
+        )
+    hub.output.log.columns = list(keys)
+
+
+def plot(hub: Hub, ID: str, every: Annotated[int, Positive], x: Quantity, y: Quantity) -> None:
+    """Plot one quantity against another, in the picture that save_plot names.
+
+    Curves over the same x share one diagram, with a legend of their IDs.
+
+    Parameters
+    ----------
+    ID
+        Name of the curve, shown in the legend.
+    every
+        Steps between two points of the curve.
+    x, y
+        ``step``, ``dt``, ``time``, a variable, a value of a fix or compute, or a formula of these.
+
+    Example
+    -------
+    plot(kinetic, 10, time, Ek_s)
+
+    See Also
+    --------
+    save_plot
+    """
+    plots = hub.output.plots
+    if ID in plots.ids():
+        raise ScriptError(f"plot ID '{ID}' is already used", argument="ID")
+    plots.add(ID, Curve(every, x, y))
+
+
+def save_plot(hub: Hub, file: OutputFile) -> None:
+    """Draw the curves of all plot commands to a file at the end of each run.
+
+    A run that breaks off draws them, too.
+
+    After a run, it draws what was collected.
+
+    Parameters
+    ----------
+    file
+        File name ending in .png, .pdf or .svg.
+
+    Example
+    -------
+    save_plot(energies.pdf)
+
+    See Also
+    --------
+    plot
+    """
+    picture_format(file)
+    plots = hub.output.plots
+    plots.file = file
+    if not hub.rehearsing:
+        plots.save()
