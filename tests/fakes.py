@@ -1,0 +1,95 @@
+"""A small hub for tests of output: a cloud of points and a grid with made-up, well-known values."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from karamelo_py.console import Console
+
+
+class FakeValues(dict):
+    """Published names."""
+
+    def names(self):
+        return list(self)
+
+
+class FakeFields:
+    """`count` random points, the second half of them of solid 2, and the nodes of a grid."""
+
+    def __init__(self, hub, count):
+        self.hub = hub
+        self.count = count
+        rng = np.random.default_rng(3)
+        dimension = hub.domain.dimension
+        at = np.zeros((count, 3))
+        at[:, :dimension] = rng.uniform(-0.45, 0.45, (count, dimension))
+        self.points = {name: at[:, i] for i, name in enumerate("xyz")}
+        self.points["id"] = np.arange(1, count + 1)
+        self.points["type"] = np.where(np.arange(count) < count // 2, 1, 2)
+        for name in ("vx", "vy", "vz", "s11", "seq", "mass"):
+            self.points[name] = rng.normal(size=count) * 1e-3
+        self.points["volume"] = np.full(count, 0.5 / count)
+        cells = [5 if i < dimension else 1 for i in range(3)]
+        axes = [np.linspace(-0.5, 0.5, n) if n > 1 else np.zeros(1) for n in cells]
+        nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        self.nodes = {name: nodes[:, i] for i, name in enumerate("xyz")}
+        self.nodes["mass"] = np.where(nodes[:, 0] > 0, 1.0, 0.0)
+        self.node_count = len(nodes)
+
+    def particle_names(self):
+        return list(self.points)
+
+    def particle(self, name):
+        return self.points[name].copy()
+
+    def node_names(self):
+        return list(self.nodes)
+
+    def node(self, name):
+        return self.nodes[name].copy()
+
+
+class FakeHub:
+    """What output sees of a hub."""
+
+    def __init__(self, folder, dimension=2, count=40):
+        from karamelo_py.output import Output
+
+        used = np.arange(3) < dimension
+        self.folder = Path(folder)
+        self.domain = SimpleNamespace(
+            dimension=dimension, lo=np.where(used, -0.5, 0.0), hi=np.where(used, 0.5, 0.0), h=0.25
+        )
+        self.update = SimpleNamespace(step=0, time=0.0, dt=0.1)
+        self.values = FakeValues(Ek=1.0, Ek_s=1.0, Es_s=0.0)
+        self.interpreter = SimpleNamespace(variables={"E": 1000.0, "name": "text"})
+        self.rehearsing = self.checking = False
+        self.place = None
+        self.console = Console(io.StringIO(), io.StringIO())
+        self.fields = FakeFields(self, count)
+        self.dumps = {}
+        self.refreshed = []
+        self.output = Output(self)
+
+    def refresh_values(self):
+        self.refreshed.append(self.update.step)
+        self.values["Ek"] = self.values["Ek_s"] = np.cos(self.update.time) ** 2
+        self.values["Es_s"] = 1 - self.values["Ek_s"]
+
+    def run(self, steps):
+        """What a run does with output."""
+        output, update = self.output, self.update
+        output.begin()
+        end = update.step + steps
+        while update.step < end:
+            step = min(output.next_step(update.step), end)
+            update.time += update.dt * (step - update.step)
+            update.step = step
+            if step < end:
+                output.write()
+        output.end()

@@ -1,0 +1,250 @@
+"""Dumps: their text, what OVITO reads back, whole files, rhythm, pictures."""
+
+from __future__ import annotations
+
+import gzip
+
+import numpy as np
+import pytest
+from fakes import FakeHub
+
+from karamelo_py.dumps import files, lammps
+from karamelo_py.dumps.grid import Grid
+from karamelo_py.dumps.grid_gz import GridGz
+from karamelo_py.dumps.particle import Particle
+from karamelo_py.dumps.particle_gz import ParticleGz
+from karamelo_py.dumps.pyplot import PyPlot
+from karamelo_py.script.errors import ScriptError
+
+
+@pytest.fixture(params=[1, 2, 3])
+def hub(request, tmp_path):
+    return FakeHub(tmp_path, dimension=request.param)
+
+
+@pytest.fixture
+def plane(tmp_path):
+    return FakeHub(tmp_path, dimension=2)
+
+
+def steps_of(text):
+    lines = text.splitlines()
+    return [int(lines[i + 1]) for i, line in enumerate(lines) if line == "ITEM: TIMESTEP"]
+
+
+def test_text_is_lammps_format(plane):
+    """Compared with the format of the reference, line by line."""
+    plane.update.step, plane.update.time = 7, 0.7
+    Particle(plane, 1, "p.*.LAMMPS", "x", "y", "z", "vx").write()
+    lines = (plane.folder / "p.7.LAMMPS").read_text().splitlines()
+    assert lines[:10] == [
+        "ITEM: TIMESTEP",
+        "7",
+        "ITEM: TIME",
+        "0.7",
+        "ITEM: NUMBER OF ATOMS",
+        "40",
+        "ITEM: BOX BOUNDS sm sm sm",
+        "-0.5 0.5",
+        "-0.5 0.5",
+        "-0.125 0.125",
+    ]
+    assert lines[10] == "ITEM: ATOMS id type x y z vx"
+    assert lines[11].split()[:2] == ["1", "1"]
+    assert lines[-1].split()[:2] == ["40", "2"]
+    table = np.loadtxt(lines[11:])
+    for column, name in enumerate(("id", "type", "x", "y", "z", "vx")):
+        np.testing.assert_allclose(table[:, column], plane.fields.particle(name), rtol=1e-8)
+
+
+@pytest.mark.parametrize("style", [Particle, ParticleGz])
+@pytest.mark.parametrize("name", ["p.*.dump", "all.dump"])
+def test_ovito_reads_particles(hub, style, name):
+    io = pytest.importorskip("ovito.io")
+    name += ".gz" if style is ParticleGz else ""
+    dump = style(hub, 5, name, "x", "y", "z", "vx", "s11", "mass")
+    hub.dumps["d"] = dump
+    hub.run(10)
+    pipeline = io.import_file(str(hub.folder / name))
+    assert pipeline.source.num_frames == 3
+    for frame, step in enumerate((0, 5, 10)):
+        data = pipeline.compute(frame)
+        assert data.attributes["Timestep"] == step
+        assert data.attributes["Time"] == pytest.approx(0.1 * step)
+        points = data.particles
+        xyz = np.column_stack([hub.fields.particle(n) for n in "xyz"])
+        np.testing.assert_allclose(points.positions, xyz, rtol=1e-8)
+        np.testing.assert_array_equal(points.particle_types, hub.fields.particle("type"))
+        np.testing.assert_array_equal(points.identifiers, hub.fields.particle("id"))
+        np.testing.assert_allclose(points["Velocity"][:, 0], hub.fields.particle("vx"), rtol=1e-8)
+        np.testing.assert_allclose(points["s11"], hub.fields.particle("s11"), rtol=1e-8)
+        np.testing.assert_allclose(points["Mass"], hub.fields.particle("mass"), rtol=1e-8)
+        assert data.cell.volume > 0
+
+
+@pytest.mark.parametrize("style", [Grid, GridGz])
+def test_ovito_reads_grid(hub, style):
+    io = pytest.importorskip("ovito.io")
+    ending = "gz" if style is GridGz else "dump"
+    style(hub, 1, f"g.*.{ending}", "x", "y", "z", "mass").write()
+    data = io.import_file(str(hub.folder / f"g.0.{ending}")).compute()
+    assert data.particles.count == hub.fields.node_count
+    assert list(data.particles.identifiers[:3]) == [0, 1, 2]
+    np.testing.assert_allclose(data.particles["Mass"], hub.fields.node("mass"))
+
+
+def test_grid_without_empty_nodes(plane):
+    Grid(plane, 1, "g.dump", "mass", occupied=True).write()
+    table = np.loadtxt((plane.folder / "g.dump").read_text().splitlines()[11:])
+    keep = plane.fields.node("mass") > 0
+    np.testing.assert_array_equal(table[:, 0], np.flatnonzero(keep))
+    np.testing.assert_allclose(table[:, 2], plane.fields.node("x")[keep])
+
+
+def test_positions_are_always_written(plane):
+    assert Particle(plane, 1, "p").columns == ("x", "y", "z")
+    assert Particle(plane, 1, "p", "x", "y", "vx").columns == ("x", "y", "z", "vx")
+    assert Particle(plane, 1, "p", "id", "vx", "z", "y", "x", "vx").columns == ("vx", "z", "y", "x")
+
+
+def test_rows_keep_integers_and_nine_digits():
+    count = lammps.ROWS + 3
+    integers = np.arange(count) * 10_000_000_000
+    numbers = np.linspace(-1e-7, 1, count) / 3
+    text = b"".join(lammps.rows([integers, numbers])).decode().splitlines()
+    assert len(text) == count
+    assert [int(line.split()[0]) for line in text] == list(integers)
+    np.testing.assert_allclose([float(line.split()[1]) for line in text], numbers, rtol=1e-8)
+
+
+def test_rows_of_nothing():
+    assert b"".join(lammps.rows([np.zeros(0, int), np.zeros(0)])) == b""
+
+
+def test_rhythm(plane):
+    """First and last state of each run and multiples of the absolute step; none twice."""
+    plane.dumps["d"] = Particle(plane, 4, "all.dump")
+    plane.run(18)
+    plane.run(3)
+    assert steps_of((plane.folder / "all.dump").read_text()) == [0, 4, 8, 12, 16, 18, 20, 21]
+
+
+def test_one_file_per_step(plane):
+    plane.dumps["d"] = Particle(plane, 4, "p.*.LAMMPS")
+    plane.run(6)
+    names = sorted(p.name for p in plane.folder.iterdir() if p.name != "log.mpm")
+    assert names == ["p.0.LAMMPS", "p.4.LAMMPS", "p.6.LAMMPS"]
+
+
+def test_a_new_run_of_the_program_replaces_the_file(tmp_path):
+    for _ in range(2):
+        hub = FakeHub(tmp_path)
+        hub.dumps["d"] = Particle(hub, 4, "all.dump")
+        hub.run(4)
+    assert steps_of((tmp_path / "all.dump").read_text()) == [0, 4]
+
+
+def test_gz_is_the_same_text_and_the_same_bytes(tmp_path):
+    hub = FakeHub(tmp_path)
+    Particle(hub, 1, "p.txt", "seq").write()
+    for name in ("a.gz", "b.gz"):
+        ParticleGz(hub, 1, name, "seq").write()
+    assert gzip.decompress((tmp_path / "a.gz").read_bytes()) == (tmp_path / "p.txt").read_bytes()
+    assert (tmp_path / "a.gz").read_bytes() == (tmp_path / "b.gz").read_bytes()
+
+
+def test_unknown_column_names_the_nearest(plane):
+    with pytest.raises(ScriptError) as caught:
+        Particle(plane, 1, "p", "x", "s111")
+    assert "s111" in str(caught.value)
+    assert caught.value.argument == 3
+    assert "s11" in caught.value.hint
+
+
+@pytest.mark.parametrize("style", [Particle, ParticleGz])
+@pytest.mark.parametrize("name", ["p.*.dump", "all.dump"])
+def test_a_snapshot_that_breaks_off_leaves_nothing(plane, monkeypatch, style, name):
+    """Ctrl-C in the middle of a snapshot: earlier ones stay readable."""
+    dump = style(plane, 1, name)
+    dump.write()
+    plane.update.step = 1
+    before = {p.name: p.read_bytes() for p in plane.folder.iterdir()}
+
+    def interrupted(columns):
+        yield b"1 1 0."
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(lammps, "rows", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        dump.write()
+    assert {p.name: p.read_bytes() for p in plane.folder.iterdir()} == before
+
+
+def test_a_folder_that_went_away_is_a_script_error(plane):
+    with pytest.raises(ScriptError, match="cannot write"):
+        Particle(plane, 1, "gone/p.*.dump").write()
+
+
+@pytest.mark.parametrize("field", [None, "seq"])
+@pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
+def test_pyplot_draws(hub, field, ending):
+    hub.dumps["d"] = PyPlot(hub, 2, f"p.*.{ending}", 300, 2, field)
+    hub.run(3)
+    pictures = {int(p.name.split(".")[1]): p for p in hub.folder.glob(f"p.*.{ending}")}
+    assert sorted(pictures) == [0, 2, 3]
+    magic = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[ending]
+    assert all(p.read_bytes().startswith(magic) for p in pictures.values())
+    if ending == "png":
+        image = pytest.importorskip("PIL.Image").open(pictures[3])
+        assert image.size == (300, 200)
+        colours = len(np.unique(np.asarray(image).reshape(-1, 3), axis=0))
+        assert colours > (10 if hub.domain.dimension > 1 or field else 2)
+
+
+def test_pyplot_shows_the_points_of_each_state(plane):
+    """A reused figure gives the picture that a fresh one gives."""
+    hub = plane
+    reused = PyPlot(hub, 1, "reused.*.png", 3, 3)
+    reused.write()
+    hub.update.step = 1
+    hub.fields.points["x"] *= 0.5
+    reused.write()
+    PyPlot(hub, 1, "fresh.*.png", 3, 3).write()
+    first, second, fresh = (
+        (hub.folder / name).read_bytes() for name in ("reused.0.png", "reused.1.png", "fresh.1.png")
+    )
+    assert first != second
+    assert second == fresh
+
+
+def test_pyplot_survives_fields_without_range(plane):
+    for values in (0.0, -3.0, np.nan, 1e300):
+        plane.fields.points["seq"][:] = values
+        PyPlot(plane, 1, "p.png", 2, 2, "seq").write()
+
+
+def test_pyplot_refuses_other_formats_and_fields(plane):
+    with pytest.raises(ScriptError, match=r"p\.jpg"):
+        PyPlot(plane, 1, "p.jpg", 3, 3)
+    with pytest.raises(ScriptError) as caught:
+        PyPlot(plane, 1, "p.png", 3, 3, "sqe")
+    assert "seq" in caught.value.hint
+
+
+def test_limits_grow_and_stay():
+    from karamelo_py.dumps.picture import grown
+
+    limits = grown(None, np.array([0.0, 0.9]))
+    assert limits[0] <= 0 and limits[1] >= 0.9
+    assert grown(limits, np.array([0.1, 0.5])) == limits
+    wider = grown(limits, np.array([-3.0]))
+    assert wider[0] <= -3 and wider[1] >= limits[1]
+
+
+def test_whole_file_appears_at_once(tmp_path):
+    target = tmp_path / "a"
+    with files.whole(target) as file:
+        file.write(b"1")
+        assert not target.exists()
+    assert target.read_bytes() == b"1"
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
