@@ -144,6 +144,19 @@ def test_terminal_console(monkeypatch):
     assert "416" in text and "25 %" in text and "10 [0.1]" in text
 
 
+def test_no_line_of_a_burst_is_lost_on_a_terminal():
+    console = Console(io.StringIO(), terminal=True)
+    console.begin_run()
+    for i in range(100):
+        console.log_line(f"<{i}>")
+    console.say("said")
+    console.log_line("<100>")
+    console.end_run()
+    text = console.out.getvalue()
+    found = [text.index(word) for word in (*(f"<{i}>" for i in range(100)), "said", "<100>")]
+    assert found == sorted(found)
+
+
 def test_piped_output_does_not_import_rich():
     import subprocess
     import sys
