@@ -32,6 +32,7 @@ class Log:
         self.last_step: int | None = None
         self._file: TextIO | None = None
         self._header: str | None = None
+        self._widths: list[int] = []
 
     def default(self) -> None:
         """Log step, dt and time."""
@@ -41,7 +42,12 @@ class Log:
         """Write the header: to the file where it is new, to the terminal always."""
         if not self.columns:
             self.columns = [Quantity(self.hub, name) for name in ("step", "dt", "time")]
-        header = _row([column.heading for column in self.columns], self._widths())
+        headings = [column.heading for column in self.columns]
+        self._widths = [
+            max(len(heading), STEP_WIDTH if heading == "Step" else NUMBER_WIDTH)
+            for heading in headings
+        ]
+        header = _row(headings, self._widths)
         if header != self._header:
             if self._file is None:
                 self._open()
@@ -63,7 +69,7 @@ class Log:
                 # A blank keeps the place of the minus sign; the first column starts at the margin
                 # for pandas' sake.
                 cells.append(f"{number: .10g}" if cells else f"{number:.10g}")
-        line = _row(cells, self._widths())
+        line = _row(cells, self._widths)
         self._put(line)
         self.hub.console.log_line(line)
 
@@ -72,10 +78,6 @@ class Log:
         if self._file is not None:
             self._file.close()
             self._file = None
-
-    def _widths(self) -> list[int]:
-        widths = [STEP_WIDTH if column.name == "step" else NUMBER_WIDTH for column in self.columns]
-        return [max(w, len(c.heading)) for w, c in zip(widths, self.columns, strict=True)]
 
     def _open(self) -> None:
         path = self.hub.folder / FILE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from karamelo_py.log import Log
@@ -36,6 +37,8 @@ class Output:
         self.hub = hub
         self.log = Log(hub)
         self.plots = Plots(hub)
+        # Which dump a file belongs to.
+        self.files: dict[Path, str] = {}
 
     def begin(self, run: Any = None) -> None:
         """Write the headers and the first state of a run."""

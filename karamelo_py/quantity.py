@@ -39,7 +39,14 @@ class Quantity:
         self.hub = hub
         self.name = name
         self.formula = formula
-        source = formula if formula is not None else self._source()
+        if formula is None and name not in self.names(hub):
+            close = nearest(name, self.names(hub))
+            raise ScriptError(
+                f"unknown quantity '{name}'",
+                expected="step, dt, time, a variable, or a value of a fix or compute",
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+        source = self._source()
         if isinstance(source, str):
             raise ScriptError(f"'{name}' is text, not a number")
         per_point = PER_POINT & getattr(source, "names", frozenset())
@@ -72,36 +79,31 @@ class Quantity:
 
     @property
     def heading(self) -> str:
-        """The name as it heads a column: as Karamelo writes it."""
-        return KEYWORDS.get(self.name, self.name)
+        """The name as it heads a column: as Karamelo writes it, and without blanks."""
+        return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int:
         """The number now."""
-        if self.formula is None and self.name in KEYWORDS:
-            return getattr(self.hub.update, self.name)
-        source = self.formula if self.formula is not None else self._source()
+        source = self._source()
         if isinstance(source, str):
             raise ScriptError(f"'{self.name}' is text, not a number")
         if hasattr(source, "evaluate"):
             return float(source.evaluate(self.hub.values))
-        return float(source)
+        return source
 
     def _source(self) -> Any:
-        """The variable's content or the published number behind the name."""
+        """The formula, the content of the variable, or the number behind the name.
+
+        Looked up each time, as the script may set a variable anew between two runs.
+        """
+        if self.formula is not None:
+            return self.formula
         if self.name in KEYWORDS:
-            return 0.0
+            return getattr(self.hub.update, self.name)
         variables = _variables(self.hub)
         if self.name in variables:
             return variables[self.name]
-        names = self.hub.values.names()
-        if self.name in names:
-            return self.hub.values.get(self.name)
-        close = nearest(self.name, self.names(self.hub))
-        raise ScriptError(
-            f"unknown quantity '{self.name}'",
-            expected="step, dt, time, a variable, or a value of a fix or compute",
-            hint=f"did you mean '{close}'?" if close else None,
-        )
+        return float(self.hub.values.get(self.name))
 
 
 def _variables(hub: Hub) -> dict[str, Any]:

@@ -40,13 +40,14 @@ def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argum
     """
     target = registry.find("dump", style)
     new = signature.call(target, hub, list(arguments), f"dump {style}")
-    for other_ID, other in hub.dumps.items():
-        if other.file == new.file and other_ID != ID:
-            raise ScriptError(
-                f"dump '{other_ID}' already writes to {new.file}",
-                expected="a file name of its own for each dump",
-            )
+    writer = hub.output.files.get(new.file)
+    if writer is not None and ID not in hub.dumps:
+        raise ScriptError(
+            f"dump '{writer}' already writes to {new.file}",
+            expected="a file name of its own for each dump",
+        )
     hub.dumps.add(ID, new)
+    hub.output.files[new.file] = ID
 
 
 def delete_dump(hub: Hub, ID: str) -> None:
@@ -65,7 +66,11 @@ def delete_dump(hub: Hub, ID: str) -> None:
     --------
     dump
     """
+    old = hub.dumps[ID]
     hub.dumps.remove(ID)
+    if old.one_file_per_step:
+        # A file of many snapshots stays taken: another dump would begin it anew.
+        hub.output.files.pop(old.file, None)
 
 
 def set_output(hub: Hub, every: Annotated[int, Positive]) -> None:
