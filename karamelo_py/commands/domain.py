@@ -1,0 +1,193 @@
+"""Commands about space: dimension, create_domain, axisymmetric, region."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from karamelo_py import registry, signature
+from karamelo_py.domain import Domain, require_domain
+from karamelo_py.forms import Forms, number, place_of
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.signature import Argument
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+_BOUNDS = ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
+_WITH_H = {d: (*_BOUNDS[: 2 * d], "h") for d in (1, 2, 3)}
+DIMENSION = Forms("dimension({dimension}, {names})", _WITH_H)
+CREATE_DOMAIN = Forms("create_domain({names})", _WITH_H)
+CREATE_DOMAIN_WITHOUT_H = Forms(
+    "create_domain({names}[, h])", {d: _BOUNDS[: 2 * d] for d in (1, 2, 3)}
+)
+
+
+def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
+    """Set the number of dimensions, the domain and the cell size of its grid.
+
+    The domain is a box that holds everything; points that leave it end the run. In 1D strain is
+    uniaxial, in 2D it is plane (unit thickness). The grid starts at the lower corner and covers
+    the whole domain, whose sides need not be multiples of the cell size.
+
+    Parameters
+    ----------
+    dimensions
+        1, 2 or 3.
+    bounds
+        In 1D ``xmin, xmax, h``; in 2D ``xmin, xmax, ymin, ymax, h``; in 3D
+        ``xmin, xmax, ymin, ymax, zmin, zmax, h``, with the cell size h. Left out altogether in
+        the older language, where create_domain follows.
+
+    Example
+    -------
+    dimension(2, -0.5, 0.5, -0.5, 0.5, 0.05)
+
+    Notes
+    -----
+    Comes once, before regions and solids.
+
+    See Also
+    --------
+    region, create_domain
+    """
+    _refuse_second(hub)
+    count = _dimensions(hub, dimensions)
+    if not bounds:
+        hub.announced_dimension = count
+        return
+    hub.domain = _domain(hub, DIMENSION, bounds, count)
+
+
+def create_domain(hub: Hub, *bounds: Argument) -> None:
+    """Set the domain: the older form of dimension.
+
+    Parameters
+    ----------
+    bounds
+        ``xmin, xmax``, in 2D and 3D followed by ``ymin, ymax``, in 3D followed by
+        ``zmin, zmax``; then perhaps the cell size h. Without h the first solid sets it.
+
+    Example
+    -------
+    dimension(2)
+    create_domain(-0.5, 0.5, -0.5, 0.5, 0.05)
+
+    Notes
+    -----
+    Without ``dimension(1|2|3)`` before it, the number of arguments tells the dimension. New
+    scripts say it all with dimension.
+
+    See Also
+    --------
+    dimension
+    """
+    _refuse_second(hub)
+    count = getattr(hub, "announced_dimension", None) or (len(bounds) // 2)
+    count = min(max(count, 1), 3)
+    forms = CREATE_DOMAIN_WITHOUT_H if len(bounds) == 2 * count else CREATE_DOMAIN
+    hub.domain = _domain(hub, forms, bounds, count)
+
+
+def axisymmetric(hub: Hub, active: bool) -> None:
+    """Say whether x is a radius and y the axis of symmetry.
+
+    Parameters
+    ----------
+    active
+        ``true`` or ``false``. ``true`` is not there yet.
+
+    Example
+    -------
+    axisymmetric(false)
+    """
+    domain = require_domain(hub)
+    if not active:
+        domain.axisymmetric = False
+        return
+    raise ScriptError(
+        "axisymmetric kinematics is not there yet",
+        argument="active",
+        expected="axisymmetric(false), or a scene in 3D",
+    )
+
+
+def region(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+    """Name a part of space, to be filled by a solid or to choose the members of a group.
+
+    Parameters
+    ----------
+    ID
+        Name of the region.
+    style
+        block, cylinder, sphere, union, intersection, difference, or the style of a plug-in.
+    arguments
+        What the style asks for, see the page of the style.
+
+    Example
+    -------
+    region(disk, cylinder, -0.3, -0.3, 0.2)
+
+    Notes
+    -----
+    Surfaces belong to a region. The word ``exterior`` at the end of block, cylinder and sphere
+    inverts the region, for groups and for solids.
+
+    See Also
+    --------
+    dimension, group, solid
+    """
+    require_domain(hub)
+    target = registry.find("region", style)
+    hub.regions.add(ID, signature.call(target, hub, list(arguments), f"region {style}"))
+
+
+def _refuse_second(hub: Hub) -> None:
+    if hub.domain is None:
+        return
+    if hub.solids:
+        first = next(iter(hub.solids))
+        raise ScriptError(
+            f"the domain cannot change once solid '{first}' is in it",
+            expected="the domain before all regions, solids and groups",
+        )
+    raise ScriptError(
+        "the domain is set already", expected="one dimension(...) or create_domain(...) in a scene"
+    )
+
+
+def _dimensions(hub: Hub, argument: Argument) -> int:
+    value = number(hub, argument, "the number of dimensions")
+    if value not in DIMENSION.names:
+        raise ScriptError(
+            f"the number of dimensions must be 1, 2 or 3, not {value:g}",
+            place=argument.place,
+            expected=" or ".join(DIMENSION.line(d) for d in DIMENSION.names),
+        )
+    return int(value)
+
+
+def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) -> Domain:
+    values = forms.read(hub, bounds, count)
+    names = forms.names[count]
+    lo = [values[name] for name in _BOUNDS[0 : 2 * count : 2]]
+    hi = [values[name] for name in _BOUNDS[1 : 2 * count : 2]]
+    for axis, (a, b) in enumerate(zip(lo, hi, strict=True)):
+        if b <= a:
+            low, high = _BOUNDS[2 * axis : 2 * axis + 2]
+            raise ScriptError(
+                f"{high} = {b:g} must be above {low} = {a:g}",
+                place=place_of(names, bounds, high),
+                expected=forms.line(count),
+            )
+    h = values.get("h")
+    if h is not None and h <= 0:
+        raise ScriptError(
+            f"the cell size h = {h:g} must be above 0",
+            place=place_of(names, bounds, "h"),
+            expected=forms.line(count),
+        )
+    try:
+        return Domain(count, lo, hi, h)
+    except ScriptError as error:
+        error.argument, error.place = None, place_of(names, bounds, "h")
+        raise

@@ -1,0 +1,47 @@
+"""Region style difference."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from karamelo_py.domain import require_domain
+from karamelo_py.regions.base import Region
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+class Difference(Region):
+    """All that lies in the first region and not in the second.
+
+    Parameters
+    ----------
+    first
+        ID of the region to cut from.
+    second
+        ID of the region that is cut off, its surface included.
+
+    Example
+    -------
+    region(plate, block, -1, 1, -1, 1)
+    region(hole, cylinder, 0, 0, 0.2)
+    region(sheet, difference, plate, hole)
+
+    See Also
+    --------
+    union, intersection
+    """
+
+    def __init__(self, hub: Hub, first: Region, second: Region):
+        self.first = first
+        self.second = second
+        used = slice(0, require_domain(hub).dimension)
+        super().__init__(hub, first.box_lo[used], first.box_hi[used])
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        """Which positions lie in the first region only, see `Region.contains`."""
+        inside = self.first.inside(x)
+        inside &= ~self.second.inside(x)
+        return inside
