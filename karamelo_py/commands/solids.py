@@ -1,0 +1,148 @@
+"""Commands that fill the scene: solid and group."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from karamelo_py import signature
+from karamelo_py.domain import require_domain
+from karamelo_py.group import ALL, KINDS
+from karamelo_py.regions.base import Region
+from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.signature import Argument
+from karamelo_py.solid import Solid
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+_SYNTAX = "solid(ID, region, regionID, ppc, material, h[, T0])"
+
+
+def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
+    """Make a body: fill a region with material points.
+
+    Points are put into the cells of the grid, `ppc` along each direction, and kept where they
+    lie in the region and in the domain. Each carries the volume ``(h / ppc)^dimension`` and the
+    mass that its material has in it.
+
+    Parameters
+    ----------
+    ID
+        Name of the solid.
+    kind
+        ``region``.
+    arguments
+        ``regionID, ppc, material, h[, T0]``: the region to fill, the points per cell in each
+        direction, the material, the cell size (that of the domain), and the initial temperature
+        (0 when left out).
+
+    Example
+    -------
+    solid(s1, region, disk, 2, steel, 0.05, 0)
+
+    Notes
+    -----
+    The points of a cell stand at equal distances, but for ``ppc`` 3, where they stand at the
+    Gauss points. The method, the domain, the region and the material come before.
+
+    See Also
+    --------
+    region, material, dimension, group
+    """
+    if getattr(hub.update, "method", None) is None:
+        raise ScriptError(
+            "there is no method yet",
+            expected="method(...) before the first solid, such as method(ulmpm, FLIP, linear, 1)",
+        )
+    require_domain(hub)
+    if kind in ("mesh", "file"):
+        raise ScriptError(
+            f"solids from a {kind} are not there yet", argument="kind", expected=_SYNTAX
+        )
+    if kind != "region":
+        close = nearest(kind, ["region", "mesh"])
+        raise ScriptError(
+            f"unknown kind of solid '{kind}'",
+            argument="kind",
+            expected=_SYNTAX,
+            hint=f"did you mean '{close}'?" if close else None,
+        )
+    hub.solids.add(ID, signature.call(Solid, hub, list(arguments), "solid region"))
+
+
+def group(
+    hub: Hub,
+    ID: str,
+    kind: Literal["particles", "nodes"],
+    by: Literal["region"],
+    region: Region,
+    of: Literal["all", "solid"],
+    *solids: Solid,
+) -> None:
+    """Name a set of points or of nodes.
+
+    Who belongs to it is decided here, once, by the reference positions of the points or by the
+    positions of the nodes. The group ``all`` of everything is always there.
+
+    Parameters
+    ----------
+    ID
+        Name of the group. A name that is in use gets the new members, too.
+    kind
+        ``particles`` or ``nodes``.
+    by
+        The word ``region``.
+    region
+        ID of the region, which says who belongs.
+    of
+        ``all``, or ``solid`` followed by the IDs of the solids whose points may belong.
+    solids
+        IDs of solids. They share one grid: for nodes it makes no difference which are named.
+
+    Example
+    -------
+    group(left, nodes, region, wall, all)
+    group(impactor, particles, region, box, solid, s1)
+
+    See Also
+    --------
+    region, fix, compute
+    """
+    if ID == ALL:
+        raise ScriptError(
+            "'all' is the group of everything and cannot be changed",
+            argument="ID",
+            expected="another name",
+        )
+    if of == "solid" and not solids:
+        raise ScriptError(
+            "no solid is named",
+            argument="of",
+            expected=f"group({ID}, {kind}, region, {region.id}, solid, solidID, ...)",
+        )
+    if of == "all" and solids:
+        raise ScriptError(
+            "nothing can follow 'all'",
+            argument="solids",
+            expected=f"group({ID}, {kind}, region, {region.id}, all)",
+        )
+    if ID in hub.groups:
+        members = hub.groups[ID]
+        if members.kind != kind:
+            raise ScriptError(
+                f"group '{ID}' is a group of {members.kind}",
+                argument="kind",
+                expected=f"{members.kind}, or another ID",
+            )
+    else:
+        members = hub.groups.add(ID, KINDS[kind](hub))
+    found = members.add(region, solids or tuple(hub.solids.values()))
+    if not found:
+        none_yet = kind == "particles" and not hub.solids
+        hub.warn(
+            f"group '{ID}': region '{region.id}' holds no {kind}; "
+            "what acts on this group does nothing there",
+            hint="no solid is made yet: groups of particles come after the solids"
+            if none_yet
+            else None,
+        )
