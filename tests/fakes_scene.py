@@ -1,0 +1,81 @@
+"""A small hub for tests of domain, regions, solids and groups, and arguments without a parser."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import NamedTuple
+
+from karamelo_py.domain import Domain
+from karamelo_py.hub import Catalogue
+from karamelo_py.points.materials import reference_density
+from karamelo_py.script.errors import Place
+from karamelo_py.solid import Solid
+
+DENSITY = 1000.0
+
+
+class FakeLaw(NamedTuple):
+    """A law that has a density and nothing else."""
+
+    rho: float = DENSITY
+
+
+@reference_density.on(FakeLaw)
+def _(law):
+    return law.rho
+
+
+class FakeArgument:
+    """An argument as a script has it: a number, a word, or a formula (anything else)."""
+
+    def __init__(self, text, index=0):
+        self.text = str(text)
+        self.place = Place("in.test", 1, index + 1, len(self.text), "")
+
+    def word(self):
+        return self.text if self.text.isidentifier() else None
+
+    def value(self, hub):
+        try:
+            return float(self.text)
+        except ValueError:
+            return object()
+
+
+def arguments(*texts):
+    """Arguments from texts or numbers; the column of each is its number, from 1."""
+    return [FakeArgument(text, index) for index, text in enumerate(texts)]
+
+
+class FakeHub:
+    """What the parts of a scene see of a hub."""
+
+    def __init__(self, dimension=2, lo=-0.5, hi=0.5, h=0.05):
+        self.place = None
+        self.rehearsing = self.checking = False
+        self.warnings = []
+        self.update = SimpleNamespace(method=object())
+        self.regions = Catalogue("region", self)
+        self.solids = Catalogue("solid", self)
+        self.groups = Catalogue("group", self)
+        self.domain = (
+            Domain(dimension, [lo] * dimension, [hi] * dimension, h) if dimension else None
+        )
+
+    def warn(self, message, place=None, hint=None):
+        self.warnings.append(message)
+
+    def region(self, ID, style, *texts):
+        """Make and file a region of class `style`."""
+        return self.regions.add(ID, style(self, *arguments(*texts)))
+
+    def combine(self, ID, style, *parts):
+        """Make and file a region from other regions."""
+        return self.regions.add(ID, style(self, *parts))
+
+    def solid(self, ID, region, ppc=2, h=None, **options):
+        """Make and file a solid."""
+        material = SimpleNamespace(law=FakeLaw())
+        return self.solids.add(
+            ID, Solid(self, region, ppc, material, h or self.domain.h, **options)
+        )

@@ -1,0 +1,143 @@
+"""Groups of points and of nodes."""
+
+import numpy as np
+import pytest
+from fakes_scene import FakeArgument, FakeHub
+
+from karamelo_py.commands.solids import group
+from karamelo_py.group import AnyGroup, NodeGroup, ParticleGroup
+from karamelo_py.regions.block import Block
+from karamelo_py.regions.cylinder import Cylinder
+from karamelo_py.script.errors import ScriptError
+
+
+def scene():
+    """Two squares of 4 x 4 points each in a unit square with cells of 0.1."""
+    hub = FakeHub(2, 0, 1, 0.1)
+    hub.solid("s1", hub.region("r1", Block, 0, 0.2, 0, 0.2))
+    hub.solid("s2", hub.region("r2", Block, 0.5, 0.7, 0.5, 0.7))
+    return hub
+
+
+def test_points_by_reference_position():
+    hub = scene()
+    low = hub.region("low", Block, "INF", "INF", 0, 0.05)
+    group(hub, "g", "particles", "region", low, "all")
+    np.testing.assert_array_equal(hub.groups["g"].ids, [0, 2, 8, 10])
+    assert hub.groups["g"].ids.dtype == np.int64
+    assert not hub.groups["g"].all
+
+
+def test_points_of_named_solids():
+    hub = scene()
+    everywhere = hub.region("e", Block, "INF", "INF", "INF", "INF")
+    s1, s2 = hub.solids["s1"], hub.solids["s2"]
+    group(hub, "second", "particles", "region", everywhere, "solid", s2)
+    np.testing.assert_array_equal(hub.groups["second"].ids, np.arange(16, 32))
+    group(hub, "both", "particles", "region", everywhere, "solid", s2, s1, s2)
+    np.testing.assert_array_equal(hub.groups["both"].ids, np.arange(32))
+
+
+def test_an_id_again_adds_members():
+    hub = scene()
+    s1, s2 = hub.solids["s1"], hub.solids["s2"]
+    group(hub, "g", "particles", "region", hub.regions["r2"], "solid", s2)
+    kept = hub.groups["g"]
+    group(hub, "g", "particles", "region", hub.regions["r1"], "solid", s1)
+    assert hub.groups["g"] is kept
+    np.testing.assert_array_equal(kept.ids, np.arange(32))
+    with pytest.raises(ScriptError, match="is a group of particles"):
+        group(hub, "g", "nodes", "region", hub.regions["r1"], "all")
+
+
+def test_nodes_by_position():
+    """A disc of radius 0.2, h = 0.05, centred on a node holds 49 nodes (reference, section 4.5)."""
+    hub = FakeHub(2, -0.5, 0.5, 0.05)
+    group(hub, "g", "nodes", "region", hub.region("d", Cylinder, 0.1, -0.1, 0.2), "all")
+    assert len(hub.groups["g"]) == 49
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("exterior", [(), ("exterior",)])
+def test_nodes_in_a_box_are_all_nodes_in_it(dimension, exterior):
+    hub = FakeHub(dimension, 0, 1, 0.15)
+    region = hub.region("r", Block, *[0.3, 0.75] * dimension, *exterior)
+    group(hub, "g", "nodes", "region", region, "all")
+    want = np.flatnonzero(region.inside(hub.domain.node_positions()))
+    np.testing.assert_array_equal(hub.groups["g"].nodes, want)
+    assert len(want)
+
+
+def test_open_ends_take_in_the_nodes_beyond_the_domain():
+    hub = FakeHub(2, 0, 1, 0.3)  # the grid reaches to 1.2
+    group(hub, "g", "nodes", "region", hub.region("r", Block, 0, 0, "INF", "INF"), "all")
+    np.testing.assert_array_equal(hub.groups["g"].nodes, np.arange(5))
+
+
+def test_nodes_far_away_are_none():
+    hub = FakeHub(2, 0, 1, 0.1)
+    for k, bounds in enumerate([(3, 4, 0, 1), (-5, -4, 0, 1), (0.01, 0.02, 0, 1)]):
+        group(hub, f"g{k}", "nodes", "region", hub.region(f"r{k}", Block, *bounds), "all")
+        assert len(hub.groups[f"g{k}"]) == 0
+    assert len(hub.warnings) == 3
+
+
+def test_all_is_everything_also_later():
+    hub = scene()
+    points = ParticleGroup.from_script(hub, FakeArgument("all"))
+    nodes = NodeGroup.from_script(hub, FakeArgument("all"))
+    assert points.all and nodes.all and AnyGroup.from_script(hub, FakeArgument("all")).all
+    assert len(nodes.nodes) == 121
+    assert len(points.ids) == 32
+    hub.solid("s3", hub.region("r3", Block, 0.8, 0.9, 0.8, 0.9))
+    assert len(points.ids) == 36
+
+
+def test_points_made_later_do_not_join():
+    hub = scene()
+    group(hub, "g", "particles", "region", hub.regions["r1"], "all")
+    hub.solid("s3", hub.regions["r1"])
+    assert len(hub.groups["g"]) == 16
+
+
+def test_groups_by_name():
+    hub = scene()
+    group(hub, "p", "particles", "region", hub.regions["r1"], "all")
+    group(hub, "n", "nodes", "region", hub.regions["r1"], "all")
+    assert ParticleGroup.from_script(hub, FakeArgument("p")) is hub.groups["p"]
+    assert AnyGroup.from_script(hub, FakeArgument("n")) is hub.groups["n"]
+    with pytest.raises(ScriptError) as caught:
+        NodeGroup.from_script(hub, FakeArgument("p"))
+    assert "group 'p' is a group of particles" in str(caught.value)
+    assert "a group of nodes" in caught.value.expected
+    with pytest.raises(ScriptError) as caught:
+        AnyGroup.from_script(hub, FakeArgument("q", 2))
+    assert caught.value.place.column == 3
+
+
+def test_empty_groups_are_warned_about():
+    hub = FakeHub()
+    group(hub, "g", "particles", "region", hub.region("r", Block, 0, 1, 0, 1), "all")
+    assert "holds no particles" in hub.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("ID", "of", "solids", "says"),
+    [
+        ("all", "all", (), "cannot be changed"),
+        ("g", "solid", (), "no solid is named"),
+        ("g", "all", ("s1",), "nothing can follow 'all'"),
+    ],
+)
+def test_wrong_groups(ID, of, solids, says):
+    hub = scene()
+    with pytest.raises(ScriptError, match=says):
+        group(
+            hub,
+            ID,
+            "particles",
+            "region",
+            hub.regions["r1"],
+            of,
+            *[hub.solids[s] for s in solids],
+        )

@@ -1,0 +1,341 @@
+"""Domain and regions: who is in, faces included, in 1D, 2D and 3D."""
+
+import math
+
+import numpy as np
+import pytest
+from fakes_scene import FakeHub, arguments
+from hypothesis import given
+from hypothesis import strategies as st
+
+from karamelo_py.commands import domain as commands
+from karamelo_py.domain import Domain
+from karamelo_py.regions.block import Block
+from karamelo_py.regions.cylinder import Cylinder
+from karamelo_py.regions.difference import Difference
+from karamelo_py.regions.intersection import Intersection
+from karamelo_py.regions.sphere import Sphere
+from karamelo_py.regions.union import Union
+from karamelo_py.script.errors import ScriptError
+
+
+def empty_hub():
+    return FakeHub(dimension=0)
+
+
+# --- dimension, create_domain, axisymmetric ---------------------------------------------------
+
+
+def test_dimension_sets_box_and_grid():
+    hub = empty_hub()
+    commands.dimension(hub, *arguments(2, -0.5, 0.5, 0, 0.4, 0.1))
+    domain = hub.domain
+    assert domain.dimension == 2
+    np.testing.assert_array_equal(domain.lo, [-0.5, 0, 0])
+    np.testing.assert_array_equal(domain.hi, [0.5, 0.4, 0])
+    assert domain.h == 0.1
+    assert domain.cells == (10, 4, 1)
+    assert domain.shape == (11, 5, 1)
+
+
+def test_node_counts_of_the_reference():
+    assert Domain(2, [0, 0], [0.4, 0.4], 0.1).node_count == 25
+    assert Domain(3, [0, 0, 0], [0.4, 0.4, 0.4], 0.1).node_count == 125
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_node_positions_have_z_fastest(dimension):
+    domain = Domain(dimension, [1.0] * dimension, [2.0, 1.5, 1.75][:dimension], 0.25)
+    x = domain.node_positions()
+    assert x.shape == (domain.node_count, 3)
+    _, ny, nz = domain.shape
+    index = (3 * ny + min(1, ny - 1)) * nz + min(2, nz - 1)
+    want = np.array([1.75, 1.25, 1.5])
+    np.testing.assert_allclose(x[index][:dimension], want[:dimension])
+    assert (x[:, dimension:] == 0).all()
+
+
+@given(st.floats(0.1, 10), st.floats(0.01, 2))
+def test_grid_covers_a_domain_whose_size_is_no_multiple_of_h(length, h):
+    domain = Domain(1, [0.0], [length], h)
+    end = domain.cells[0] * h
+    assert end >= length - 1e-8 * h
+    assert domain.cells[0] == 1 or end < length + h
+
+
+@pytest.mark.parametrize(
+    ("texts", "says", "form"),
+    [
+        ((2, 0, 1), "ymin, ymax, h are missing in 2D", "dimension(2, xmin, xmax, ymin, ymax, h)"),
+        ((2, 0, 1, 0, 1), "h is missing in 2D", "dimension(2, xmin, xmax, ymin, ymax, h)"),
+        ((1, 0, 1, 0.1, 3), "1 argument too many in 1D", "dimension(1, xmin, xmax, h)"),
+        ((4, 0, 1, 0.1), "must be 1, 2 or 3, not 4", "dimension(1, xmin, xmax, h) or dimension(2"),
+        ((1.5, 0, 1, 0.1), "must be 1, 2 or 3, not 1.5", "dimension(1, "),
+        ((1, 0, 1, 0), "h = 0 must be above 0", "dimension(1, xmin, xmax, h)"),
+        ((1, 0, 1, -0.1), "h = -0.1 must be above 0", "dimension(1, xmin, xmax, h)"),
+        ((2, 0, 1, 1, 0, 0.1), "ymax = 0 must be above ymin = 1", "dimension(2, "),
+        ((1, 0, "nan", 0.1), "xmax must be a finite number, not nan", None),
+        ((1, 0, 1, "inf"), "h must be a finite number, not inf", None),
+        ((1, 0, "time*2", 1), "xmax must be a constant number", "dimension(1, xmin, xmax, h)"),
+        ((1, 0, 1, 1e-12), "cell size 1e-12 gives a grid of 1e+12 nodes", "a larger h"),
+    ],
+)
+def test_wrong_dimensions(texts, says, form):
+    with pytest.raises(ScriptError) as caught:
+        commands.dimension(empty_hub(), *arguments(*texts))
+    assert says in str(caught.value)
+    if form:
+        assert form in caught.value.expected
+
+
+def test_a_wrong_value_marks_its_argument():
+    with pytest.raises(ScriptError) as caught:
+        commands.dimension(empty_hub(), *arguments(2, 0, 1, 3, 2, 0.1))
+    assert caught.value.place.column == 5
+    with pytest.raises(ScriptError) as caught:
+        commands.dimension(empty_hub(), *arguments(1, 0, 1, -1))
+    assert caught.value.place.column == 4
+
+
+def test_the_form_of_another_dimension_is_recognised():
+    with pytest.raises(ScriptError) as caught:
+        commands.dimension(empty_hub(), *arguments(3, 0, 1, 0, 1, 0.1))
+    assert "2D" in caught.value.hint
+
+
+def test_the_older_form():
+    hub = empty_hub()
+    commands.dimension(hub, *arguments(2))
+    assert hub.domain is None
+    with pytest.raises(ScriptError, match="no size yet"):
+        Block(hub, *arguments(0, 1, 0, 1))
+    commands.create_domain(hub, *arguments(-0.5, 0.5, -0.5, 0.5, 0.05))
+    assert hub.domain.shape == (21, 21, 1)
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("with_h", [False, True])
+def test_create_domain_alone(dimension, with_h):
+    hub = empty_hub()
+    commands.create_domain(hub, *arguments(*[0, 1] * dimension, *[0.25] * with_h))
+    assert hub.domain.dimension == dimension
+    assert hub.domain.h == (0.25 if with_h else None)
+
+
+def test_create_domain_must_agree_with_the_dimension():
+    hub = empty_hub()
+    commands.dimension(hub, *arguments(2))
+    with pytest.raises(ScriptError, match="missing in 2D"):
+        commands.create_domain(hub, *arguments(0, 1, 0.1))
+    with pytest.raises(ScriptError) as caught:
+        commands.create_domain(hub, *arguments(0, 1, 0, 1, 0, 1))
+    assert "1 argument too many in 2D" in str(caught.value)
+
+
+def test_without_h_the_first_solid_lays_the_grid():
+    hub = empty_hub()
+    commands.create_domain(hub, *arguments(0, 1, 0, 1))
+    hub.solid("s1", hub.region("r", Block, 0, 0.5, 0, 0.5), h=0.1)
+    assert hub.domain.h == 0.1
+    assert hub.domain.shape == (11, 11, 1)
+
+
+def test_the_domain_comes_once():
+    hub = FakeHub()
+    with pytest.raises(ScriptError, match="set already"):
+        commands.dimension(hub, *arguments(2, 0, 1, 0, 1, 0.1))
+    hub.solid("s1", hub.region("r", Block, "INF", "INF", "INF", "INF"))
+    with pytest.raises(ScriptError, match="once solid 's1' is in it"):
+        commands.create_domain(hub, *arguments(0, 1, 0, 1, 0.1))
+
+
+def test_axisymmetric():
+    hub = FakeHub()
+    commands.axisymmetric(hub, False)
+    assert not hub.domain.axisymmetric
+    with pytest.raises(ScriptError, match="not there yet"):
+        commands.axisymmetric(hub, True)
+
+
+def test_regions_need_a_domain():
+    with pytest.raises(ScriptError) as caught:
+        commands.region(empty_hub(), "r", "block", *arguments(0, 1))
+    assert "no domain" in str(caught.value)
+    assert "dimension(2, xmin, xmax, ymin, ymax, h)" in caught.value.expected
+
+
+# --- shapes ------------------------------------------------------------------------------------
+
+
+def inside(region, *positions):
+    return region.inside(np.array(positions, dtype=float)).tolist()
+
+
+def test_block_holds_its_faces_whatever_the_rounding():
+    hub = FakeHub(h=0.1)
+    block = hub.region("b", Block, -0.3, 0.3, 0, 0.3)
+    assert inside(block, (0.1 + 0.2, 0.1 * 3, 0), (-0.3, 0, 0), (0.30001, 0.1, 0)) == [
+        True,
+        True,
+        False,
+    ]
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_block_in_every_dimension(dimension):
+    hub = FakeHub(dimension)
+    block = hub.region("b", Block, *[-0.1, 0.2] * dimension)
+    assert inside(block, [0.2] * dimension, [0.21] + [0] * (dimension - 1)) == [True, False]
+    used = [1] * dimension + [0] * (3 - dimension)
+    np.testing.assert_allclose(block.lo, np.multiply(used, -0.1))
+    np.testing.assert_allclose(block.hi, np.multiply(used, 0.2))
+
+
+def test_open_ends_reach_as_far_as_the_domain():
+    hub = FakeHub()
+    for k, (lo, hi) in enumerate([("INF", "INF"), ("-INF", "+INF"), ("EDGE", "EDGE")]):
+        block = hub.region(f"b{k}", Block, 0, 0.1, lo, hi)
+        np.testing.assert_allclose(block.lo, [0, -0.5, 0])
+        np.testing.assert_allclose(block.hi, [0.1, 0.5, 0])
+        assert inside(block, (0.05, 7), (0.2, 0)) == [True, False]
+    far = hub.region("far", Block, -1e20, 1e20, 0, 1)
+    assert np.isinf(far.box_lo[0]) and np.isinf(far.box_hi[0])
+
+
+def test_a_plane_is_a_block_with_equal_ends():
+    hub = FakeHub()
+    assert inside(hub.region("b", Block, 0, 0, "INF", "INF"), (0, 0.3), (0.01, 0.3)) == [
+        True,
+        False,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("dimension", "style", "texts", "says"),
+    [
+        (2, Block, (0, 1), "ylo, yhi are missing in 2D"),
+        (2, Block, (0, 1, 0, 1, 2), "1 argument too many"),
+        (2, Block, (1, 0, 0, 1), "xlo = 1 is above xhi = 0"),
+        (2, Block, ("+INF", 0, 0, 1), "xlo cannot be +INF"),
+        (2, Block, (0, "-INF", 0, 1), "xhi cannot be -INF"),
+        (2, Block, (0, "nan", 0, 1), "xhi must be a finite number"),
+        (2, Block, (0, "x0*2", 0, 1), "xhi must be a constant number"),
+        (2, Cylinder, (0, 0, 0), "R = 0 must be above 0"),
+        (2, Cylinder, (0, 0), "R is missing"),
+        (2, Cylinder, ("INF", 0, 1), "xc must be"),
+        (1, Cylinder, (0, 1), "no form for 1D"),
+        (3, Cylinder, ("w", 0, 0, 1, 0, 1), "axis must be one of x, y, z"),
+        (3, Cylinder, ("z", 0, 0, 1, 2, 1), "lo = 2 is above hi = 1"),
+        (3, Cylinder, ("z", 0, 0, -1, 0, 1), "R = -1 must be above 0"),
+        (3, Sphere, (0, 0, 0, -1), "R = -1 must be above 0"),
+        (3, Sphere, (0, 0, 1), "R is missing in 3D"),
+    ],
+)
+def test_wrong_shapes(dimension, style, texts, says):
+    with pytest.raises(ScriptError) as caught:
+        style(FakeHub(dimension), *arguments(*texts))
+    assert says in str(caught.value)
+
+
+def test_a_wrong_block_shows_the_form_for_the_dimension():
+    with pytest.raises(ScriptError) as caught:
+        Block(FakeHub(3), *arguments(0, 1, 0, 1))
+    assert caught.value.expected == ("region(ID, block, xlo, xhi, ylo, yhi, zlo, zhi[, exterior])")
+    assert caught.value.hint == "4 arguments are the form for 2D"
+
+
+def test_a_disk():
+    hub = FakeHub()
+    disk = hub.region("d", Cylinder, 0.1, 0.1, 0.2)
+    assert inside(disk, (0.3, 0.1), (0.1, -0.1), (0.25, 0.25), (0.3, 0.3)) == [
+        True,
+        True,
+        False,
+        False,
+    ]
+    np.testing.assert_allclose(disk.lo, [-0.1, -0.1, 0])
+    np.testing.assert_allclose(disk.hi, [0.3, 0.3, 0])
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_cylinders_along_each_axis(axis):
+    hub = FakeHub(3)
+    along = "xyz".index(axis)
+    rod = hub.region("rod", Cylinder, axis, 0.1, -0.2, 0.15, -0.3, "INF")
+    centre = np.insert([0.1, -0.2], along, 0.0)
+    points = np.tile(centre, (4, 1))
+    points[1, along] = -0.3  # on the end
+    points[2, along] = -0.31  # beyond it
+    points[3, (along + 1) % 3] += 0.16  # aside
+    assert rod.inside(points).tolist() == [True, True, False, False]
+    assert rod.lo[along] == -0.3
+    assert rod.hi[along] == 0.5
+    np.testing.assert_allclose(np.delete(rod.hi, along), [0.25, -0.05])
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_spheres(dimension):
+    hub = FakeHub(dimension)
+    ball = hub.region("s", Sphere, *[0.1] * dimension, 0.2)
+    axis = np.eye(dimension)[0]
+    assert ball.inside(0.1 + np.outer([0.2, -0.2, 0.2001, 0], axis)).tolist() == [
+        True,
+        True,
+        False,
+        True,
+    ]
+    np.testing.assert_allclose(ball.lo[:dimension], -0.1)
+
+
+@pytest.mark.parametrize(
+    ("style", "texts"),
+    [(Block, (-0.1, 0.1, -0.1, 0.1)), (Cylinder, (0, 0, 0.1)), (Sphere, (0, 0, 0.1))],
+)
+def test_exterior_inverts(style, texts):
+    hub = FakeHub()
+    plain = hub.region("p", style, *texts)
+    outside = hub.region("o", style, *texts, "exterior")
+    x = np.random.default_rng(1).uniform(-0.5, 0.5, (500, 3))
+    np.testing.assert_array_equal(outside.inside(x), ~plain.inside(x))
+    np.testing.assert_array_equal(outside.lo, hub.domain.lo)
+    np.testing.assert_array_equal(outside.hi, hub.domain.hi)
+
+
+def test_union_intersection_difference():
+    hub = FakeHub()
+    a = hub.region("a", Block, -0.2, 0.1, -0.2, 0.2)
+    b = hub.region("b", Cylinder, 0.1, 0, 0.2)
+    c = hub.region("c", Sphere, 0, 0, 0.15, "exterior")
+    x = np.random.default_rng(2).uniform(-0.5, 0.5, (2000, 2))
+    A, B, C = (part.inside(x) for part in (a, b, c))
+    union = hub.combine("u", Union, a, b, c)
+    both = hub.combine("i", Intersection, a, b, c)
+    cut = hub.combine("d", Difference, a, b)
+    nested = hub.combine("n", Difference, union, both)
+    np.testing.assert_array_equal(union.inside(x), A | B | C)
+    np.testing.assert_array_equal(both.inside(x), A & B & C)
+    np.testing.assert_array_equal(cut.inside(x), A & ~B)
+    np.testing.assert_array_equal(nested.inside(x), (A | B | C) & ~(A & B & C))
+    np.testing.assert_allclose(both.lo, [-0.1, -0.2, 0])
+    np.testing.assert_allclose(both.hi, [0.1, 0.2, 0])
+    np.testing.assert_allclose(cut.hi, a.hi)
+    np.testing.assert_allclose(hub.combine("u2", Union, a, b).hi, [0.3, 0.2, 0])
+    assert math.isinf(union.box_hi[0])
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_region_lies_in_its_box(seed):
+    rng = np.random.default_rng(seed)
+    hub = FakeHub()
+    lo, hi = np.sort(rng.uniform(-0.5, 0.5, (2, 2)), axis=0)
+    a = hub.region("a", Block, lo[0], hi[0], lo[1], hi[1])
+    b = hub.region("b", Cylinder, *rng.uniform(-0.3, 0.3, 2), 0.2)
+    x = rng.uniform(-0.5, 0.5, (300, 2))
+    regions = [a, b]
+    for k, style in enumerate((Union, Intersection, Difference)):
+        regions.append(hub.combine(f"r{k}", style, a, b))
+    for region in regions:
+        found = x[region.inside(x)]
+        if len(found):
+            assert (found >= region.lo[:2] - 1e-9).all()
+            assert (found <= region.hi[:2] + 1e-9).all()

@@ -1,0 +1,201 @@
+"""Solids: where the points are put, in which order, and what is refused."""
+
+import math
+import tracemalloc
+
+import numpy as np
+import pytest
+from fakes_scene import DENSITY, FakeHub
+from hypothesis import given
+from hypothesis import strategies as st
+
+from karamelo_py.commands import solids as commands
+from karamelo_py.regions.block import Block
+from karamelo_py.regions.cylinder import Cylinder
+from karamelo_py.regions.sphere import Sphere
+from karamelo_py.regions.union import Union
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.solid import cell_pattern
+
+
+def whole(hub, ID="whole"):
+    return hub.region(ID, Block, *["INF"] * (2 * hub.domain.dimension))
+
+
+def karamelo_points(region, domain, ppc, dimension):
+    """The same rule in plain loops: cells x outermost, then y, then z, then points in a cell."""
+    along = [-0.3873, 0, 0.3873] if ppc == 3 else [(i + 0.5) / ppc - 0.5 for i in range(ppc)]
+    pattern = {
+        1: [(a,) for a in along],
+        2: [(a, b) for a in along for b in along],
+        3: [(a, b, c) for c in along for a in along for b in along],
+    }[dimension]
+    points = []
+    for i in range(domain.cells[0]):
+        for j in range(domain.cells[1]):
+            for k in range(domain.cells[2]):
+                for offset in pattern:
+                    x = [
+                        domain.lo[axis] + (cell + 0.5 + offset[axis]) * domain.h
+                        for axis, cell in enumerate((i, j, k)[:dimension])
+                    ]
+                    if region.inside(np.array([x]))[0] and domain.contains(np.array([x]))[0]:
+                        points.append(x)
+    return np.array(points).reshape(-1, dimension)
+
+
+def test_two_disks_have_208_points_each():
+    """Karamelo's count for the 2020 paper's example (reference, section 4.5)."""
+    hub = FakeHub(2, -0.5, 0.5, 0.05)
+    for number, centre in enumerate((-0.3, 0.3), start=1):
+        solid = hub.solid(f"s{number}", hub.region(f"d{number}", Cylinder, centre, centre, 0.2))
+        assert solid.count == 208
+        assert solid.first_id == 208 * (number - 1)
+        assert solid.index == number - 1
+
+
+def test_first_point_of_karamelos_dump():
+    """Reference, section 4.1: (-0.4525, -0.4025), after moving by 0.01 in both directions."""
+    hub = FakeHub(2, -0.5, 0.5, 0.05)
+    solid = hub.solid("s", hub.region("d", Cylinder, -0.3, -0.3, 0.2))
+    np.testing.assert_allclose(solid.x0[0] + 0.01, [-0.4525, -0.4025])
+
+
+@pytest.mark.parametrize("ppc", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_places_and_order(dimension, ppc):
+    hub = FakeHub(dimension, 0.1, 0.75, 0.2)  # 4 cells a side, the last one cut by the domain
+    ball = hub.region("r", Sphere, *[0.45] * dimension, 0.28)
+    solid = hub.solid("s", ball, ppc=ppc)
+    want = karamelo_points(ball, hub.domain, ppc, dimension)
+    assert solid.x0.shape == want.shape
+    np.testing.assert_allclose(solid.x0, want, atol=1e-14)
+    assert solid.x0.flags["C_CONTIGUOUS"]
+
+
+def test_order_within_a_cell():
+    """Reference, section 3.2: 2D (-,-),(-,+),(+,-),(+,+); in 3D the lower z quad first."""
+    quad = [(-0.25, -0.25), (-0.25, 0.25), (0.25, -0.25), (0.25, 0.25)]
+    np.testing.assert_array_equal(cell_pattern(2, 2), quad)
+    np.testing.assert_array_equal(
+        cell_pattern(2, 3), [(*xy, z) for z in (-0.25, 0.25) for xy in quad]
+    )
+    np.testing.assert_array_equal(cell_pattern(2, 1), [[-0.25], [0.25]])
+
+
+def test_points_do_not_depend_on_chunks(monkeypatch):
+    def points():
+        hub = FakeHub(3, 0, 1, 0.1)
+        return hub.solid("s", hub.region("r", Sphere, 0.5, 0.5, 0.5, 0.4)).x0
+
+    whole_at_once = points()
+    monkeypatch.setattr("karamelo_py.domain.CHUNK", 100)
+    np.testing.assert_array_equal(points(), whole_at_once)
+
+
+def test_volume_and_mass():
+    hub = FakeHub(2, 0, 1, 0.1)
+    solid = hub.solid("s", whole(hub), ppc=3, T0=293.0)
+    assert solid.count == 900
+    assert solid.T0 == 293.0
+    assert solid.volume0.shape == solid.mass.shape == (900,)
+    assert math.isclose(solid.volume0.sum(), 1.0)
+    assert math.isclose(solid.mass.sum(), DENSITY)
+
+
+@given(st.floats(0.3, 1.0), st.floats(0.02, 0.2), st.integers(1, 4))
+def test_a_region_of_any_size_is_filled_to_within_a_layer_of_points(width, h, ppc):
+    hub = FakeHub(1, 0.0, 1.0, h)
+    solid = hub.solid("s", hub.region("r", Block, 0, width), ppc=ppc)
+    gap = 0.3873 * h if ppc == 3 else h / ppc
+    assert abs(solid.volume0.sum() - width) <= 2 * gap
+    assert solid.x0.min() >= 0 and solid.x0.max() <= width + 1e-8
+
+
+def test_exterior_fills_the_rest_of_the_domain():
+    hub = FakeHub(2, 0, 1, 0.05)
+    hole = hub.region("hole", Cylinder, 0.5, 0.5, 0.2)
+    rest = hub.region("rest", Cylinder, 0.5, 0.5, 0.2, "exterior")
+    inner, outer = hub.solid("a", hole), hub.solid("b", rest)
+    assert inner.count + outer.count == 1600
+    assert not hub.warnings
+
+
+def test_points_outside_the_domain_are_left_out_with_a_warning():
+    hub = FakeHub(2, 0, 1, 0.1)
+    solid = hub.solid("s", hub.region("r", Block, 0.8, 1.2, -0.2, 0.2))
+    assert solid.count == 16
+    assert solid.x0.max() < 1
+    assert hub.warnings == ["48 points of region 'r' outside the domain left out of the solid"]
+
+
+def test_a_huge_region_is_not_walked_through():
+    hub = FakeHub(2, 0, 1, 0.1)
+    solid = hub.solid("s", hub.region("r", Block, -1e15, 1e15, -1e15, 1e15))
+    assert solid.count == 400
+    assert hub.warnings == ["points of region 'r' outside the domain left out of the solid"]
+
+
+def test_a_domain_that_is_no_multiple_of_h_loses_no_points_silently():
+    hub = FakeHub(2, 0, 1, 0.3)
+    solid = hub.solid("s", whole(hub), ppc=2)
+    assert solid.x0.max() <= 1
+    assert not hub.warnings
+
+
+def test_open_ends_of_a_part_do_not_warn():
+    hub = FakeHub(2, 0, 1, 0.3)
+    strip = hub.region("strip", Block, "INF", "INF", 0, 0.3)
+    ball = hub.region("ball", Sphere, 0.5, 0.5, 0.1)
+    hub.solid("s", hub.combine("u", Union, strip, ball))
+    assert not hub.warnings
+
+
+@pytest.mark.parametrize(
+    ("region", "options", "says", "argument"),
+    [
+        ((0.2, 0.8, 0.2, 0.8), {"h": 0.2}, "differs from that of the domain's grid, 0.1", "h"),
+        ((0.21, 0.22, 0.21, 0.22), {}, "no point lies in region 'r'", "region"),
+        ((1.2, 1.8, 0.2, 0.8), {}, "all of them lie outside the domain", "region"),
+        ((0.2, 0.8, 0.2, 0.8), {"ppc": 10**9}, "points would be needed", None),
+    ],
+)
+def test_wrong_solids(region, options, says, argument):
+    hub = FakeHub(2, 0, 1, 0.1)
+    with pytest.raises(ScriptError) as caught:
+        hub.solid("s", hub.region("r", Block, *region), **options)
+    assert says in str(caught.value)
+    assert caught.value.argument == argument
+
+
+def test_a_solid_needs_a_method_and_a_domain():
+    hub = FakeHub()
+    hub.update.method = None
+    with pytest.raises(ScriptError) as caught:
+        commands.solid(hub, "s", "region")
+    assert "method(" in caught.value.expected
+    hub = FakeHub(dimension=0)
+    with pytest.raises(ScriptError, match="no domain"):
+        commands.solid(hub, "s", "region")
+
+
+@pytest.mark.parametrize(
+    ("kind", "says"),
+    [("mesh", "not there yet"), ("file", "not there yet"), ("regoin", "unknown kind of solid")],
+)
+def test_other_kinds_of_solids(kind, says):
+    with pytest.raises(ScriptError, match=says) as caught:
+        commands.solid(FakeHub(), "s", kind)
+    assert caught.value.expected.startswith("solid(ID, region, ")
+
+
+def test_placing_a_million_points_is_quick_and_lean():
+    hub = FakeHub(2, 0, 1, 1 / 500)
+    region = whole(hub)
+    tracemalloc.start()
+    solid = hub.solid("s", region)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert solid.count == 1_000_000
+    # The points once in chunks and once in one piece, and some chunks of work.
+    assert peak < 3 * solid.x0.nbytes + 40e6
