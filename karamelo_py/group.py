@@ -59,7 +59,7 @@ class Group:
 
     def add(self, region: Region, solids: Sequence[Solid]) -> int:
         """Add what lies in `region`; returns how many were found."""
-        found = self.find(region, solids)
+        found = np.empty(0, np.int64) if region.unknown else self.find(region, solids)
         self._members = np.union1d(self._members, found) if len(self._members) else found
         return len(found)
 

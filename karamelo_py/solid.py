@@ -83,7 +83,7 @@ class Solid:
         self.point_volume = (self.h / ppc) ** domain.dimension
         self.point_mass = float(reference_density(material.law)) * self.point_volume
         self.x0, outside = fill(region, domain, ppc)
-        if not len(self.x0):
+        if not len(self.x0) and not region.unknown:
             raise ScriptError(
                 "the solid has no points: "
                 + ("all of them lie outside the domain" if outside else _why_empty(region, domain)),
@@ -176,7 +176,7 @@ def fill(region: Region, domain: Domain, ppc: int) -> tuple[np.ndarray, float]:
     lo, hi = region.box_lo[:dimension], region.box_hi[:dimension]
     corner, end = domain.lo[:dimension], domain.hi[:dimension]
     last_cell = np.array(domain.cells[:dimension]) - 1
-    if (lo > hi).any():
+    if region.unknown or (lo > hi).any():
         return np.empty((0, dimension)), 0
     # One cell more on either side: rounding must not lose a point that lies on a face.
     first = np.floor((lo - corner) / h) - 1

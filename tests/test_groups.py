@@ -8,6 +8,7 @@ from karamelo_py.commands.solids import group
 from karamelo_py.group import AnyGroup, NodeGroup, ParticleGroup
 from karamelo_py.regions.block import Block
 from karamelo_py.regions.cylinder import Cylinder
+from karamelo_py.regions.difference import Difference
 from karamelo_py.script.errors import ScriptError
 
 
@@ -141,3 +142,24 @@ def test_wrong_groups(ID, of, solids, says):
             of,
             *[hub.solids[s] for s in solids],
         )
+
+
+def test_a_rehearsal_leaves_groups_alone():
+    hub = scene()
+    group(hub, "g", "particles", "region", hub.regions["r1"], "all")
+    hub.rehearsing = True
+    group(hub, "g", "particles", "region", hub.regions["r2"], "all")
+    assert len(hub.groups["g"]) == 16
+
+
+def test_results_that_a_rehearsal_does_not_have_pass_silently():
+    hub = scene()
+    hub.rehearsing = True
+    regions = [hub.region("b", Block, 0, "nan", 0, 1), hub.region("c", Cylinder, 0, 0, "nan")]
+    regions += [hub.region("e", Cylinder, "nan", 0, 1, "exterior")]
+    regions += [hub.combine("d", Difference, hub.regions["r1"], regions[1])]
+    for k, region in enumerate(regions):
+        for kind in ("particles", "nodes"):
+            group(hub, f"{kind}{k}", kind, "region", region, "all")
+        assert hub.solid(f"new{k}", region).count == 0
+    assert not hub.warnings

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import TYPE_CHECKING, Literal
 
 from karamelo_py import signature
@@ -134,10 +135,12 @@ def group(
                 argument="kind",
                 expected=f"{members.kind}, or another ID",
             )
+        if hub.rehearsing:  # The real group gets its members when the script comes here.
+            members = copy.copy(members)
     else:
         members = hub.groups.add(ID, KINDS[kind](hub))
     found = members.add(region, solids or tuple(hub.solids.values()))
-    if not found:
+    if not found and not region.unknown:
         none_yet = kind == "particles" and not hub.solids
         hub.warn(
             f"group '{ID}': region '{region.id}' holds no {kind}; "

@@ -28,9 +28,13 @@ class Region:
         Corners of a box around the shape, one number per dimension; infinite where it is open.
     exterior
         Whether the region is what lies outside the shape.
+    parts
+        The regions it is made of, if any.
 
     Attributes
     ----------
+    unknown : bool
+        Whether its place depends on results that a rehearsal does not have (NaN).
     box_lo, box_hi : ndarray (3,)
         Box around the region, infinite where it is open; 0 in unused directions.
     """
@@ -39,12 +43,20 @@ class Region:
     place: Place | None = None
 
     def __init__(
-        self, hub: Hub, lo: Sequence[float], hi: Sequence[float], *, exterior: bool = False
+        self,
+        hub: Hub,
+        lo: Sequence[float],
+        hi: Sequence[float],
+        *,
+        exterior: bool = False,
+        parts: Sequence[Region] = (),
     ):
         self.hub = hub
         self.domain = require_domain(hub)
         self.exterior = exterior
         dimension = self.domain.dimension
+        self.parts = tuple(parts)
+        self.unknown = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
         self.box_lo = np.zeros(3)
         self.box_hi = np.zeros(3)
         self.box_lo[:dimension] = -np.inf if exterior else lo

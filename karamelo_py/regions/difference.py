@@ -35,13 +35,12 @@ class Difference(Region):
     """
 
     def __init__(self, hub: Hub, first: Region, second: Region):
-        self.first = first
-        self.second = second
         used = slice(0, require_domain(hub).dimension)
-        super().__init__(hub, first.box_lo[used], first.box_hi[used])
+        super().__init__(hub, first.box_lo[used], first.box_hi[used], parts=(first, second))
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Which positions lie in the first region only, see `Region.contains`."""
-        inside = self.first.inside(x)
-        inside &= ~self.second.inside(x)
+        first, second = self.parts
+        inside = first.inside(x)
+        inside &= ~second.inside(x)
         return inside

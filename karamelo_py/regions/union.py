@@ -33,12 +33,13 @@ class Union(Region):
     """
 
     def __init__(self, hub: Hub, first: Region, second: Region, *more: Region):
-        self.parts = (first, second, *more)
+        parts = (first, second, *more)
         used = slice(0, require_domain(hub).dimension)
         super().__init__(
             hub,
-            np.min([part.box_lo[used] for part in self.parts], axis=0),
-            np.max([part.box_hi[used] for part in self.parts], axis=0),
+            np.min([part.box_lo[used] for part in parts], axis=0),
+            np.max([part.box_hi[used] for part in parts], axis=0),
+            parts=parts,
         )
 
     def contains(self, x: np.ndarray) -> np.ndarray:
