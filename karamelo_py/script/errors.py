@@ -1,0 +1,137 @@
+"""What goes wrong in a script, said with its place in the text and a remedy."""
+
+from __future__ import annotations
+
+import difflib
+import unicodedata
+from collections.abc import Iterable
+from typing import NamedTuple
+
+_WIDEST_LINE = 160
+
+
+class Place(NamedTuple):
+    """Where in a script: `line` and `column` count from 1, `text` is the whole source line."""
+
+    file: str
+    line: int
+    column: int
+    length: int
+    text: str
+
+
+class Quit(Exception):
+    """The statement quit: the script ends here, and that is fine."""
+
+
+class ScriptError(Exception):
+    """Something in a script (or on the command line) that the user has to change.
+
+    Parameters
+    ----------
+    message
+        What is wrong, in one sentence without a final stop.
+    place
+        Where; filled in by whoever knows it when the raiser does not.
+    argument
+        Name or index (from 0) of the argument of a style or command that is to blame;
+        `karamelo_py.signature.call` turns it into a place.
+    expected
+        What would have been right.
+    hint
+        What to write instead.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        place: Place | None = None,
+        argument: str | int | None = None,
+        expected: str | None = None,
+        hint: str | None = None,
+    ):
+        super().__init__(message)
+        self.message = message
+        self.place = place
+        self.argument = argument
+        self.expected = expected
+        self.hint = hint
+        # Command or style that complains, put in front of the message.
+        self.command: str | None = None
+
+    def __str__(self) -> str:
+        return self.message
+
+    def render(self) -> str:
+        """The whole message for the user: place, marked line, what was expected, remedy."""
+        message = self.message
+        if self.command and not message.startswith(self.command):
+            message = f"{self.command}: {message}"
+        return render_message("error", message, self.place, self.expected, self.hint)
+
+
+def render_message(
+    kind: str,
+    message: str,
+    place: Place | None = None,
+    expected: str | None = None,
+    hint: str | None = None,
+) -> str:
+    """Lay out an error or a warning (`kind`) as it is shown to the user."""
+    lines = []
+    if place is None:
+        lines.append(f"{kind}: {message}")
+    else:
+        lines.append(f"{place.file}:{place.line}:{place.column}: {kind}: {message}")
+        lines += _marked(place)
+    if expected:
+        lines.append(f"expected: {expected}")
+    if hint:
+        lines.append(f"hint: {hint}")
+    return "\n".join(lines)
+
+
+def _marked(place: Place) -> list[str]:
+    """The source line and, below it, carets under the marked word."""
+    text, start = place.text.rstrip(), place.column - 1
+    length = max(place.length, 1)
+    if len(text) > _WIDEST_LINE:
+        cut = max(0, start - _WIDEST_LINE // 2)
+        end = cut + _WIDEST_LINE
+        shown = ("..." if cut else "") + text[cut:end] + ("..." if end < len(text) else "")
+        start += (3 if cut else 0) - cut
+        length = min(length, max(end - cut - start, 1))
+        text = shown
+    # Tabs are kept so that the carets line up whatever the width of a tab on this terminal.
+    before = "".join(c if c == "\t" else " " * _width(c) for c in text[:start].ljust(start))
+    carets = "^" * max(sum(_width(c) for c in text[start : start + length]), 1)
+    number = str(place.line)
+    margin = " " * max(len(number), 5)
+    return [f"{number:>5} | {_printable(text)}", f"{margin} | {before}{carets}"]
+
+
+def _width(character: str) -> int:
+    if unicodedata.combining(character):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in "WF" else 1
+
+
+def _printable(text: str) -> str:
+    """`text` with control characters replaced: they could garble the terminal."""
+    return "".join(c if c == "\t" or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def nearest(name: str, names: Iterable[str]) -> str | None:
+    """The one of `names` most like `name`, or None when none is alike."""
+    names = list(names)
+    lowered = name.lower()
+    for candidate in names:
+        if candidate.lower() == lowered and candidate != name:
+            return candidate
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    if close:
+        return close[0]
+    by_lower = {candidate.lower(): candidate for candidate in names}
+    close = difflib.get_close_matches(lowered, by_lower, n=1, cutoff=0.6)
+    return by_lower[close[0]] if close else None

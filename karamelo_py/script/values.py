@@ -1,0 +1,85 @@
+"""Published values: the numbers that formulas, logs and plots read by name while a scene runs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from karamelo_py.script.errors import ScriptError
+
+CAPACITY = 1024
+TIME, TIMESTEP, DT = 0, 1, 2
+
+
+class Values:
+    """Numbers with names, in one array that kernels read and write.
+
+    The array is never reallocated, so that whoever holds it sees every change. Slots 0, 1 and 2
+    are time, timestep (the number of the step) and dt.
+    """
+
+    def __init__(self) -> None:
+        self.array = np.zeros(CAPACITY)
+        self._slots: dict[str, int] = {}
+        self._used = 0
+        for name in ("time", "timestep", "dt"):
+            self.publish(name)
+
+    def publish(self, name: str, value: float = 0.0) -> int:
+        """Make `name` known with this value; a known name keeps its slot. Returns the slot."""
+        if name not in self._slots:
+            self._slots[name] = self._reserve(1)
+        slot = self._slots[name]
+        self.array[slot] = value
+        return slot
+
+    def publish_vector(self, ID: str) -> tuple[int, int, int, int, int]:
+        """Publish ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` in consecutive slots, and ``ID`` itself.
+
+        Returns the slots in this order; only the first four are sure to be consecutive.
+        """
+        names = [f"{ID}_{suffix}" for suffix in "xyzs"]
+        slots = [self._slots.get(name, -1) for name in names]
+        if slots[0] < 0 or slots != list(range(slots[0], slots[0] + 4)):
+            first = self._reserve(4)
+            for k, name in enumerate(names):
+                self._slots[name] = first + k
+        for name in names:
+            self.publish(name)
+        plain = self.publish(ID)
+        first = self._slots[names[0]]
+        return first, first + 1, first + 2, first + 3, plain
+
+    def slot(self, name: str) -> int:
+        """Where in the array `name` is kept.
+
+        Raises
+        ------
+        KeyError
+            If nothing of that name is published.
+        """
+        return self._slots[name]
+
+    def names(self) -> list[str]:
+        """Every published name, in the order of publication."""
+        return list(self._slots)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._slots
+
+    def get(self, name: str) -> float:
+        """The present value of `name` (KeyError if it is not published)."""
+        return float(self.array[self._slots[name]])
+
+    def set(self, name: str, value: float) -> None:
+        """Change the value of `name` (KeyError if it is not published)."""
+        self.array[self._slots[name]] = value
+
+    def _reserve(self, count: int) -> int:
+        first = self._used
+        if first + count > CAPACITY:
+            raise ScriptError(
+                f"there are more than {CAPACITY} values of fixes and computes",
+                hint="use the IDs of deleted fixes and computes again: they keep their values",
+            )
+        self._used += count
+        return first
