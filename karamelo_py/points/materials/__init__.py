@@ -1,0 +1,58 @@
+"""Constitutive laws of one point. One file each.
+
+A law is a NamedTuple of parameters (its class is the tag). It owns a state, a flat tuple with as
+many numbers as it needs; kernels only load it, pass it on and store it. All tensors have the
+components of the kinematics `kin`; `j` = det F is the volume over the reference volume.
+"""
+
+from karamelo_py.compile import point_function
+
+
+@point_function()
+def initial_state(law, kin, like):
+    """The state of an undeformed, unstressed point."""
+
+
+@point_function()
+def advance(law, kin, state, dl, dt):
+    """The state after the increment dl = dt grad v of a step dt."""
+
+
+@point_function()
+def kirchhoff_stress(law, kin, state):
+    """det F times the Cauchy stress, which times the reference volume makes the nodal forces."""
+
+
+@point_function()
+def cauchy_stress(law, kin, state):
+    """Cauchy stress, for output."""
+
+
+@point_function()
+def jacobian(law, kin, state):
+    """det F."""
+
+
+@point_function()
+def wave_speed(law, kin, state):
+    """Speed of the fastest small disturbance, for the stable step."""
+
+
+@point_function()
+def energy_density(law, kin, state):
+    """Stored energy per reference volume."""
+
+
+@point_function()
+def elastic_strain(law, kin, state):
+    """Elastic strain, for output."""
+
+
+@point_function()
+def with_stress(law, kin, state, stress):
+    """The state whose Cauchy stress is `stress` (initial_stress); left out by laws without."""
+
+
+@point_function()
+def reference_density(law):
+    """Mass per reference volume."""

@@ -1,0 +1,186 @@
+"""How the package compiles: one cache folder per state of the sources, one decorator for point functions.
+
+Numba does not notice when a function in *another* file changes, so the folder of its on-disk cache
+is named by a hash of every source that can end up in a kernel: this package's and every plug-in's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from importlib import metadata, util
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import config, njit
+from numba.extending import overload
+
+_KEPT_CACHES = 6
+_COMPILED_PARTS = ("compile.py", "tensors.py", "points", "kernels", "state", "schemes", "fixes")
+
+
+def _source_folders() -> list[Path]:
+    """What may end up in a kernel: parts of this package, and every package with a plug-in."""
+    here = Path(__file__).parent
+    folders = [here / name for name in _COMPILED_PARTS]
+    points = metadata.entry_points()
+    groups = [group for group in points.groups if group.startswith("karamelo_py.")]
+    packages = {
+        entry.value.partition(":")[0].partition(".")[0]
+        for group in groups
+        for entry in points.select(group=group)
+    }
+    for package in packages - {"karamelo_py"}:
+        try:
+            origin = getattr(util.find_spec(package), "origin", None)
+        except (ImportError, ValueError):
+            continue
+        if origin:
+            path = Path(origin)
+            folders.append(path.parent if path.name == "__init__.py" else path)
+    return sorted(set(folders))
+
+
+def _sources_hash() -> str:
+    digest = hashlib.sha256(f"{sys.version}|{numba.__version__}".encode())
+    for folder in _source_folders():
+        for source in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder]:
+            digest.update(str(source).encode())
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _use_cache_folder() -> Path:
+    """Point Numba's cache at the folder of these sources and forget the oldest of the others."""
+    import platformdirs
+
+    root = Path(os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py"))
+    folder = root / _sources_hash()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        folder.touch()
+        others = sorted(root.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+        for old in others[_KEPT_CACHES:]:
+            shutil.rmtree(old, ignore_errors=True)
+    except OSError:
+        return folder  # Numba then keeps its cache beside the sources or in memory.
+    config.CACHE_DIR = str(folder)
+    return folder
+
+
+CACHE_FOLDER = _use_cache_folder()
+
+
+def kernel(function: Callable | None = None, **options: Any) -> Callable:
+    """Compile a loop over points or nodes; cached on disk, free of the interpreter lock."""
+    if function is None:
+        return lambda f: kernel(f, **options)
+    return njit(cache=True, nogil=True, error_model="numpy", _nrt=False, **options)(function)
+
+
+def shared(function: Callable) -> Callable:
+    """A helper of point functions that needs no choice by type: plain Python, and itself in kernels."""
+    overload(function, strict=False)(lambda *arguments: function)
+    return function
+
+
+def tag_class(numba_type: Any) -> Any:
+    """The Python class that a Numba type stands for, as far as point functions select by it."""
+    return getattr(numba_type, "instance_class", None)
+
+
+def point_function(*, tags: int = 1, inline: str = "never") -> Callable[[Callable], Callable]:
+    """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
+
+    The decorated function gives name, parameters and docstring. Implementations are added with
+    ``name.on(Class, ...)`` and serve both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and
+    inside kernels, where the types are known at compile time and no branch is left. A plug-in adds
+    its own in the same way.
+    """
+
+    def declare(stub: Callable) -> Callable:
+        table: dict[tuple[type, ...], Callable] = {}
+
+        def missing(classes: tuple) -> str:
+            names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
+            return f"{stub.__name__} is not defined for ({names})"
+
+        def dispatch(*arguments: Any) -> Any:
+            classes = tuple(type(a) for a in arguments[:tags])
+            if classes not in table:
+                raise TypeError(missing(classes))
+            return table[classes](*arguments)
+
+        dispatch.__name__ = stub.__name__
+        dispatch.__qualname__ = stub.__qualname__
+        dispatch.__module__ = stub.__module__
+        dispatch.__doc__ = stub.__doc__
+
+        def choose(*arguments: Any) -> Callable | None:
+            classes = tuple(tag_class(a) for a in arguments[:tags])
+            return table.get(classes)
+
+        overload(dispatch, strict=False, inline=inline)(choose)
+
+        def on(*classes: type) -> Callable[[Callable], Callable]:
+            def register(implementation: Callable) -> Callable:
+                table[classes] = implementation
+                return implementation
+
+            return register
+
+        dispatch.on = on
+        dispatch.defined = lambda *classes: classes in table
+        return dispatch
+
+    return declare
+
+
+def real(value: float, like: Any) -> Any:
+    """`value` in the number type of `like`.
+
+    In a kernel, a bare Python number next to a single-precision one makes the result double;
+    every literal in a point function therefore passes through here (it costs nothing at run time).
+    """
+    return type(like)(value)
+
+
+@overload(real, inline="always")
+def _real(value, like):
+    if like is numba.types.float32:
+        return lambda value, like: numba.float32(value)
+    return lambda value, like: numba.float64(value)
+
+
+def over_blocks(per_block: Callable) -> Callable:
+    """Make ``f(setup, ...)`` that calls ``per_block(block, setup, ...)`` for each of setup.blocks.
+
+    The blocks have different types (one for each constitutive law), which a loop in a kernel cannot
+    run over: the calls are written out once per number of blocks.
+    """
+
+    shared(per_block)
+
+    def loop(setup: Any, *arguments: Any) -> None:
+        for block in setup.blocks:
+            per_block(block, setup, *arguments)
+
+    def written_out(setup: Any, *arguments: Any) -> Callable:
+        names = "".join(f", a{k}" for k in range(len(arguments)))
+        count = len(setup[setup.fields.index("blocks")])
+        lines = [f"per_block(setup.blocks[{k}], setup{names})" for k in range(count)]
+        return define(f"setup{names}", *lines, per_block=per_block)
+
+    overload(loop, strict=False)(written_out)
+    return loop
+
+
+def define(parameters: str, *lines: str, **names: Any) -> Callable:
+    """The function with these `parameters` and body `lines`, which may use `names`."""
+    body = "\n    ".join(lines or ("pass",))
+    exec(f"def spelled({parameters}):\n    {body}", names)
+    return names["spelled"]

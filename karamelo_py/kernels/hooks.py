@@ -1,0 +1,285 @@
+"""Compiled hooks of fixes: a scalar function of one component at one node or point.
+
+A fix that is "a formula acting on a group" (all built-in ones are) gives a tiny function; the loops
+here choose the members, evaluate the formula over them block by block and apply the function. The
+functions are called by address, so a new list of fixes compiles nothing but the functions it adds.
+
+Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star, force, total)``
+    `value` and `before` are the formula at the time of the step and one step earlier, `share` is
+    one over the number of members with mass; the totals are summed and published.
+Point function ``(mass, v, x_old, x, value, before, dt) -> (v, x, total)``
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from llvmlite import ir
+from numba import cfunc, config, types
+from numba.extending import intrinsic
+
+from karamelo_py.compile import kernel
+from karamelo_py.kernels.formula import BLOCK, Program, evaluate
+from karamelo_py.points.kinematics import dimension
+from karamelo_py.state.arrays import (
+    ADDRESS,
+    BEFORE,
+    CODE,
+    FROM,
+    SLOT,
+    STACK,
+    STAGE,
+    TIME,
+    TO,
+    USES_BEFORE,
+    USES_SHARE,
+    VALUE,
+)
+
+_F8 = types.float64
+NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)
+POINT_FUNCTION = types.UniTuple(_F8, 3)(*[_F8] * 7)
+
+# Where in the node arrays a stage acts.
+ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
+
+_uncompiled: list[Callable] = []
+_addresses: dict[Callable, int] = {}
+_keep_alive: list = []
+
+
+def address_of(function: Callable, signature: types.Type) -> int:
+    """Compile `function` (cached on disk) and return the address kernels call it by."""
+    if function not in _addresses:
+        if config.DISABLE_JIT:
+            _uncompiled.append(function)
+            _addresses[function] = len(_uncompiled) - 1
+        else:
+            compiled = cfunc(signature, cache=True, error_model="numpy")(function)
+            _keep_alive.append(compiled)
+            _addresses[function] = compiled.address
+    return _addresses[function]
+
+
+def _caller(signature: types.Type) -> Callable:
+    """An intrinsic that calls a function of this signature by its address."""
+    result, parameters = signature.return_type, signature.args
+
+    if config.DISABLE_JIT:
+        return lambda address, *arguments: _uncompiled[address](*arguments)
+
+    def codegen(context, builder, _, arguments):
+        kind = ir.FunctionType(
+            context.get_value_type(result), [context.get_value_type(p) for p in parameters]
+        )
+        pointer = builder.inttoptr(arguments[0], kind.as_pointer())
+        return builder.call(pointer, arguments[1:])
+
+    if len(parameters) == 8:
+
+        @intrinsic
+        def call(typing_context, address, a, b, c, d, e, f, g, h):
+            return result(types.int64, *parameters), codegen
+
+    else:
+
+        @intrinsic
+        def call(typing_context, address, a, b, c, d, e, f, g):
+            return result(types.int64, *parameters), codegen
+
+    return call
+
+
+_call_node_function = _caller(NODE_FUNCTION)
+_call_point_function = _caller(POINT_FUNCTION)
+
+
+@kernel
+def _evaluate(hooks, h, component, count, control, out, shift):
+    """Formula of one component over the chosen members, at the present time plus `shift`."""
+    where, stack = hooks.scratch[:VALUE], hooks.scratch[STACK:]
+    row = hooks.table[h, CODE + 4 * component : CODE + 4 * component + 4]
+    program = Program(hooks.code[row[0] : row[1]], hooks.constants[row[2] : row[3]])
+    time = control.values[TIME]
+    control.values[TIME] = time + shift
+    evaluate(program, control.values, where, count, hooks.scratch[out], stack)
+    control.values[TIME] = time
+
+
+@kernel
+def _locate_nodes(kin, basis, shape, hooks, count):
+    """Positions of the chosen nodes."""
+    where = hooks.scratch
+    ny = shape[1]
+    nz = shape[2]
+    for q in range(count):
+        n = hooks.chosen[q]
+        i = n // (ny * nz)
+        j = (n // nz) % ny
+        k = n % nz
+        where[0, q] = basis.x0 + i * basis.h
+        where[1, q] = basis.y0 + j * basis.h if dimension(kin) > 1 else 0.0
+        where[2, q] = basis.z0 + k * basis.h if dimension(kin) > 2 else 0.0
+        for axis in range(3):
+            where[3 + axis, q] = where[axis, q]
+
+
+@kernel
+def _apply_at_nodes(target, kin, basis, nodes, shape, hooks, control, dt, h, count, share):
+    """Act on the chosen nodes; add to the published totals."""
+    _locate_nodes(kin, basis, shape, hooks, count)
+    d = dimension(kin)
+    for c in range(d):
+        if hooks.table[h, CODE + 4 * c] < 0:
+            continue
+        _evaluate(hooks, h, c, count, control, VALUE, 0.0)
+        if hooks.table[h, USES_BEFORE]:
+            _evaluate(hooks, h, c, count, control, BEFORE, -dt)
+        total = 0.0
+        for q in range(count):
+            n = hooks.chosen[q]
+            mass = nodes.sums[n, 0]
+            if target == ON_SUMS:
+                v = nodes.sums[n, 1 + c] / mass
+                star = v
+            elif target == ON_UPDATE:
+                star = nodes.update[n, c]
+                v = star - nodes.update[n, d + c]
+            else:
+                v = nodes.velocity[n, c]
+                star = v
+            v, star, force, part = _call_node_function(
+                hooks.table[h, ADDRESS],
+                mass,
+                v,
+                star,
+                nodes.sums[n, 1 + d + c],
+                hooks.scratch[VALUE, q],
+                hooks.scratch[BEFORE, q],
+                dt,
+                share,
+            )
+            total += part
+            if target == ON_SUMS:
+                nodes.sums[n, 1 + d + c] = force
+            elif target == ON_UPDATE:
+                nodes.update[n, c] = star
+                nodes.update[n, d + c] = star - v
+            else:
+                nodes.velocity[n, c] = v
+        slot = hooks.table[h, SLOT]
+        if slot >= 0:
+            control.values[slot + c] += total
+
+
+@kernel
+def node_hooks(stage, target, kin, basis, nodes, shape, spans, hooks, control, dt):
+    """Call the node functions of `stage` on the members that have mass."""
+    dt = float(dt)
+    for h in range(len(hooks.table)):
+        if hooks.table[h, STAGE] != stage:
+            continue
+        slot = hooks.table[h, SLOT]
+        if slot >= 0:
+            control.values[slot : slot + 3] = 0.0
+        share = 1.0
+        # The first pass only counts the members with mass, for those that share a total.
+        for counting in (True, False):
+            if counting and not hooks.table[h, USES_SHARE]:
+                continue
+            heavy = 0
+            count = 0
+            begin = hooks.table[h, FROM]
+            everything = begin < 0
+            ranges = spans[0, 0] if everything else 1
+            for s in range(ranges):
+                low = spans[1 + s, 0] if everything else begin
+                high = spans[1 + s, 1] if everything else hooks.table[h, TO]
+                for m in range(low, high):
+                    n = m if everything else hooks.members[m]
+                    if not nodes.sums[n, 0] > 0:
+                        continue
+                    heavy += 1
+                    if counting:
+                        continue
+                    hooks.chosen[count] = n
+                    count += 1
+                    if count == BLOCK:
+                        _apply_at_nodes(
+                            target, kin, basis, nodes, shape, hooks, control, dt, h, count, share
+                        )
+                        count = 0
+            if counting:
+                share = 1.0 / max(heavy, 1)
+            elif count > 0:
+                _apply_at_nodes(
+                    target, kin, basis, nodes, shape, hooks, control, dt, h, count, share
+                )
+
+
+@kernel
+def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y):
+    """Act on the chosen points; add to the published totals."""
+    where = hooks.scratch
+    d = dimension(kin)
+    for q in range(count):
+        p = hooks.chosen[q]
+        for c in range(d):
+            where[c, q] = x[p, c]
+            where[3 + c, q] = hooks.x0[ids[p], c]
+    for c in range(d):
+        if hooks.table[h, CODE + 4 * c] < 0:
+            continue
+        _evaluate(hooks, h, c, count, control, VALUE, 0.0)
+        if hooks.table[h, USES_BEFORE]:
+            _evaluate(hooks, h, c, count, control, BEFORE, -dt)
+        total = 0.0
+        for q in range(count):
+            p = hooks.chosen[q]
+            velocity, place, part = _call_point_function(
+                hooks.table[h, ADDRESS],
+                mass[p],
+                v[p, c],
+                x[p, c],
+                y[p, c],
+                hooks.scratch[VALUE, q],
+                hooks.scratch[BEFORE, q],
+                dt,
+            )
+            v[p, c] = velocity
+            y[p, c] = place
+            total += part
+        slot = hooks.table[h, SLOT]
+        if slot >= 0:
+            control.values[slot + c] += total
+
+
+@kernel
+def clear_point_totals(stage, hooks, control):
+    """Totals of point functions start from zero: they are summed over the blocks."""
+    for h in range(len(hooks.table)):
+        slot = hooks.table[h, SLOT]
+        if hooks.table[h, STAGE] == stage and slot >= 0:
+            control.values[slot : slot + 3] = 0.0
+
+
+@kernel
+def point_hooks(stage, kin, v, mass, ids, hooks, control, dt, x, y):
+    """Call the point functions of `stage` on the members in a block."""
+    dt = float(dt)
+    hooks.scratch[:VALUE] = 0.0
+    for h in range(len(hooks.table)):
+        if hooks.table[h, STAGE] != stage:
+            continue
+        count = 0
+        begin = hooks.table[h, FROM]
+        for p in range(mass.size):
+            if begin >= 0 and hooks.members[begin + ids[p]] == 0:
+                continue
+            hooks.chosen[count] = p
+            count += 1
+            if count == BLOCK:
+                _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y)
+                count = 0
+        if count > 0:
+            _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y)

@@ -1,0 +1,387 @@
+"""What a sweep over the points takes from the nodes and gives to them.
+
+A sweep visits every point once: it gathers from the nodes of the point's stencil, settles the
+point, and scatters to nodes again. *What* is gathered and scattered are tags, so that one loop
+(:mod:`karamelo_py.kernels.sweep`) serves every scheme, fused or stage by stage.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+from karamelo_py.compile import point_function, real, shared
+from karamelo_py.points.basis import entry, inside, locate
+from karamelo_py.points.kinematics import (
+    dimension,
+    largest_component,
+    outer,
+    symmetric_dot,
+    vector_at,
+    zero_tensor,
+)
+from karamelo_py.points.materials import (
+    advance,
+    initial_state,
+    jacobian,
+    kirchhoff_stress,
+    reference_density,
+    wave_speed,
+)
+from karamelo_py.points.transfers import (
+    add_moment,
+    carried_momentum,
+    updated_velocity,
+    zero_moment,
+)
+from karamelo_py.tensors import (
+    add,
+    add_at,
+    add_scaled,
+    moment_at,
+    put_at,
+    put_moment,
+    record,
+    row,
+    scale,
+    subtract,
+)
+
+
+class Nothing(NamedTuple):
+    """Gather or scatter nothing."""
+
+
+class Velocity(NamedTuple):
+    """Gather v* and its change; settle velocity and new position."""
+
+
+class Gradient(NamedTuple):
+    """Gather the gradient of the nodal velocity; settle the state of the law."""
+
+
+class VelocityAndGradient(NamedTuple):
+    """Gather both from v*, in one visit."""
+
+
+class Momentum(NamedTuple):
+    """Scatter momentum to the velocity array, with the weights of the gather."""
+
+
+class Force(NamedTuple):
+    """Scatter the internal force, with the weights of the gather."""
+
+
+class MassMomentum(NamedTuple):
+    """Scatter mass and momentum, with the weights of the present position."""
+
+
+class Everything(NamedTuple):
+    """Scatter mass, momentum and internal force, with the weights of the present position."""
+
+
+# --- gather -----------------------------------------------------------------------------------
+
+
+@point_function()
+def empty(gather, transfer, kin, x):
+    """What a gather sums up, before the first node."""
+
+
+@empty.on(Nothing)
+def _(gather, transfer, kin, x):
+    return ()
+
+
+@empty.on(Velocity)
+def _(gather, transfer, kin, x):
+    zero = subtract(x, x)
+    return zero, zero, zero_moment(transfer, kin, x[0])
+
+
+@empty.on(Gradient)
+def _(gather, transfer, kin, x):
+    return zero_tensor(kin, x[0])
+
+
+@empty.on(VelocityAndGradient)
+def _(gather, transfer, kin, x):
+    zero = subtract(x, x)
+    return zero, zero, zero_moment(transfer, kin, x[0]), zero_tensor(kin, x[0])
+
+
+@point_function()
+def gathered(gather, transfer, kin, basis, stencil, k, nodes, total):
+    """`total` with the part of the k-th node of the stencil."""
+
+
+@gathered.on(Nothing)
+def _(gather, transfer, kin, basis, stencil, k, nodes, total):
+    return total
+
+
+@gathered.on(Velocity)
+def _(gather, transfer, kin, basis, stencil, k, nodes, total):
+    i, weight, _ = entry(basis, kin, stencil, k)
+    v = row(nodes.update, i, 0, total[0])
+    dv = row(nodes.update, i, len(v), v)
+    return (
+        add_scaled(total[0], weight, v),
+        add_scaled(total[1], weight, dv),
+        add_moment(transfer, kin, basis, stencil, k, weight, v, total[2]),
+    )
+
+
+@gathered.on(Gradient)
+def _(gather, transfer, kin, basis, stencil, k, nodes, total):
+    i, _, gradient = entry(basis, kin, stencil, k)
+    v = vector_at(kin, nodes.velocity, i)
+    return add(total, outer(kin, v, gradient))
+
+
+@gathered.on(VelocityAndGradient)
+def _(gather, transfer, kin, basis, stencil, k, nodes, total):
+    i, weight, gradient = entry(basis, kin, stencil, k)
+    v = row(nodes.update, i, 0, total[0])
+    dv = row(nodes.update, i, len(v), v)
+    return (
+        add_scaled(total[0], weight, v),
+        add_scaled(total[1], weight, dv),
+        add_moment(transfer, kin, basis, stencil, k, weight, v, total[2]),
+        add(total[3], outer(kin, v, gradient)),
+    )
+
+
+# --- settle -----------------------------------------------------------------------------------
+
+
+@point_function()
+def settled(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
+    """Store what follows from `total`; return how far the point moved in cells, and its rate.
+
+    The rate, (c + max |v_i|) in lengths per time, bounds the stable step. A point that went wrong
+    (det F <= 0, NaN, outside the domain) returns a rate or a distance of NaN or infinity.
+    """
+
+
+@settled.on(Nothing)
+def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
+    if not inside(basis, kin, x):
+        return real(inf, dt), real(0, dt)
+    return real(0, dt), real(0, dt)
+
+
+@settled.on(Velocity)
+def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
+    return _move(transfer, kin, basis, points, laws, x, to, p, dt, total), real(0, dt)
+
+
+@settled.on(Gradient)
+def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
+    return real(0, dt), _strain(kin, points, laws, p, dt, total)
+
+
+@settled.on(VelocityAndGradient)
+def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
+    moved = _move(transfer, kin, basis, points, laws, x, to, p, dt, total)
+    return moved, _strain(kin, points, laws, p, dt, total[3])
+
+
+@shared
+def _move(transfer, kin, basis, points, laws, x, to, p, dt, total):
+    v = updated_velocity(transfer, vector_at(kin, points.v, p), total[0], total[1])
+    put_at(points.v, p, 0, v)
+    put_moment(points.moment, p, total[2])
+    step = scale(dt, total[0])
+    y = add(x, step)
+    put_at(to, p, 0, y)
+    if not inside(basis, kin, y):
+        return real(inf, dt)
+    return largest_component(kin, step) * basis.inv_h
+
+
+@shared
+def _strain(kin, points, laws, p, dt, gradient):
+    law = record(laws, points.material[p])
+    like = initial_state(law, kin, dt)
+    state = advance(law, kin, row(points.state, p, 0, like), scale(dt, gradient), dt)
+    put_at(points.state, p, 0, state)
+    if not jacobian(law, kin, state) > 0:
+        return real(inf, dt)
+    return wave_speed(law, kin, state) + largest_component(kin, vector_at(kin, points.v, p))
+
+
+# --- scatter ----------------------------------------------------------------------------------
+
+
+@point_function()
+def restencil(scatter, kin, basis, stencil, y):
+    """The stencil of the scatter: the gather's own, or that of the present position `y`."""
+
+
+@restencil.on(Nothing)
+@restencil.on(Momentum)
+@restencil.on(Force)
+def _(scatter, kin, basis, stencil, y):
+    return stencil
+
+
+@restencil.on(MassMomentum)
+@restencil.on(Everything)
+def _(scatter, kin, basis, stencil, y):
+    return locate(basis, kin, y)
+
+
+@point_function()
+def load(scatter, transfer, kin, points, laws, p, like):
+    """What a point brings to the nodes."""
+
+
+@load.on(Nothing)
+def _(scatter, transfer, kin, points, laws, p, like):
+    return ()
+
+
+@load.on(Momentum)
+@load.on(MassMomentum)
+def _(scatter, transfer, kin, points, laws, p, like):
+    moment = moment_at(points.moment, p, zero_moment(transfer, kin, like))
+    return points.mass[p], vector_at(kin, points.v, p), moment
+
+
+@load.on(Force)
+def _(scatter, transfer, kin, points, laws, p, like):
+    return _force(kin, points, laws, p, like)
+
+
+@load.on(Everything)
+def _(scatter, transfer, kin, points, laws, p, like):
+    moment = moment_at(points.moment, p, zero_moment(transfer, kin, like))
+    return points.mass[p], vector_at(kin, points.v, p), moment, _force(kin, points, laws, p, like)
+
+
+@shared
+def _force(kin, points, laws, p, like):
+    """Minus volume times stress: (m / rho) tau, with the sign of the internal force."""
+    law = record(laws, points.material[p])
+    state = row(points.state, p, 0, initial_state(law, kin, like))
+    volume = points.mass[p] / reference_density(law)
+    return scale(-volume, kirchhoff_stress(law, kin, state))
+
+
+@point_function()
+def scattered(scatter, transfer, kin, basis, stencil, k, nodes, burden):
+    """Give the k-th node of the stencil its part."""
+
+
+@scattered.on(Nothing)
+def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
+    return None
+
+
+@scattered.on(Momentum)
+def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
+    i, weight, _ = entry(basis, kin, stencil, k)
+    mass, v, moment = burden
+    p = carried_momentum(transfer, kin, basis, stencil, k, weight, mass, v, moment)
+    add_at(nodes.velocity, i, 0, p)
+
+
+@scattered.on(Force)
+def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
+    i, _, gradient = entry(basis, kin, stencil, k)
+    add_at(nodes.sums, i, 1 + len(gradient), symmetric_dot(kin, burden, gradient))
+
+
+@scattered.on(MassMomentum)
+def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
+    i, weight, _ = entry(basis, kin, stencil, k)
+    mass, v, moment = burden
+    p = carried_momentum(transfer, kin, basis, stencil, k, weight, mass, v, moment)
+    add_at(nodes.sums, i, 0, (weight * mass,) + p)
+
+
+@scattered.on(Everything)
+def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
+    i, weight, gradient = entry(basis, kin, stencil, k)
+    mass, v, moment, force = burden
+    p = carried_momentum(transfer, kin, basis, stencil, k, weight, mass, v, moment)
+    f = symmetric_dot(kin, force, gradient)
+    add_at(nodes.sums, i, 0, (weight * mass,) + p + f)
+
+
+# --- nodes ------------------------------------------------------------------------------------
+
+
+class ClearSums(NamedTuple):
+    """Mass, momentum and force of the nodes start from zero."""
+
+
+class ClearVelocity(NamedTuple):
+    """The velocity array starts from zero, to take momentum."""
+
+
+class Update(NamedTuple):
+    """v* = v + dt f / m from the sums."""
+
+
+class MomentumToVelocity(NamedTuple):
+    """The momentum in the velocity array over the mass: the re-mapped velocity of MUSL."""
+
+
+class SumsToVelocity(NamedTuple):
+    """Velocity from the momentum in the sums, before the update (USF)."""
+
+
+class UpdateToVelocity(NamedTuple):
+    """The velocity whose gradient deforms the points is v* (USL)."""
+
+
+@point_function()
+def at_node(task, kin, nodes, n, dt):
+    """Do `task` at node `n`. Nodes without mass stay at rest."""
+
+
+@at_node.on(ClearSums)
+def _(task, kin, nodes, n, dt):
+    for k in range(1 + 2 * dimension(kin)):
+        nodes.sums[n, k] = 0
+
+
+@at_node.on(ClearVelocity)
+def _(task, kin, nodes, n, dt):
+    for k in range(dimension(kin)):
+        nodes.velocity[n, k] = 0
+
+
+@at_node.on(Update)
+def _(task, kin, nodes, n, dt):
+    d = dimension(kin)
+    mass = nodes.sums[n, 0]
+    per_mass = real(1, dt) / mass if mass > 0 else real(0, dt)
+    for k in range(d):
+        dv = dt * nodes.sums[n, 1 + d + k] * per_mass
+        nodes.update[n, k] = nodes.sums[n, 1 + k] * per_mass + dv
+        nodes.update[n, d + k] = dv
+
+
+@at_node.on(MomentumToVelocity)
+def _(task, kin, nodes, n, dt):
+    mass = nodes.sums[n, 0]
+    per_mass = real(1, dt) / mass if mass > 0 else real(0, dt)
+    for k in range(dimension(kin)):
+        nodes.velocity[n, k] *= per_mass
+
+
+@at_node.on(SumsToVelocity)
+def _(task, kin, nodes, n, dt):
+    mass = nodes.sums[n, 0]
+    per_mass = real(1, dt) / mass if mass > 0 else real(0, dt)
+    for k in range(dimension(kin)):
+        nodes.velocity[n, k] = nodes.sums[n, 1 + k] * per_mass
+
+
+@at_node.on(UpdateToVelocity)
+def _(task, kin, nodes, n, dt):
+    for k in range(dimension(kin)):
+        nodes.velocity[n, k] = nodes.update[n, k]

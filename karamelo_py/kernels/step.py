@@ -1,0 +1,291 @@
+"""The parts of a step that schemes put together, and the loop over steps.
+
+Every part takes the :class:`~karamelo_py.state.arrays.Setup` and runs over all its blocks. The same
+source serves two drivers: compiled, where many steps run in one call, and plain Python, where hooks
+that are written in Python are called between the parts.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+from karamelo_py.compile import kernel, over_blocks, point_function, real, shared
+from karamelo_py.kernels.hooks import clear_point_totals, node_hooks, point_hooks
+from karamelo_py.kernels.sweep import sweep_tiles
+from karamelo_py.points.basis import inside
+from karamelo_py.points.kinematics import largest_component, vector_at
+from karamelo_py.points.materials import initial_state, wave_speed
+from karamelo_py.state.arrays import (
+    DRIFT,
+    DRIFT_LIMIT,
+    DT,
+    DT_FACTOR,
+    END_TIME,
+    FIXED_DT,
+    MOVE,
+    NEW_RATE,
+    NOW,
+    OVER_LIMIT,
+    RATE,
+    SPACING,
+    TIME,
+    TIMESTEP,
+    WATCH_LIMIT,
+    WRONG,
+    Hooks,
+    NoHooks,
+)
+from karamelo_py.tensors import record, row, subtract
+
+
+class Fused(NamedTuple):
+    """As few visits of the points as the scheme allows; no hooks between them on points."""
+
+
+class Staged(NamedTuple):
+    """One visit for each stage, so that hooks on points can act in between."""
+
+
+@point_function(tags=2)
+def step(scheme, visits, mode, s, hooks, more):
+    """One step of `scheme`. With `more`, a fused step leaves the next step's sums on the nodes."""
+
+
+# --- parts ------------------------------------------------------------------------------------
+
+
+def _sweep(block, s, mode, gather, scatter, dt):
+    now = s.control.whole[NOW]
+    x = block.x[now]
+    y = block.x[1 - now]
+    points, laws, tiling = block.points, block.laws, block.tiling
+    sweep_tiles(
+        mode, gather, scatter, s.kin, s.basis, s.transfer, s.nodes, points, laws, tiling, x, y, dt
+    )
+
+
+def _sweep_here(block, s, mode, gather, scatter, dt):
+    x = block.x[s.control.whole[NOW]]
+    points, laws, tiling = block.points, block.laws, block.tiling
+    sweep_tiles(
+        mode, gather, scatter, s.kin, s.basis, s.transfer, s.nodes, points, laws, tiling, x, x, dt
+    )
+
+
+_sweep_blocks = over_blocks(_sweep)
+_sweep_blocks_here = over_blocks(_sweep_here)
+
+
+@kernel
+def _read_reports(tiling, control):
+    rate = 0.0
+    for t in range(tiling.colour[-1]):
+        control.real[MOVE] = max(control.real[MOVE], tiling.report[t, 0])
+        rate = max(rate, tiling.report[t, 1])
+        if tiling.report[t, 2] > 0:
+            control.whole[WRONG] = 1
+    control.real[NEW_RATE] = max(control.real[NEW_RATE], rate)
+
+
+def _survey(block, s):
+    _read_reports(block.tiling, s.control)
+
+
+_survey_blocks = over_blocks(_survey)
+
+
+@shared
+def _survey_all(s):
+    """Gather what the tiles reported; whether all points went well."""
+    s.control.real[NEW_RATE] = 0.0
+    _survey_blocks(s)
+    if s.control.real[NEW_RATE] > 0:
+        s.control.real[RATE] = s.control.real[NEW_RATE]
+    return s.control.whole[WRONG] == 0
+
+
+@shared
+def sweep(s, mode, gather, scatter, dt):
+    """Visit all points, moving from the positions now to the next; whether all went well."""
+    _sweep_blocks(s, mode, gather, scatter, dt)
+    return _survey_all(s)
+
+
+@shared
+def sweep_here(s, mode, gather, scatter, dt):
+    """Visit all points at their positions now; whether all went well."""
+    _sweep_blocks_here(s, mode, gather, scatter, dt)
+    return _survey_all(s)
+
+
+@kernel
+def _look_at_moves(kin, basis, x, tiling, control):
+    now = control.whole[NOW]
+    for p in range(x.shape[1]):
+        y = vector_at(kin, x[1 - now], p)
+        step = largest_component(kin, subtract(y, vector_at(kin, x[now], p)))
+        cells = step * basis.inv_h
+        control.real[MOVE] = max(control.real[MOVE], cells)
+        if not (cells <= 1 and inside(basis, kin, y)):
+            control.whole[WRONG] = 1
+            tiling.report[0, 2] = p + 1
+
+
+def _check_moves(block, s):
+    _look_at_moves(s.kin, s.basis, block.x, block.tiling, s.control)
+
+
+_check_moves_of_blocks = over_blocks(_check_moves)
+
+
+@shared
+def check_moves(s):
+    """Look at the new positions again, after hooks that may have changed them."""
+    _check_moves_of_blocks(s)
+    return s.control.whole[WRONG] == 0
+
+
+@shared
+def step_size(s):
+    """dt of the present step, in the precision of the run."""
+    return real(s.control.values[DT], s.basis.h)
+
+
+@kernel
+def choose_dt(control):
+    """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end."""
+    real_, whole = control.real, control.whole
+    limit = real_[SPACING] / real_[RATE] if real_[RATE] > 0 else inf
+    fixed = real_[FIXED_DT]
+    dt = fixed if fixed > 0 else real_[DT_FACTOR] * limit
+    whole[OVER_LIMIT] = whole[OVER_LIMIT] + 1 if dt > limit else 0
+    remaining = real_[END_TIME] - control.values[TIME]
+    # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end.
+    if 0 < remaining <= dt * (1 + 1e-9):
+        dt = remaining
+    control.values[DT] = dt
+
+
+@kernel
+def finish(control):
+    """End of a step: the points are where they moved to, time goes on, the next dt is chosen."""
+    control.whole[NOW] = 1 - control.whole[NOW]
+    dt = control.values[DT]
+    time = control.values[TIME] + dt
+    end = control.real[END_TIME]
+    # Exactly the end, when this step was shortened to reach it.
+    control.values[TIME] = end if end - control.values[TIME] == dt else time
+    control.values[TIMESTEP] += 1
+    control.real[DRIFT] += control.real[MOVE]
+    control.real[MOVE] = 0.0
+    choose_dt(control)
+
+
+# --- hooks ------------------------------------------------------------------------------------
+
+
+@point_function()
+def at_nodes(hooks, stage, target, s):
+    """Let the fixes act on the nodes."""
+
+
+@at_nodes.on(NoHooks)
+def _(hooks, stage, target, s):
+    return None
+
+
+@at_nodes.on(Hooks)
+def _(hooks, stage, target, s):
+    dt = step_size(s)
+    node_hooks(stage, target, s.kin, s.basis, s.nodes, s.shape, s.spans, hooks, s.control, dt)
+
+
+def _point_hooks(block, s, hooks, stage, now, then):
+    x = block.x[now]
+    y = block.x[then]
+    points, ids = block.points, block.id
+    point_hooks(stage, s.kin, points.v, points.mass, ids, hooks, s.control, step_size(s), x, y)
+
+
+hook_points = over_blocks(_point_hooks)
+
+
+@point_function()
+def at_points(hooks, stage, then, s):
+    """Let the fixes act on the points; `then` is 1 when their new positions are known, else 0."""
+
+
+@at_points.on(NoHooks)
+def _(hooks, stage, then, s):
+    return None
+
+
+@at_points.on(Hooks)
+def _(hooks, stage, then, s):
+    clear_point_totals(stage, hooks, s.control)
+    now = s.control.whole[NOW]
+    hook_points(s, hooks, stage, now, 1 - now if then else now)
+
+
+# --- loop -------------------------------------------------------------------------------------
+
+@point_function(tags=2)
+def begin(scheme, visits, mode, s):
+    """Before the first of several steps: fused steps expect the sums on the nodes."""
+
+
+DONE, STOPPED, ABOVE_LIMIT, SORT = range(4)
+PATIENCE = 50  # steps above the stable limit before a run is stopped
+
+
+def run_steps(scheme, visits, mode, s, hooks, count):
+    """Take up to `count` steps, as far as the end time; say why it stopped.
+
+    Returns DONE, STOPPED (a point went wrong), ABOVE_LIMIT (the step is above the stable limit) or
+    SORT: the points must be sorted before one can have left the surroundings of its tile. When that
+    is depends on the points only, never on where a run is interrupted.
+    """
+    control = s.control
+    begin(scheme, visits, mode, s)
+    for n in range(count):
+        time = control.values[TIME] + control.values[DT]
+        last = n + 1 == count or time >= control.real[END_TIME]
+        if not step(scheme, visits, mode, s, hooks, not last):
+            return STOPPED
+        finish(control)
+        if control.whole[WATCH_LIMIT] > 0 and control.whole[OVER_LIMIT] >= PATIENCE:
+            return ABOVE_LIMIT
+        if control.real[DRIFT] > control.real[DRIFT_LIMIT]:
+            return SORT
+        if last:
+            break
+    return DONE
+
+
+advance = kernel(run_steps)
+
+
+@kernel
+def _fastest(kin, basis, points, laws, control):
+    rate = 0.0
+    for p in range(points.mass.size):
+        law = record(laws, points.material[p])
+        state = row(points.state, p, 0, initial_state(law, kin, basis.h))
+        speed = wave_speed(law, kin, state)
+        rate = max(rate, speed + largest_component(kin, vector_at(kin, points.v, p)))
+    control.real[RATE] = max(control.real[RATE], rate)
+
+
+def _measure(block, s):
+    _fastest(s.kin, s.basis, block.points, block.laws, s.control)
+
+
+measure_blocks = over_blocks(_measure)
+
+
+@shared
+def measure(s):
+    """The rate of the present state, for the first dt."""
+    s.control.real[RATE] = 0.0
+    measure_blocks(s)

@@ -1,0 +1,210 @@
+"""A lowered scene and the way it runs: in chunks of compiled steps, watched from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from karamelo_py.kernels.hooks import ON_VELOCITY
+from karamelo_py.kernels.step import (
+    DONE,
+    SORT,
+    Fused,
+    Staged,
+    advance,
+    at_nodes,
+    at_points,
+    choose_dt,
+    measure,
+    run_steps,
+)
+from karamelo_py.kernels.sweep import Serial, Threaded
+from karamelo_py.lowering import State, lower, thread_count
+from karamelo_py.modify import POINT_STAGES, STAGES, CompiledHook, NodesView, PointsView
+from karamelo_py.state.arrays import (
+    DRIFT,
+    DRIFT_LIMIT,
+    DT,
+    DT_FACTOR,
+    END_TIME,
+    FIXED_DT,
+    NOW,
+    OVER_LIMIT,
+    RATE,
+    SPACING,
+    TIME,
+    TIMESTEP,
+    WATCH_LIMIT,
+    Setup,
+)
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+CHUNK = 100  # steps between two looks at the run from Python, and between two snapshots
+
+
+class PythonHooks:
+    """Hooks of a step when some fixes act from Python: these, and the compiled ones."""
+
+    def __init__(self, simulation: Simulation, fixes: list):
+        self.simulation = simulation
+        self.by_stage: dict[int, list[tuple[Any, Callable]]] = {}
+        for fix in fixes:
+            for name, hook in fix.hooks().items():
+                if not isinstance(hook, CompiledHook):
+                    self.by_stage.setdefault(STAGES[name], []).append((fix, hook))
+
+
+@at_nodes.on(PythonHooks)
+def _(hooks, stage, target, s):
+    at_nodes(s.hooks, stage, target, s)
+    for fix, hook in hooks.by_stage.get(stage, ()):
+        hook(NodesView(s, fix.group, stage, before_update=target == ON_VELOCITY))
+
+
+@at_points.on(PythonHooks)
+def _(hooks, stage, then, s):
+    at_points(s.hooks, stage, then, s)
+    for fix, hook in hooks.by_stage.get(stage, ()):
+        view = PointsView(hooks.simulation, fix.group, bool(then))
+        hook(view)
+        if view.moved:
+            s.control.real[DRIFT] = np.inf
+
+
+class Simulation:
+    """The arrays of a scene, and how they go forward in time."""
+
+    def __init__(self, hub: Hub, previous: Simulation | None = None):
+        self.hub = hub
+        state = previous.state() if previous else None
+        self.setup, self.tiles = lower(hub, state)
+        self.count = sum(len(s.x0) for s in hub.solids.values())
+        self.x0 = np.concatenate([s.x0 for s in hub.solids.values()])
+        self.solid_of = np.concatenate(
+            [np.full(len(s.x0), k, np.int32) for k, s in enumerate(hub.solids.values())]
+        )
+        self.threads = thread_count(hub, self.count)
+        self.mode = Threaded() if self.threads > 1 else Serial()
+        self.steps_taken = 0
+        self._python: PythonHooks | None = None
+
+    # --- fields by id -------------------------------------------------------------------------
+
+    @property
+    def now(self) -> int:
+        """Which of the two position arrays is the present one."""
+        return int(self.setup.control.whole[NOW])
+
+    def by_id(self, field: Callable) -> np.ndarray:
+        """A field of all points in the order of their ids; `field` takes it from a block."""
+        blocks = self.setup.blocks
+        first = field(blocks[0])
+        out = np.zeros((self.count, *first.shape[1:]), first.dtype)
+        for block in blocks:
+            out[block.id] = field(block)
+        return out
+
+    def members(self, group: Any) -> np.ndarray:
+        """Ids (0-based) of a particle group."""
+        return np.arange(self.count) if group.all else group.ids
+
+    @property
+    def x(self) -> np.ndarray:
+        """(N, d) present positions by id."""
+        return self.by_id(lambda block: block.x[self.now])
+
+    @property
+    def v(self) -> np.ndarray:
+        """(N, d) velocities by id."""
+        return self.by_id(lambda block: block.points.v)
+
+    @property
+    def mass(self) -> np.ndarray:
+        """(N,) masses by id."""
+        return self.by_id(lambda block: block.points.mass)
+
+    def state(self) -> State:
+        """All that a new lowering takes over."""
+        laws = {}
+        for block in self.setup.blocks:
+            points = block.points
+            rows = np.zeros((self.count, points.state.shape[1]), points.state.dtype)
+            rows[points.id] = points.state
+            laws[type(block.laws)] = rows
+        keeps = self.setup.blocks[0].points.moment is not None
+        moment = self.by_id(lambda block: block.points.moment) if keeps else None
+        return State(self.count, self.x, self.v, laws, moment)
+
+    # --- stepping -----------------------------------------------------------------------------
+
+    def begin(self, end_time: float) -> None:
+        """Start of a run: choose the first dt; the run ends at `end_time` at the latest."""
+        import numba
+
+        if self.threads > 1:
+            numba.set_num_threads(self.threads)
+        update = self.hub.update
+        control = self.setup.control
+        control.real[FIXED_DT] = update.fixed_dt or 0.0
+        control.real[DT_FACTOR] = update.dt_factor
+        control.real[END_TIME] = end_time
+        control.whole[OVER_LIMIT] = 0
+        measure(self.setup)
+        choose_dt(self.setup.control)
+        control.whole[WATCH_LIMIT] = int(not self.above_limit())
+        control.whole[OVER_LIMIT] = 0
+        fixes = list(self.hub.fixes.values())
+        self._python = PythonHooks(self, [f for f in fixes if not f.first_step_only])
+        self._first = PythonHooks(self, [f for f in fixes if f.first_step_only and not f.done])
+        self._staged = any(
+            name in POINT_STAGES for fix in fixes if not fix.first_step_only for name in fix.hooks()
+        )
+        if control.real[DRIFT] > control.real[DRIFT_LIMIT]:
+            self.tiles.sort(self.setup, self.mode)
+
+    @property
+    def limit(self) -> float:
+        """The stable step of the present state: cell size over the fastest point's rate."""
+        control = self.setup.control.real
+        return control[SPACING] / control[RATE] if control[RATE] > 0 else np.inf
+
+    def above_limit(self) -> bool:
+        """Whether the chosen step is above the stable limit already."""
+        return self.setup.control.values[DT] > self.limit * (1 + 1e-12)
+
+    @property
+    def time(self) -> float:
+        """Present time."""
+        return float(self.setup.control.values[TIME])
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken in the whole script."""
+        return int(self.setup.control.values[TIMESTEP])
+
+    def advance(self, count: int) -> int:
+        """Take up to `count` steps (to the end time at most); DONE, STOPPED or ABOVE_LIMIT."""
+        target = self.step + count
+        status = SORT
+        while status == SORT:
+            status = self._advance(target - self.step)
+            if status == SORT:
+                self.tiles.sort(self.setup, self.mode)
+                if self.step == target or self.time >= self.setup.control.real[END_TIME]:
+                    status = DONE
+        return status
+
+    def _advance(self, count: int) -> int:
+        scheme = self.hub.update.scheme
+        if self._first.by_stage:
+            status = run_steps(scheme, Staged(), self.mode, self.setup, self._first, 1)
+            self._first.by_stage.clear()
+            return SORT if status == DONE else status
+        if self._python.by_stage:
+            return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
+        visits = Staged() if self._staged else Fused()
+        return advance(scheme, visits, self.mode, self.setup, self.setup.hooks, count)
