@@ -1,0 +1,247 @@
+"""From text to statements. The grammar is in karamelo.lark."""
+
+from __future__ import annotations
+
+import math
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+from karamelo_py.script import mistakes
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.mistakes import Mistake
+from karamelo_py.script.syntax import (
+    Assignment,
+    Binary,
+    Call,
+    Evaluation,
+    Function,
+    Name,
+    Node,
+    Number,
+    Raw,
+    Source,
+    Statement,
+    Text,
+    Unary,
+)
+
+# Trees are walked by recursion; this keeps well below Python's limit.
+MAX_DEPTH = 200
+
+_SPELLINGS = {"**": "^", "and": "&&", "or": "||", "not": "!"}
+
+
+def parse(text: str, file: str = "<text>") -> list[Statement]:
+    """The statements of a script.
+
+    Arguments of calls stay as they are written; everything else is checked.
+
+    Raises
+    ------
+    ScriptError
+        At the first syntax error, with its place.
+    """
+    # A byte order mark and the line ends of other systems mean nothing.
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    source = Source(text, file)
+    try:
+        mistakes.check_characters(text)
+        with mistakes.explained(lambda error: mistakes.in_script(text, error)):
+            spans = _lark().parse(text, start="script")
+    except Mistake as mistake:
+        raise mistake.error(source) from None
+    return [_statement(source, *span) for span in spans]
+
+
+def parse_expression(raw: Raw) -> Node:
+    """The tree of an expression.
+
+    Raises
+    ------
+    ScriptError
+        At a syntax error, with its place.
+    """
+    try:
+        return _tree(raw.code)
+    except Mistake as mistake:
+        raise mistake.error(raw.source, raw.start) from None
+
+
+def parse_text(text: str, file: str = "<text>") -> tuple[Raw, Node]:
+    """An expression that stands in no script, such as one from the command line."""
+    raw = Raw(Source(text, file), 0, len(text))
+    return raw, parse_expression(raw)
+
+
+@lru_cache(maxsize=4096)
+def _tree(code: str) -> Node:
+    """The tree of `code`; its offsets count from the start of `code`."""
+    word = code.strip()
+    # Most arguments and many right-hand sides are one name or one whole number.
+    if word.isascii() and word.isidentifier() and word not in _SPELLINGS:
+        start = code.index(word)
+        return Name(start, start + len(word), 1, word)
+    if word.isascii() and word.isdigit():
+        start = code.index(word)
+        return Number(start, start + len(word), 1, _number(word, start))
+    if not word:
+        raise Mistake("there is nothing here", 0, len(code), expected="an expression")
+    with mistakes.explained(lambda error: mistakes.in_expression(code, error)):
+        return _lark().parse(code, start="expression")
+
+
+def _number(word: str, start: int) -> float:
+    value = float(word)
+    if math.isinf(value):
+        raise Mistake(
+            f"the number {word} is too large", start, start + len(word), expected="below 1.8e308"
+        )
+    return value
+
+
+def _statement(source: Source, kind: str, name: str, start: int, end: int, parts: Any) -> Statement:
+    """The statement that lies at `start` to `end`."""
+    place = source.place(start, start + max(len(name), 1))
+    whole = Raw(source, start, end)
+    if kind == "assignment":
+        begin, stop = parts
+        right = Raw(source, begin, max(stop, begin))
+        if not right.code.strip():
+            raise ScriptError(
+                f"nothing is assigned to '{name}'",
+                place=source.place(start, end),
+                expected="a number, a text in quotes or an expression after the =",
+                hint=f"{name} = 1",
+            )
+        return Assignment(place, whole, name, parse_expression(right))
+    if kind == "call":
+        return Call(place, whole, name, tuple(_arguments(source, name, parts)))
+    node = parse_expression(whole)
+    return Evaluation(source.place(start, end), whole, node)
+
+
+def _arguments(source: Source, name: str, parts: list) -> list[Raw]:
+    """Raw arguments of a call; `parts` are spans (None where empty) and the commas between."""
+    if parts == [None]:
+        return []
+    raws = []
+    for k, part in enumerate(parts):
+        if k % 2:
+            continue
+        if part is None:
+            comma = parts[k + 1] if k + 1 < len(parts) else parts[k - 1]
+            where = "before" if k + 1 < len(parts) else "after"
+            raise ScriptError(
+                f"{name}: argument {k // 2 + 1} is missing",
+                place=source.place(*_span(comma)),
+                expected=f"something {where} this comma",
+                hint="leave the comma out, or write NULL where a component is not to be set",
+            )
+        raws.append(Raw(source, *part))
+    return raws
+
+
+# ---- Lark ---------------------------------------------------------------------------------------
+
+
+@cache
+def _lark() -> Any:
+    from lark import Lark
+
+    grammar = Path(__file__).with_name("karamelo.lark").read_text(encoding="utf-8")
+    return Lark(
+        grammar,
+        parser="lalr",
+        start=["script", "expression"],
+        transformer=_Builder(),
+        keep_all_tokens=True,
+        maybe_placeholders=False,
+    )
+
+
+def _span(part: Any) -> tuple[int, int]:
+    return part if isinstance(part, tuple) else (part.start_pos, part.end_pos)
+
+
+def _around(parts: list) -> tuple[int, int]:
+    return _span(parts[0])[0], _span(parts[-1])[1]
+
+
+def _deeper(start: int, end: int, *below: Node) -> int:
+    depth = 1 + max((node.depth for node in below), default=0)
+    if depth > MAX_DEPTH:
+        raise Mistake(
+            "the expression is too long or too deeply nested",
+            start,
+            end,
+            expected=f"at most {MAX_DEPTH} levels",
+            hint="give parts of it names: a = ..., b = ..., then a + b",
+        )
+    return depth
+
+
+class _Builder:
+    """Makes spans of statements and trees of expressions while Lark parses.
+
+    Each method is named after a rule of the grammar and gets what the rule matched.
+    """
+
+    def script(self, parts: list) -> list:
+        return [part for part in parts if isinstance(part, tuple)]
+
+    def assignment(self, parts: list) -> tuple:
+        head = parts[0]
+        start, end = _around(parts)
+        return "assignment", head[:-1].rstrip(), start, end, (head.end_pos, end)
+
+    def call(self, parts: list) -> tuple:
+        return "call", parts[0][:-1].rstrip(), *_around(parts), parts[1]
+
+    def evaluation(self, parts: list) -> tuple:
+        return "evaluation", "", *_around(parts), None
+
+    def group(self, parts: list) -> tuple:
+        return _around(parts)
+
+    nested = group
+
+    def arguments(self, parts: list) -> list:
+        return parts
+
+    def argument(self, parts: list) -> tuple | None:
+        parts = [p for p in parts if isinstance(p, tuple) or p.type != "NEWLINE"]
+        return _around(parts) if parts else None
+
+    def number(self, parts: list) -> Node:
+        start, end = _span(parts[0])
+        return Number(start, end, 1, _number(str(parts[0]), start))
+
+    def text(self, parts: list) -> Node:
+        return Text(*_span(parts[0]), 1, str(parts[0])[1:-1])
+
+    def name(self, parts: list) -> Node:
+        return Name(*_span(parts[0]), 1, str(parts[0]))
+
+    def unary(self, parts: list) -> Node:
+        sign, operand = parts
+        operator = _SPELLINGS.get(str(sign), str(sign))
+        start, end = sign.start_pos, operand.end
+        return Unary(start, end, _deeper(start, end, operand), operator, operand)
+
+    def binary(self, parts: list) -> Node:
+        left, sign, right = parts
+        operator = _SPELLINGS.get(str(sign), str(sign))
+        start, end = left.start, right.end
+        return Binary(start, end, _deeper(start, end, left, right), operator, left, right)
+
+    def operands(self, parts: list) -> list:
+        return parts[::2]
+
+    def function(self, parts: list) -> Node:
+        operands = tuple(parts[2]) if len(parts) == 4 else ()
+        start, end = parts[0].start_pos, parts[-1].end_pos
+        return Function(start, end, _deeper(start, end, *operands), str(parts[0]), operands)
+
+    def parenthesis(self, parts: list) -> Node:
+        return parts[1]

@@ -1,0 +1,155 @@
+"""What a script looks like once it is read: statements, raw arguments, expression trees."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from karamelo_py.script.errors import Place
+
+# Quoted text is matched first so that a # in it starts no comment.
+_COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
+
+
+class Source:
+    """The text of one script file, and where its offsets are."""
+
+    def __init__(self, text: str, file: str):
+        self.text = text
+        self.file = file
+
+    @cached_property
+    def _starts(self) -> list[int]:
+        return [0] + [m.end() for m in re.finditer("\n", self.text)]
+
+    def place(self, start: int, end: int) -> Place:
+        """The place of the characters from offset `start` up to `end`."""
+        start = min(max(start, 0), len(self.text))
+        line = bisect_right(self._starts, start) - 1
+        first = self._starts[line]
+        last = self.text.find("\n", first)
+        last = len(self.text) if last < 0 else last
+        length = max(min(end, last) - start, 1)
+        return Place(self.file, line + 1, start - first + 1, length, self.text[first:last])
+
+    def code(self, start: int, end: int) -> str:
+        """The characters from `start` to `end` with comments and line ends made blank."""
+        text = self.text[start:end]
+        if "#" in text or "\n" in text:
+            text = _COMMENT_OR_BREAK.sub(
+                lambda m: m[0] if m[0][0] == '"' else " " * len(m[0]), text
+            )
+        return text
+
+
+# ---- expressions; start and end are offsets into the text of the expression ---------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One node of an expression tree."""
+
+    start: int
+    end: int
+    depth: int = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Number(Node):
+    """A literal number."""
+
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Text(Node):
+    """A literal text, without its quotes."""
+
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Name(Node):
+    """A variable, seed or published value."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unary(Node):
+    """`operator` (``-``, ``+`` or ``!``) in front of `operand`."""
+
+    operator: str
+    operand: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Binary(Node):
+    """`left` `operator` `right`; the operators are spelled ``^ && ||`` whatever the script says."""
+
+    operator: str
+    left: Node
+    right: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Function(Node):
+    """A call of a function or of a command that gives a value."""
+
+    name: str
+    operands: tuple[Node, ...]
+
+
+# ---- statements ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Raw:
+    """An argument or right-hand side as it was written; offsets into `source`."""
+
+    source: Source
+    start: int
+    end: int
+
+    @property
+    def code(self) -> str:
+        """The text to parse: as written, comments and line ends made blank."""
+        return self.source.code(self.start, self.end)
+
+    @property
+    def place(self) -> Place:
+        """Where it stands."""
+        return self.source.place(self.start, self.end)
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """One statement; `place` marks its first word."""
+
+    place: Place
+    raw: Raw
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment(Statement):
+    """``name = expression``."""
+
+    name: str
+    node: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Call(Statement):
+    """``name(arguments)`` alone on a line."""
+
+    name: str
+    arguments: tuple[Raw, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation(Statement):
+    """An expression alone on a line."""
+
+    node: Node
