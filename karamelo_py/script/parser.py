@@ -27,7 +27,7 @@ from karamelo_py.script.syntax import (
 )
 
 # Trees are walked by recursion; this keeps well below Python's limit.
-MAX_DEPTH = 200
+MAX_DEPTH = 150
 
 _SPELLINGS = {"**": "^", "and": "&&", "or": "||", "not": "!"}
 

@@ -1,0 +1,535 @@
+"""What expressions stand for: numbers, texts, and formulas that are evaluated again and again.
+
+An operation on numbers is done at once. As soon as something that changes takes part (a position,
+the time, a published value), the result is a `Formula`, with the numbers folded in.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.functions import FUNCTIONS, compute, compute_quietly
+from karamelo_py.script.syntax import Binary, Function, Name, Node, Number, Raw, Text, Unary
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+    from karamelo_py.kernels.formula import Program
+    from karamelo_py.script.values import Values
+    from karamelo_py.signature import Argument
+
+POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
+GLOBAL_SEEDS = ("time", "timestep", "dt")
+SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
+
+# Operands on the evaluator's stack, levels of nesting, number of operations in all.
+_MAX_STACK = 32
+_MAX_DEPTH = 200
+_MAX_SIZE = 20000
+
+# Functions that the evaluator does not know as such.
+_REWRITTEN = {
+    "pow": lambda a, b: _term("^", a, b),
+    "mod": lambda a, b: _term("%", a, b),
+    "tgamma": lambda a: _term("gamma", a),
+    "exp2": lambda a: _term("^", _number(2.0), a),
+    "degrees": lambda a: _term("*", a, _number(180 / math.pi)),
+    "radians": lambda a: _term("*", a, _number(math.pi / 180)),
+    "remainder": lambda a, b: _term("-", a, _term("*", b, _term("round", _term("/", a, b)))),
+}
+
+_PRECEDENCE = {
+    "||": 1,
+    "&&": 2,
+    "not": 3,
+    **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 4),
+    "+": 5,
+    "-": 5,
+    "*": 6,
+    "/": 6,
+    "%": 6,
+    "neg": 7,
+    "^": 8,
+}
+
+
+class _Term:
+    """A node of a formula: a number, the name of a seed, or an operation on terms."""
+
+    __slots__ = ("depth", "names", "need", "operands", "operation", "size", "value")
+
+    def __init__(self, operation: str, operands: tuple[_Term, ...], value: Any):
+        self.operation = operation
+        self.operands = operands
+        self.value = value
+        self.names: frozenset[str] = frozenset()
+        if operation == "name":
+            self.names = frozenset({value})
+        elif operands:
+            self.names = frozenset().union(*(term.names for term in operands))
+        self.depth = 1 + max((term.depth for term in operands), default=0)
+        self.size = 1 + sum(term.size for term in operands)
+        # Operands wait on the stack while the next one is computed.
+        self.need = max((k + term.need for k, term in enumerate(operands)), default=1)
+        if self.need > _MAX_STACK or self.depth > _MAX_DEPTH or self.size > _MAX_SIZE:
+            raise ScriptError(
+                "the formula is too long",
+                expected=f"at most {_MAX_SIZE} operations, nested {_MAX_STACK} deep",
+            )
+
+
+def _number(value: float) -> _Term:
+    return _Term("number", (), float(value))
+
+
+def _term(operation: str, *operands: _Term) -> _Term:
+    return _Term(operation, operands, None)
+
+
+class Formula:
+    """A formula of positions, time and published values.
+
+    Attributes
+    ----------
+    names : frozenset of str
+        The seeds it needs: some of x y z x0 y0 z0, time timestep dt, published names.
+    """
+
+    __slots__ = ("_term",)
+
+    def __init__(self, term: _Term):
+        self._term = term
+
+    @classmethod
+    def of(cls, value: float | Formula) -> Formula:
+        """A number as a formula; a formula as it is."""
+        return value if isinstance(value, Formula) else cls(_number(value))
+
+    @classmethod
+    def seed(cls, name: str) -> Formula:
+        """The formula that is nothing but a name."""
+        return cls(_Term("name", (), name))
+
+    @property
+    def names(self) -> frozenset[str]:
+        return self._term.names
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is one number for ever."""
+        return not self._term.names
+
+    @property
+    def text(self) -> str:
+        """The formula as it could stand in a script, down to its seeds."""
+        return _text(self._term)
+
+    def __repr__(self) -> str:
+        return f"Formula({self.text})"
+
+    def evaluate(self, values: Values) -> float:
+        """The number it has now.
+
+        Raises
+        ------
+        ScriptError
+            If it needs a position.
+        """
+        needed = self.names.intersection(POINT_SEEDS)
+        if needed:
+            raise ScriptError(
+                f"'{self.text}' depends on {min(needed)}, which differs from point to point",
+                expected="a formula of time and of values of fixes and computes",
+            )
+        return _evaluate(self._term, values)
+
+    def program(self, values: Values) -> Program:
+        """The formula for :func:`karamelo_py.kernels.formula.evaluate`."""
+        from karamelo_py.kernels import formula as kernels
+
+        code: list[tuple[int, int]] = []
+        constants: dict[float, int] = {}
+        _compile(self._term, values, kernels, code, constants)
+        return kernels.Program(
+            np.array(code, dtype=np.int64).reshape(-1, 2),
+            np.array(list(constants), dtype=np.float64),
+        )
+
+    def evaluate_points(
+        self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
+    ) -> np.ndarray:
+        """The numbers it has at positions `x`, whose reference positions are `x0`.
+
+        Parameters
+        ----------
+        values
+            Published values.
+        x, x0 : ndarray (n, 1 to 3)
+            Missing directions count as 0; `x0` defaults to `x`.
+
+        Returns
+        -------
+        ndarray (n,) float64
+        """
+        from karamelo_py.kernels import formula as kernels
+
+        x = _three_columns(x)
+        x0 = x if x0 is None else _three_columns(x0)
+        out = np.empty(len(x))
+        scratch = np.empty((6 + kernels.MAX_DEPTH, kernels.BLOCK))
+        kernels.evaluate_all(self.program(values), values.array, x, x0, out, scratch)
+        return out
+
+
+class Expression:
+    """For signatures: a number or a formula, used alike.
+
+    Attributes
+    ----------
+    formula : Formula
+    """
+
+    def __init__(self, value: float | Formula):
+        self.formula = Formula.of(value)
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Expression:
+        """The expression that a script's argument stands for."""
+        value = argument.value(hub)
+        if isinstance(value, str):
+            raise ScriptError(
+                f"'{value}' is text",
+                place=argument.place,
+                expected="a number or a formula",
+            )
+        return cls(value)
+
+    @property
+    def is_constant(self) -> bool:
+        return self.formula.is_constant
+
+    @property
+    def constant(self) -> float:
+        """The number, if it is one for ever (else a ValueError)."""
+        if not self.is_constant:
+            raise ValueError(f"{self.text} is not constant")
+        return self.formula._term.value
+
+    @property
+    def names(self) -> frozenset[str]:
+        return self.formula.names
+
+    @property
+    def text(self) -> str:
+        return self.formula.text
+
+    def __repr__(self) -> str:
+        return f"Expression({self.text})"
+
+    def program(self, values: Values) -> Program:
+        """See :meth:`Formula.program`."""
+        return self.formula.program(values)
+
+    def evaluate(self, values: Values) -> float:
+        """See :meth:`Formula.evaluate`."""
+        return self.formula.evaluate(values)
+
+    def evaluate_points(
+        self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
+    ) -> np.ndarray:
+        """See :meth:`Formula.evaluate_points`."""
+        return self.formula.evaluate_points(values, x, x0)
+
+
+Value = float | str | Formula
+
+
+# ---- formulas: text, numbers, programs ----------------------------------------------------------
+
+
+def number_text(value: float) -> str:
+    """A number as a script says it, exactly."""
+    text = repr(float(value))
+    return text.removesuffix(".0")
+
+
+def _text(term: _Term) -> str:
+    operation, operands = term.operation, term.operands
+    if operation == "number":
+        return number_text(term.value)
+    if operation == "name":
+        return term.value
+    level = _PRECEDENCE.get(operation)
+    if level is None:
+        return f"{operation}({', '.join(_text(operand) for operand in operands)})"
+    if operation == "neg":
+        return "-" + _bracketed(operands[0], 7)
+    if operation == "not":
+        return "!" + _bracketed(operands[0], 3)
+    if operation == "^":
+        return _bracketed(operands[0], 9) + "^" + _bracketed(operands[1], 7)
+    left, right = operands
+    blank = "" if level >= 6 else " "
+    return f"{_bracketed(left, level)}{blank}{operation}{blank}{_bracketed(right, level + 1)}"
+
+
+def _bracketed(term: _Term, level: int) -> str:
+    """The text of `term`, in parentheses if it binds less than `level`."""
+    if term.operation == "number":
+        own = 7 if math.copysign(1.0, term.value) < 0 else 9
+    else:
+        own = _PRECEDENCE.get(term.operation, 9)
+    return _text(term) if own >= level else f"({_text(term)})"
+
+
+def _evaluate(term: _Term, values: Values) -> float:
+    if term.operation == "number":
+        return term.value
+    if term.operation == "name":
+        return values.get(_published(term.value, values))
+    return compute_quietly(term.operation, *[_evaluate(t, values) for t in term.operands])
+
+
+def _published(name: str, values: Values) -> str:
+    if name not in values:
+        raise ScriptError(f"'{name}' is no longer a value of a fix or a compute")
+    return name
+
+
+def _compile(term: _Term, values: Values, kernels: Any, code: list, constants: dict) -> bool:
+    """Append the instructions for `term`; returns whether its result is the same at all points."""
+    if term.operation == "number":
+        # Keyed by the digits, not the value: 0.0 and -0.0 are different numbers.
+        slot = constants.setdefault(_Exact(term.value), len(constants))
+        code.append((kernels.CONSTANT + kernels.UNIFORM, slot))
+        return True
+    if term.operation == "name":
+        if term.value in POINT_SEEDS:
+            code.append((kernels.POINT, POINT_SEEDS.index(term.value)))
+            return False
+        code.append((kernels.GLOBAL + kernels.UNIFORM, values.slot(_published(term.value, values))))
+        return True
+    uniform = [_compile(operand, values, kernels, code, constants) for operand in term.operands]
+    operation = kernels.OPERATIONS[term.operation]
+    if all(uniform):
+        code.append((operation + kernels.UNIFORM, 0))
+        return True
+    for k, same in enumerate(uniform):
+        if same:
+            code.append((kernels.SPREAD, len(uniform) - 1 - k))
+    code.append((operation, 0))
+    return False
+
+
+class _Exact(float):
+    """A float that equals only its own bits."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, float) and self.hex() == other.hex()
+
+    def __hash__(self) -> int:
+        return hash(self.hex())
+
+
+def _three_columns(x: np.ndarray) -> np.ndarray:
+    x = np.asarray(x, dtype=np.float64)
+    if x.shape[1] < 3:
+        x = np.concatenate([x, np.zeros((len(x), 3 - x.shape[1]))], axis=1)
+    return np.ascontiguousarray(x)
+
+
+# ---- from trees to values -----------------------------------------------------------------------
+
+
+class Scope(Protocol):
+    """Where names and calls of commands get their meaning: the interpreter."""
+
+    def name(self, name: str, node: Name, raw: Raw) -> Value:
+        """What a name stands for."""
+
+    def command(self, node: Function, raw: Raw) -> Value:
+        """The value of a call that is not a function."""
+
+
+def evaluate(node: Node, raw: Raw, scope: Scope) -> Value:
+    """What the tree of `raw` stands for: a number, a text or a formula.
+
+    Raises
+    ------
+    ScriptError
+        With the place of the operand to blame.
+    """
+    if isinstance(node, Number):
+        return node.value
+    if isinstance(node, Text):
+        return node.value
+    if isinstance(node, Name):
+        return scope.name(node.name, node, raw)
+    if isinstance(node, Unary):
+        operand = _numeric(node.operand, raw, scope, f"'{node.operator}'")
+        if node.operator == "+":
+            return operand
+        return _apply("not" if node.operator == "!" else "neg", node, (operand,), raw)
+    if isinstance(node, Binary):
+        return _binary(node, raw, scope)
+    assert isinstance(node, Function)
+    if node.name not in FUNCTIONS:
+        return scope.command(node, raw)
+    return _function(node, raw, scope)
+
+
+def mark(raw: Raw, node: Node) -> Any:
+    """The place of `node`, a part of `raw`."""
+    return raw.source.place(raw.start + node.start, raw.start + node.end)
+
+
+def _binary(node: Binary, raw: Raw, scope: Scope) -> Value:
+    left = evaluate(node.left, raw, scope)
+    logical = node.operator in ("&&", "||") and isinstance(left, float) and not math.isnan(left)
+    if logical and (left != 0) == (node.operator == "||"):
+        # What cannot matter is not evaluated, so that a != 0 && 1/a > 2 is fine.
+        return 1.0 if left != 0 else 0.0
+    right = evaluate(node.right, raw, scope)
+    if isinstance(left, str) or isinstance(right, str):
+        return _texts(node, left, right, raw)
+    return _apply(node.operator, node, (left, right), raw)
+
+
+def _texts(node: Binary, left: Value, right: Value, raw: Raw) -> Value:
+    if isinstance(left, str) and isinstance(right, str):
+        if node.operator == "+":
+            return left + right
+        if node.operator in ("==", "!="):
+            return float((left == right) == (node.operator == "=="))
+        guilty, text = node.left, left
+    else:
+        guilty, text = (node.left, left) if isinstance(left, str) else (node.right, right)
+    raise ScriptError(
+        f"'{text}' is text, and '{node.operator}' needs numbers",
+        place=mark(raw, guilty),
+        expected="a number; texts can be joined with + and compared with == and !=",
+    )
+
+
+def _numeric(node: Node, raw: Raw, scope: Scope, user: str) -> float | Formula:
+    value = evaluate(node, raw, scope)
+    if isinstance(value, str):
+        raise ScriptError(
+            f"'{value}' is text, and {user} needs a number",
+            place=mark(raw, node),
+            expected="a number",
+        )
+    return value
+
+
+def _function(node: Function, raw: Raw, scope: Scope) -> Value:
+    signature = FUNCTIONS[node.name]
+    count = len(node.operands)
+    if not signature.least <= count <= signature.most:
+        wanted = (
+            f"at least {signature.least} operands"
+            if signature.most > signature.least
+            else "1 operand"
+            if signature.least == 1
+            else f"{signature.least} operands"
+        )
+        raise ScriptError(
+            f"{node.name} takes {wanted}, not {count}",
+            place=mark(raw, node),
+            expected=usage(node.name),
+        )
+    if node.name == "if":
+        condition = _numeric(node.operands[0], raw, scope, "if")
+        if isinstance(condition, float):
+            if math.isnan(condition):
+                return math.nan
+            return evaluate(node.operands[1 if condition != 0 else 2], raw, scope)
+    values = tuple(_numeric(operand, raw, scope, node.name) for operand in node.operands)
+    if node.name in ("min", "max"):
+        # Pairwise: the evaluator knows them for two operands.
+        result = values[0]
+        for value in values[1:]:
+            result = _apply(node.name, node, (result, value), raw)
+        return result
+    return _apply(node.name, node, values, raw)
+
+
+def usage(name: str) -> str:
+    """How a function is called."""
+    operands = {"if": "condition, a, b", "atan2": "y, x", "min": "a, b, ...", "max": "a, b, ..."}
+    return f"{name}({operands.get(name) or ('a, b' if FUNCTIONS[name].least == 2 else 'a')})"
+
+
+def _apply(operation: str, node: Node, values: tuple, raw: Raw) -> float | Formula:
+    """The operation on numbers, or a formula if one of the values is."""
+    if any(isinstance(value, Formula) for value in values):
+        terms = [v._term if isinstance(v, Formula) else _number(v) for v in values]
+        try:
+            rewrite = _REWRITTEN.get(operation)
+            return Formula(rewrite(*terms) if rewrite else _term(operation, *terms))
+        except ScriptError as error:
+            error.place = mark(raw, node)
+            raise
+    try:
+        return compute(operation, *values)
+    except (ValueError, ZeroDivisionError, OverflowError) as error:
+        raise _impossible(operation, node, values, raw, error) from None
+
+
+def _impossible(
+    operation: str, node: Node, values: tuple, raw: Raw, error: Exception
+) -> ScriptError:
+    """The error for an operation on constants that has no result."""
+    operands = _operands(node)
+    shown = ", ".join(f"{value:g}" for value in values)
+    if isinstance(error, ZeroDivisionError) or (operation in ("^", "pow") and values[0] == 0):
+        guilty = operands[0] if operation in ("^", "pow") else operands[-1]
+        code = raw.code[guilty.start : guilty.end]
+        return ScriptError(
+            "division by zero" + ("" if isinstance(guilty, Number) else f": {code} is 0"),
+            place=mark(raw, guilty),
+            expected="a number other than 0",
+        )
+    if isinstance(error, OverflowError):
+        return ScriptError(
+            f"the result of {_spelled(operation, shown)} is too large",
+            place=mark(raw, node),
+            expected="at most 1.8e308",
+        )
+    domains = {
+        "sqrt": "a number of at least 0",
+        "asin": "a number between -1 and 1",
+        "acos": "a number between -1 and 1",
+        "atanh": "a number between -1 and 1, both excluded",
+        "acosh": "a number of at least 1",
+        "log1p": "a number above -1",
+        "^": "a whole exponent for a negative base",
+        "pow": "a whole exponent for a negative base",
+        "gamma": "any number but 0, -1, -2, ...",
+        "lgamma": "any number but 0, -1, -2, ...",
+        "tgamma": "any number but 0, -1, -2, ...",
+    }
+    positive = operation in ("log", "log2", "log10")
+    return ScriptError(
+        f"{_spelled(operation, shown)} is not a real number",
+        place=mark(raw, operands[0] if len(operands) == 1 else node),
+        expected="a number above 0" if positive else domains.get(operation, "a finite result"),
+    )
+
+
+def _spelled(operation: str, shown: str) -> str:
+    if operation in FUNCTIONS:
+        return f"{operation}({shown})"
+    return f" {operation} ".join(shown.split(", "))
+
+
+def _operands(node: Node) -> tuple[Node, ...]:
+    if isinstance(node, Unary):
+        return (node.operand,)
+    if isinstance(node, Binary):
+        return node.left, node.right
+    assert isinstance(node, Function)
+    return node.operands
