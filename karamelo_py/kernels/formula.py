@@ -26,61 +26,18 @@ CONSTANT, GLOBAL, POINT = 0, 1, 2
 # Make a row of the number that lies `operand` below the top.
 SPREAD = 3
 
-UNARY = [
-    "neg",
-    "not",
-    "abs",
-    "sign",
-    "step",
-    "sqrt",
-    "cbrt",
-    "exp",
-    "log",
-    "log10",
-    "log2",
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "sinh",
-    "cosh",
-    "tanh",
-    "asinh",
-    "acosh",
-    "atanh",
-    "erf",
-    "erfc",
-    "gamma",
-    "lgamma",
-    "expm1",
-    "log1p",
-    "floor",
-    "ceil",
-    "round",
-    "trunc",
-]
-BINARY = [
-    "+",
-    "-",
-    "*",
-    "/",
-    "^",
-    "%",
-    "<",
-    "<=",
-    ">",
-    ">=",
-    "==",
-    "!=",
-    "&&",
-    "||",
-    "min",
-    "max",
-    "atan2",
-    "hypot",
-]
+# fmt: off
+UNARY = (
+    "neg", "not", "abs", "sign", "step", "sqrt", "cbrt", "exp", "log", "log10", "log2",
+    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh",
+    "asinh", "acosh", "atanh", "erf", "erfc", "gamma", "lgamma", "expm1", "log1p",
+    "floor", "ceil", "round", "trunc",
+)
+BINARY = (
+    "+", "-", "*", "/", "^", "%", "<", "<=", ">", ">=", "==", "!=",
+    "&&", "||", "min", "max", "atan2", "hypot",
+)
+# fmt: on
 
 _FIRST_UNARY = 4
 _FIRST_BINARY = 64
