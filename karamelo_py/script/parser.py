@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -114,7 +115,7 @@ def _statement(source: Source, kind: str, name: str, start: int, end: int, parts
                 expected="a number, a text in quotes or an expression after the =",
                 hint=f"{name} = 1",
             )
-        return Assignment(place, whole, name, parse_expression(right))
+        return Assignment(place, whole, name, right, parse_expression(right))
     if kind == "call":
         return Call(place, whole, name, tuple(_arguments(source, name, parts)))
     node = parse_expression(whole)
@@ -244,4 +245,5 @@ class _Builder:
         return Function(start, end, _deeper(start, end, *operands), str(parts[0]), operands)
 
     def parenthesis(self, parts: list) -> Node:
-        return parts[1]
+        # The same tree, but marked and quoted with its parentheses.
+        return replace(parts[1], start=parts[0].start_pos, end=parts[2].end_pos)

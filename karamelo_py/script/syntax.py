@@ -134,9 +134,10 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Assignment(Statement):
-    """``name = expression``."""
+    """``name = expression``; `right` is the expression as written, `node` its tree."""
 
     name: str
+    right: Raw
     node: Node
 
 

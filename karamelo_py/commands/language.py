@@ -1,0 +1,125 @@
+"""Commands of the language itself: print, value, evaluate, include, quit."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from karamelo_py.script.errors import Quit
+from karamelo_py.script.expressions import POINT_SEEDS, SEEDS, Expression, Formula
+from karamelo_py.script.interpreter import shown
+from karamelo_py.signature import Argument
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+def print_(hub: Hub, first: Argument, *more: Argument) -> None:
+    """Print what variables and expressions stand for.
+
+    Parameters
+    ----------
+    first, more
+        Expressions, or texts in quotes. A formula is printed with its present value.
+
+    Example
+    -------
+    print(E)
+    print("energy", Ek + Es)
+
+    See Also
+    --------
+    value
+    """
+    arguments = (first, *more)
+    values = [argument.value(hub) for argument in arguments]
+    if hub.rehearsing:
+        return
+    parts = []
+    for argument, value in zip(arguments, values, strict=True):
+        if isinstance(value, str) and argument.text.startswith('"'):
+            parts.append(value)
+            continue
+        parts.append(f"{argument.text} = {shown(value)}")
+        if isinstance(value, Formula) and not value.names.intersection(POINT_SEEDS):
+            _refresh(hub, value)
+            if value.text != argument.text:
+                parts[-1] += f" = {value.evaluate(hub.values):.10g}"
+            else:
+                parts[-1] = f"{argument.text} = {value.evaluate(hub.values):.10g}"
+    hub.console.say(", ".join(parts))
+
+
+def value(hub: Hub, expression: Expression) -> float:
+    """Give the present value of a formula, as a number that no longer changes.
+
+    Parameters
+    ----------
+    expression
+        A formula of time and of values of fixes and computes.
+
+    Example
+    -------
+    E0 = value(Ek + Es)
+
+    See Also
+    --------
+    print
+    """
+    if expression.is_constant:
+        return expression.constant
+    if not expression.names.intersection(POINT_SEEDS):
+        if hub.rehearsing:
+            return math.nan  # Known only once the runs before it are made.
+        _refresh(hub, expression.formula)
+    return expression.evaluate(hub.values)
+
+
+def evaluate(hub: Hub, expression: Expression) -> float:
+    """Give the present value of a formula: another name of value.
+
+    Parameters
+    ----------
+    expression
+        A formula of time and of values of fixes and computes.
+
+    Example
+    -------
+    E0 = evaluate(Ek + Es)
+
+    See Also
+    --------
+    value
+    """
+    return value(hub, expression)
+
+
+def include(hub: Hub, file: str) -> None:
+    """Go through another script at this place; what it sets stays set.
+
+    Parameters
+    ----------
+    file
+        Name of the script, relative to the one that includes it.
+
+    Example
+    -------
+    include(materials.in)
+    """
+    hub.interpreter.include(file)
+
+
+def quit_(hub: Hub) -> None:
+    """End the script here. The bare word quit does the same.
+
+    Example
+    -------
+    quit
+    """
+    raise Quit
+
+
+def _refresh(hub: Hub, formula: Formula) -> None:
+    """Let fixes and computes measure anew if the formula reads what they publish."""
+    if formula.names - SEEDS and not hub.rehearsing:
+        hub.refresh_values()
