@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
 
 from karamelo_py.domain import Domain
 from karamelo_py.hub import Catalogue
-from karamelo_py.points.materials import reference_density
+from karamelo_py.material import Material
+from karamelo_py.points.materials import specific_volume
 from karamelo_py.script.errors import Place
+from karamelo_py.script.values import Values
 from karamelo_py.solid import Solid
 
 DENSITY = 1000.0
@@ -20,9 +23,15 @@ class FakeLaw(NamedTuple):
     rho: float = DENSITY
 
 
-@reference_density.on(FakeLaw)
+@specific_volume.on(FakeLaw)
 def _(law):
-    return law.rho
+    return 1 / law.rho
+
+
+class FakeMaterial(Material):
+    """A material with this law."""
+
+    law = FakeLaw()
 
 
 class FakeArgument:
@@ -52,6 +61,10 @@ class FakeHub:
 
     def __init__(self, dimension=2, lo=-0.5, hi=0.5, h=0.05):
         self.place = None
+        self.folder = Path.cwd()
+        self.values = Values()
+        self.materials = Catalogue("material", self)
+        self.materials.add("steel", FakeMaterial())
         self.rehearsing = self.checking = False
         self.warnings = []
         self.update = SimpleNamespace(method=object())
@@ -75,7 +88,6 @@ class FakeHub:
 
     def solid(self, ID, region, ppc=2, h=None, **options):
         """Make and file a solid."""
-        material = SimpleNamespace(law=FakeLaw())
         return self.solids.add(
-            ID, Solid(self, region, ppc, material, h or self.domain.h, **options)
+            ID, Solid(self, region, ppc, self.materials["steel"], h or self.domain.h, **options)
         )

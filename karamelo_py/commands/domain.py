@@ -58,6 +58,9 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     hub.domain = _domain(hub, DIMENSION, bounds, count)
 
 
+dimension.syntax = "1|2|3, xmin, xmax[, ymin, ymax[, zmin, zmax]], h"
+
+
 def create_domain(hub: Hub, *bounds: Argument) -> None:
     """Set the domain: the older form of dimension.
 
@@ -86,6 +89,9 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
     count = min(max(count, 1), 3)
     forms = CREATE_DOMAIN_WITHOUT_H if len(bounds) == 2 * count else CREATE_DOMAIN
     hub.domain = _domain(hub, forms, bounds, count)
+
+
+create_domain.syntax = "xmin, xmax[, ymin, ymax[, zmin, zmax]][, h]"
 
 
 def axisymmetric(hub: Hub, active: bool) -> None:

@@ -16,8 +16,6 @@ from karamelo_py.solid import Solid
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
-_SYNTAX = "solid(ID, region, regionID, ppc, material, h[, T0])"
-
 
 def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
     """Make a body: fill a region with material points.
@@ -58,17 +56,22 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
     require_domain(hub)
     if kind in ("mesh", "file"):
         raise ScriptError(
-            f"solids from a {kind} are not there yet", argument="kind", expected=_SYNTAX
+            f"solids from a {kind} are not there yet",
+            argument="kind",
+            expected=f"solid({solid.syntax})",
         )
     if kind != "region":
         close = nearest(kind, ["region", "mesh"])
         raise ScriptError(
             f"unknown kind of solid '{kind}'",
             argument="kind",
-            expected=_SYNTAX,
+            expected=f"solid({solid.syntax})",
             hint=f"did you mean '{close}'?" if close else None,
         )
     hub.solids.add(ID, signature.call(Solid, hub, list(arguments), "solid region"))
+
+
+solid.syntax = "ID, region, regionID, ppc, material, h[, T0]"
 
 
 def group(
@@ -149,3 +152,6 @@ def group(
             if none_yet
             else None,
         )
+
+
+group.syntax = "ID, particles|nodes, region, regionID, all | solid, solidID, ..."

@@ -46,6 +46,8 @@ class Block(Region):
     cylinder, sphere
     """
 
+    syntax = "xlo, xhi[, ylo, yhi[, zlo, zhi]][, exterior]"
+
     def __init__(self, hub: Hub, *bounds: Argument):
         given, exterior = split_exterior(bounds)
         dimension = require_domain(hub).dimension

@@ -47,6 +47,8 @@ class Cylinder(Region):
     block, sphere
     """
 
+    syntax = "xc, yc, R | axis, c1, c2, R, lo, hi[, exterior]"
+
     def __init__(self, hub: Hub, *shape: Argument):
         given, exterior = split_exterior(shape)
         dimension = require_domain(hub).dimension

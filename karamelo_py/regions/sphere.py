@@ -38,6 +38,8 @@ class Sphere(Region):
     block, cylinder
     """
 
+    syntax = "x[, y[, z]], R[, exterior]"
+
     def __init__(self, hub: Hub, *shape: Argument):
         given, exterior = split_exterior(shape)
         dimension = require_domain(hub).dimension
