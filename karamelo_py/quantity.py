@@ -63,9 +63,6 @@ class Quantity:
         try:
             if text in cls.names(hub):
                 return cls(hub, text)
-            word = argument.word()
-            if word is not None:
-                return cls(hub, word)
             return cls(hub, text, argument.value(hub))
         except ScriptError as error:
             if error.place is None:

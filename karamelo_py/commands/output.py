@@ -44,6 +44,7 @@ def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argum
     if writer is not None and ID not in hub.dumps:
         raise ScriptError(
             f"dump '{writer}' already writes to {new.file}",
+            place=arguments[1].place,
             expected="a file name of its own for each dump",
         )
     hub.dumps.add(ID, new)

@@ -1,0 +1,135 @@
+"""dump, log, plot and their kin as a script says them: what they accept and how they refuse."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from karamelo_py.console import Console
+from karamelo_py.hub import Hub
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.interpreter import Interpreter
+
+
+@pytest.fixture
+def hub(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    hub = Hub(Console(io.StringIO(), io.StringIO()))
+    hub.values.publish_vector("Ek")
+    hub.values.publish_vector("Es")
+    Interpreter(hub).run_text('Etot = Ek_s + Es_s\nE = 1000\nname = "text"')
+    return hub
+
+
+def say(hub, text):
+    hub.interpreter.run_text(text, "in.test")
+
+
+def refused(hub, text):
+    with pytest.raises(ScriptError) as caught:
+        say(hub, text)
+    rendered = caught.value.render()
+    assert rendered.startswith("in.test:1:")
+    return rendered, caught.value.place.text[caught.value.place.column - 1 :]
+
+
+def test_dumps_are_made_as_said(hub):
+    say(
+        hub,
+        """
+        N = 10
+        dump(d1, all, particle, N, dump_p.*.LAMMPS, x, y, vx, s11)
+        dump(d2, all, particle/gz, 2*N, dump_p.*.LAMMPS.gz)
+        dump(d3, all, grid, N, dump_g.*.LAMMPS, x, y, mass, occupied=true)
+        dump(d4, all, grid/gz, N, "a name.gz")
+        dump(d5, all, pyplot, 1, dump.*.png, 500, 400)
+        dump(d6, all, pyplot, 1, dump.*.pdf, 5, 4, seq)
+        """,
+    )
+    assert [dump.every for dump in hub.dumps.values()] == [10, 20, 10, 10, 1, 1]
+    assert hub.dumps["d1"].columns == ("x", "y", "z", "vx", "s11")
+    assert hub.dumps["d3"].occupied
+    assert hub.dumps["d5"].size == (5.0, 4.0) == hub.dumps["d6"].size
+    assert hub.dumps["d6"].field == "seq"
+
+
+@pytest.mark.parametrize(
+    ("line", "word", "remedy"),
+    [
+        ("dump(d, all, partcle, 1, f)", "partcle", "particle"),
+        ("dump(d, some, particle, 1, f)", "some", "all"),
+        ("dump(d, all, particle, 0, f)", "0", "above 0"),
+        ("dump(d, all, particle, 1.5, f)", "1.5", "whole number"),
+        ("dump(d, all, particle, -1, f)", "-1", "above 0"),
+        ("dump(d, all, particle, 1, gone/f)", "gone/f", "mkdir gone"),
+        ("dump(d, all, particle, 1, f, x, vxx)", "vxx", "'vx'"),
+        ("dump(d, all, grid, 1, f, masss)", "masss", "'mass'"),
+        ("dump(d, all, pyplot, 1, f.jpg, 3, 3)", "f.jpg", ".png"),
+        ("dump(d, all, pyplot, 1, f.png, 0, 3)", "0", "above 0"),
+        ("dump(d, all, pyplot, 1, f.png, 3, 3, sqe)", "sqe", "'seq'"),
+        ("dump(d, all, particle, 1)", "", "file"),
+        ("delete_dump(d)", "d", "no dump"),
+        ("set_output(0)", "0", "above 0"),
+        ("log(0)", "0", "above 0"),
+        ("log_modify(custom, step, Ek_ss)", "Ek_ss", "'Ek_s'"),
+        ("log_modify(custom, step, Ek_s + foo)", "foo", "unknown name"),
+        ("log_modify(custom, step, x0)", "x0", "point"),
+        ("log_modify(custom, name)", "name", "text"),
+        ("log_modify(custom)", "", "at least one"),
+        ("log_modify(default, step)", "step", "takes no columns"),
+        ("log_modify(other)", "other", "custom"),
+        ("plot(p, 1, time)", "", "plot("),
+        ("plot(p, 1, tme, Ek_s)", "tme", "'time'"),
+        ("save_plot(plot.txt)", "plot.txt", ".pdf"),
+        ("save_plot(gone/plot.pdf)", "gone/plot.pdf", "mkdir gone"),
+    ],
+)
+def test_mistakes_are_marked(hub, line, word, remedy):
+    rendered, marked = refused(hub, line)
+    assert marked.startswith(word)
+    assert remedy in rendered
+
+
+def test_names_are_used_once(hub):
+    say(hub, "dump(d, all, particle, 1, f)\nplot(p, 1, time, Ek_s)")
+    assert "already used" in refused(hub, "dump(d, all, particle, 1, g)")[0]
+    assert "already used" in refused(hub, "plot(p, 1, time, Ek_s)")[0]
+    rendered, marked = refused(hub, "dump(e, all, particle/gz, 1, f)")
+    assert "dump 'd' already writes to f" in rendered
+    assert marked.startswith("f)")
+    # What a deleted dump has written is not overwritten either.
+    say(hub, "delete_dump(d)")
+    assert "already writes" in refused(hub, "dump(d, all, particle, 1, f)")[0]
+    say(hub, "dump(d, all, particle, 1, g.*)\ndelete_dump(d)\ndump(d, all, particle, 1, g.*)")
+
+
+def test_quantities(hub):
+    say(
+        hub,
+        """
+        log_modify(custom, step, dt, time, Ek_s, Ek, Etot, E, timestep, Ek_s + 2*Es_s)
+        plot(total, 5, time, Etot)
+        plot(share, 5, Ek_s/E, Es_s)
+        """,
+    )
+    hub.values.set("Ek_s", 2.0)
+    hub.values.set("Es_s", 3.0)
+    columns = hub.output.log.columns
+    headings = "Step dt Time Ek_s Ek Etot E timestep Ek_s+2*Es_s".split()
+    assert [column.heading for column in columns] == headings
+    assert columns[5].read() == 5.0
+    assert columns[6].read() == 1000.0
+    assert columns[8].read() == 8.0
+    (total, share) = hub.output.plots
+    assert (total.x.read(), total.y.read()) == (0.0, 5.0)
+    assert share.x.read() == pytest.approx(0.002)
+    say(hub, "log_modify(default)")
+    assert hub.output.log.columns == []
+
+
+def test_log_is_an_older_name_of_set_output(hub):
+    say(hub, "log(30)")
+    assert hub.output.log.every == 30
+    say(hub, "set_output(20)\na = log(10)")
+    assert hub.output.log.every == 20
