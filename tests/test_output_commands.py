@@ -116,7 +116,7 @@ def test_quantities(hub):
     hub.values.set("Ek_s", 2.0)
     hub.values.set("Es_s", 3.0)
     columns = hub.output.log.columns
-    headings = "Step dt Time Ek_s Ek Etot E timestep Ek_s+2*Es_s".split()
+    headings = ["Step", "dt", "Time", "Ek_s", "Ek", "Etot", "E", "timestep", "Ek_s+2*Es_s"]
     assert [column.heading for column in columns] == headings
     assert columns[5].read() == 5.0
     assert columns[6].read() == 1000.0
