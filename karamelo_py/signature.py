@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 NULL = "NULL"
 _NAME = re.compile(r"[^\W\d]\w*")
 _QUOTED = re.compile(r'"([^"]*)"')
+# Two words with nothing but blanks between them.
+_GAP = re.compile(r'[\w)"]\s+["\w.]')
 _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
@@ -554,32 +556,40 @@ def _bind(
     """Pair arguments with parameters by position, and by name where a name is given."""
     by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
+    variadic = next((p for p in slots if p.variadic), None)
     positional: list[tuple[Parameter, Argument]] = []
     keywords: list[tuple[Parameter, Argument]] = []
     given = []
+    variadic = next((p for p in slots if p.variadic), None)
     for argument in arguments:
         pair = argument.keyword()
-        if pair is None:
+        # Raw arguments are passed on to a style, which knows the names.
+        passed_on = variadic is not None and variadic.kind is _SIMPLE[Argument]
+        if pair is None or (passed_on and pair[0] not in by_name):
             given.append(argument)
             continue
         word, value = pair
         if word not in by_name:
+            if variadic is not None and variadic.kind is _SIMPLE[Argument]:
+                # For the style that the command passes its arguments on to.
+                given.append(argument)
+                continue
             raise _unknown_keyword(word, argument, expected, by_name)
         if word in bound:
             raise ScriptError(f"{word} is given twice", place=argument.place)
         bound[word] = [value]
         keywords.append((by_name[word], value))
     needed = sum(1 for p in slots if not p.optional and not p.variadic)
-    variadic = next((p for p in slots if p.variadic), None)
     missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
+        gap = next((argument for argument in given if _GAP.search(argument.text)), None)
         count = f"{len(given)} argument" + ("" if len(given) == 1 else "s")
-        takes = ", ".join(_syntax_parts(target)) or "no arguments"
         raise ScriptError(
-            f"expects {_joined(_syntax_parts(target)) or takes}; got {count}",
-            place=surplus.place if surplus else None,
+            f"expects {_arguments(target) or 'no arguments'}; got {count}",
+            place=gap.place if gap else surplus.place if surplus else None,
             expected=syntax(target, name),
+            hint=f"is a comma missing in '{gap.text}'?" if gap else None,
         )
     for k, argument in enumerate(given):
         parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic
@@ -596,7 +606,7 @@ def _unknown_keyword(
     if any(p.name == word for p in expected):
         hint: str | None = f"arguments are given by position: leave out '{word} ='"
     else:
-        hint = f"did you mean '{close}'?" if close else "compare with =="
+        hint = f"did you mean '{close}'?" if close else f"leave out '{word} ='; == compares"
     known = ", ".join(f"{name}=..." for name in by_name)
     return ScriptError(
         f"there is no argument to be given as '{word} = ...'",
@@ -702,10 +712,15 @@ def _joined(parts: Any) -> str:
     return text + "]" * open_brackets
 
 
+def _arguments(target: Callable) -> str:
+    """The arguments as they are written: the target's own `syntax`, or from its signature."""
+    own = getattr(target, "syntax", None)
+    return own if isinstance(own, str) else _joined(_syntax_parts(target))
+
+
 def syntax(target: Callable, name: str) -> str:
     """The line that shows how a command or style is called."""
-    own = getattr(target, "syntax", None)
-    own = own if isinstance(own, str) else _joined(_syntax_parts(target))
+    own = _arguments(target)
     family, _, style = name.partition(" ")
     if not style:
         return f"{name}({own})"

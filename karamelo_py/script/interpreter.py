@@ -98,7 +98,12 @@ class Interpreter:
                 expected="a script that is not in progress already",
                 argument="file",
             )
-        self._frames.append(_Frame(parse(read_script(path), str(path)), path))
+        try:
+            text = read_script(path)
+        except ScriptError as error:
+            error.argument = "file"
+            raise
+        self._frames.append(_Frame(parse(text, str(path)), path))
         self._go_on(self._frames[-1])
         self._frames.pop()
 
@@ -198,7 +203,7 @@ class Interpreter:
             return self.evaluate(node, raw)
         except ScriptError as error:
             word = raw.code.strip()
-            if error.message.startswith("unknown name") and "-" in word and " " not in word:
+            if error.message.startswith("unknown name") and re.fullmatch(r"\w+([-/.]\w+)+", word):
                 error.hint = f'a text stands in quotes: "{word}"'
             raise
 
@@ -271,12 +276,16 @@ class Interpreter:
         place = raw.source.place(begin, begin + len(name))
         if not registry.knows("command", name):
             raise self._unknown_call(name, place, statement=False)
+        target = registry.find("command", name)
+        # What gives no value must not be carried out here, least of all a run.
+        if getattr(target, "__annotations__", {}).get("return", "") in (None, "None"):
+            raise self._no_value(name, place)
         arguments = [
             signature.Argument(Raw(raw.source, raw.start + o.start, raw.start + o.end), self)
             for o in node.operands
         ]
         try:
-            value = signature.call(registry.find("command", name), self.hub, arguments, name)
+            value = signature.call(target, self.hub, arguments, name)
         except ScriptError as error:
             error.place = error.place or place
             raise
@@ -286,7 +295,10 @@ class Interpreter:
             return float(value)
         if isinstance(value, (str, Formula)):
             return value
-        raise ScriptError(
+        raise self._no_value(name, place)
+
+    def _no_value(self, name: str, place: Any) -> ScriptError:
+        return ScriptError(
             f"{name}(...) gives no value",
             place=place,
             expected="a function, or a command that gives a value, such as value(...)",
@@ -361,7 +373,7 @@ class Interpreter:
         if later:
             return later(place)
         known = [*self.variables, *self.hub.values.names(), *SEEDS, *CONSTANTS]
-        close = nearest(name, known) or nearest(name, [*FUNCTIONS, *registry.names("command")])
+        close = nearest(name, known)
         defined = ", ".join(self.variables) or "none so far"
         return ScriptError(
             f"unknown name '{name}'",
