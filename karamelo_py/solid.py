@@ -10,7 +10,7 @@ import numpy as np
 
 from karamelo_py.domain import Domain, boxes, require_domain
 from karamelo_py.material import Material
-from karamelo_py.points.materials import reference_density
+from karamelo_py.points.materials import specific_volume
 from karamelo_py.regions.base import Region, look_up
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.signature import Argument, AtLeast, Positive
@@ -51,6 +51,7 @@ class Solid:
         Volume and mass of each point (per unit thickness in 2D, per unit area in 1D).
     """
 
+    syntax = "regionID, ppc, material, h[, T0]"
     id: str = ""
     place: Place | None = None
 
@@ -81,7 +82,7 @@ class Solid:
         self.index = len(hub.solids)
         self.first_id = sum(len(other.x0) for other in hub.solids.values())
         self.point_volume = (self.h / ppc) ** domain.dimension
-        self.point_mass = float(reference_density(material.law)) * self.point_volume
+        self.point_mass = self.point_volume / float(specific_volume(material.law))
         self.x0, outside = fill(region, domain, ppc)
         if not len(self.x0) and not region.unknown:
             raise ScriptError(
