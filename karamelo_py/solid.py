@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from karamelo_py.domain import Domain, boxes, require_domain
+from karamelo_py.forms import finite
 from karamelo_py.material import Material
 from karamelo_py.points.materials import specific_volume
 from karamelo_py.regions.base import Region, look_up
@@ -65,6 +66,8 @@ class Solid:
         T0: float = 0.0,
     ):
         domain = require_domain(hub)
+        for name, value in (("h", h), ("T0", T0)):
+            finite(hub, value, name)
         if domain.h is None:
             domain.set_cell_size(h)
         elif abs(h - domain.h) > 1e-9 * domain.h:
