@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-import sys
+import copy
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from karamelo_py.console import Console
+from karamelo_py.fields import Fields
+from karamelo_py.output import Output
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
 from karamelo_py.script.values import Values
+from karamelo_py.update import Update
+
+if TYPE_CHECKING:
+    from karamelo_py.domain import Domain
+    from karamelo_py.simulation import Simulation
 
 
 class Catalogue(dict):
@@ -51,3 +59,95 @@ class Settings:
         self.threads: int | None = None
         self.precision = "double"
         self.debug = False
+
+
+class Hub:
+    """The scene, how it goes forward, and what it writes.
+
+    Attributes
+    ----------
+    domain
+        The domain, or None before ``dimension``.
+    regions, materials, solids, groups, fixes, computes, dumps
+        Catalogues of what the script has named.
+    values
+        Numbers that fixes and computes publish, and time, timestep, dt.
+    place
+        Place of the statement in progress.
+    rehearsing
+        True while the rest of a script is tried before the first step: nothing runs or is written.
+    checking
+        True under ``karamelo-py check``: the first run only reports.
+    """
+
+    def __init__(self, console: Console | None = None):
+        self.console = console or Console()
+        self.settings = Settings()
+        self.folder = Path.cwd()
+        self.place: Place | None = None
+        self.rehearsing = False
+        self.rehearsed = False
+        self.checking = False
+        self.interpreter: Any = None
+        self.domain: Domain | None = None
+        self.announced_dimension: int | None = None
+        self.regions = Catalogue("region", self)
+        self.materials = Catalogue("material", self)
+        self.solids = Catalogue("solid", self)
+        self.groups = Catalogue("group", self)
+        self.fixes = Catalogue("fix", self)
+        self.computes = Catalogue("compute", self)
+        self.dumps = Catalogue("dump", self)
+        self.values = Values()
+        self.update = Update(self.values)
+        self.output = Output(self)
+        self.fields = Fields(self)
+        self._simulation: Simulation | None = None
+
+    @property
+    def simulation(self) -> Simulation:
+        """The arrays of the scene as it is now, made when first asked for."""
+        from karamelo_py.simulation import Simulation, scene_key
+
+        if self._simulation is None or self._simulation.key != scene_key(self):
+            self._simulation = Simulation(self, self._simulation)
+        return self._simulation
+
+    def refresh_values(self) -> None:
+        """Let computes and fixes measure the present state."""
+        for item in (*self.computes.values(), *self.fixes.values()):
+            item.refresh()
+
+    def warn(
+        self,
+        message: str,
+        place: Place | None = None,
+        hint: str | None = None,
+        expected: str | None = None,
+    ) -> None:
+        """Tell the user of something that may not be meant; not during a rehearsal."""
+        if not self.rehearsing:
+            text = render_message("warning", message, place or self.place, expected, hint)
+            self.console.warn(text)
+
+    def rehearsal(self) -> Hub:
+        """A copy on which the rest of the script can be tried without consequences."""
+        other = copy.copy(self)
+        other.rehearsing = True
+        for name in (
+            "regions", "materials", "solids", "groups", "fixes", "computes", "dumps",
+        ):  # fmt: skip
+            catalogue = Catalogue(getattr(self, name).kind, other)
+            catalogue.update(getattr(self, name))
+            setattr(other, name, catalogue)
+        other.settings = copy.copy(self.settings)
+        other.values = copy.deepcopy(self.values)
+        other.update = copy.copy(self.update)
+        other.update.values = other.values
+        other.output = Output(other)
+        other.output.files = dict(self.output.files)
+        for curve in self.output.plots:
+            other.output.plots.add(curve.id, curve)
+        other.output.plots.file = self.output.plots.file
+        other.fields = Fields(other)
+        return other

@@ -101,6 +101,11 @@ class Fix:
         """Publish `value` as ID_`name` (x, y, z or s), or as the plain ID when `name` is empty."""
         self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
 
+    def publish_components(self, vector: np.ndarray) -> None:
+        """Publish up to three components as ID_x, ID_y, ID_z."""
+        for name, value in zip("xyz", vector, strict=False):
+            self.publish(name, value)
+
     def refresh(self) -> None:
         """Bring published values up to date; called before the log or a dump is written."""
 
@@ -119,6 +124,7 @@ class Compute:
         self.hub = hub
 
     publish = Fix.publish
+    publish_components = Fix.publish_components
 
     def refresh(self) -> None:
         """Measure and publish; override this."""
@@ -262,6 +268,10 @@ class PointsView:
     def mass(self) -> np.ndarray:
         """(n,) masses; read only."""
         return self._gather(lambda block: block.points.mass)
+
+    def set_stress(self, given: dict[str, np.ndarray]) -> None:
+        """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
+        self._simulation.set_stress(self.ids, given)
 
     @property
     def reference_position(self) -> np.ndarray:

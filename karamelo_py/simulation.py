@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from karamelo_py.kernels.export import impose_stress
 from karamelo_py.kernels.hooks import ON_VELOCITY
 from karamelo_py.kernels.step import (
     DONE,
@@ -23,6 +24,8 @@ from karamelo_py.kernels.step import (
 from karamelo_py.kernels.sweep import Serial, Threaded
 from karamelo_py.lowering import State, lower, thread_count
 from karamelo_py.modify import POINT_STAGES, STAGES, CompiledHook, NodesView, PointsView
+from karamelo_py.points.materials import with_stress
+from karamelo_py.state.hooks import lower_hooks
 from karamelo_py.state.arrays import (
     DRIFT,
     DRIFT_LIMIT,
@@ -44,6 +47,20 @@ if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
 CHUNK = 100  # steps between two looks at the run from Python, and between two snapshots
+
+
+def scene_key(hub: Hub) -> tuple:
+    """What the arrays of a simulation depend on: while it stays the same, so do they."""
+    update = hub.update
+    return (
+        id(hub.domain),
+        hub.domain.h if hub.domain else None,
+        tuple(id(solid) for solid in hub.solids.values()),
+        id(update.method),
+        update.transfer,
+        hub.settings.precision,
+        hub.settings.threads,
+    )
 
 
 class PythonHooks:
@@ -80,6 +97,7 @@ class Simulation:
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         self.hub = hub
+        self.key = scene_key(hub)
         state = previous.state() if previous else None
         self.setup, self.tiles = lower(hub, state)
         self.count = sum(len(s.x0) for s in hub.solids.values())
@@ -90,7 +108,9 @@ class Simulation:
         self.threads = thread_count(hub, self.count)
         self.mode = Threaded() if self.threads > 1 else Serial()
         self.steps_taken = 0
-        self._python: PythonHooks | None = None
+        self.version = 0  # grows when fields change without a step
+        self._begun: set[str] = set()
+        self.staged = False
 
     # --- fields by id -------------------------------------------------------------------------
 
@@ -139,6 +159,24 @@ class Simulation:
         moment = self.by_id(lambda block: block.points.moment) if keeps else None
         return State(self.count, self.x, self.v, laws, moment)
 
+    def set_stress(self, ids: np.ndarray, given: dict[str, np.ndarray]) -> None:
+        """Set components of the Cauchy stress (by name, "11" ...) of the points `ids`."""
+        s = self.setup
+        names = s.kin.symmetric_names
+        chosen = np.zeros(self.count, np.bool_)
+        chosen[ids] = True
+        stress = np.zeros((self.count, len(names)), s.nodes.sums.dtype)
+        for k, name in enumerate(names):
+            if name in given:
+                stress[ids, k] = given[name]
+        flags = np.array([name in given for name in names])
+        for block in s.blocks:
+            if with_stress.defined(type(block.laws)):
+                rows = stress[block.id]
+                part = chosen[block.id]
+                impose_stress(s.kin, s.basis.h, block.points, block.laws, part, flags, rows)
+        self.version += 1
+
     # --- stepping -----------------------------------------------------------------------------
 
     def begin(self, end_time: float) -> None:
@@ -149,6 +187,7 @@ class Simulation:
             numba.set_num_threads(self.threads)
         update = self.hub.update
         control = self.setup.control
+        self.setup = self.setup._replace(hooks=lower_hooks(self.hub))
         control.real[FIXED_DT] = update.fixed_dt or 0.0
         control.real[DT_FACTOR] = update.dt_factor
         control.real[END_TIME] = end_time
@@ -157,12 +196,7 @@ class Simulation:
         choose_dt(self.setup.control)
         control.whole[WATCH_LIMIT] = int(not self.above_limit())
         control.whole[OVER_LIMIT] = 0
-        fixes = list(self.hub.fixes.values())
-        self._python = PythonHooks(self, [f for f in fixes if not f.first_step_only])
-        self._first = PythonHooks(self, [f for f in fixes if f.first_step_only and not f.done])
-        self._staged = any(
-            name in POINT_STAGES for fix in fixes if not fix.first_step_only for name in fix.hooks()
-        )
+        self._prepare_hooks()
         if control.real[DRIFT] > control.real[DRIFT_LIMIT]:
             self.tiles.sort(self.setup, self.mode)
 
@@ -175,6 +209,11 @@ class Simulation:
     def above_limit(self) -> bool:
         """Whether the chosen step is above the stable limit already."""
         return self.setup.control.values[DT] > self.limit * (1 + 1e-12)
+
+    @property
+    def dt(self) -> float:
+        """The next step."""
+        return float(self.setup.control.values[DT])
 
     @property
     def time(self) -> float:
@@ -206,5 +245,51 @@ class Simulation:
             return SORT if status == DONE else status
         if self._python.by_stage:
             return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
-        visits = Staged() if self._staged else Fused()
+        visits = Staged() if self.staged else Fused()
         return advance(scheme, visits, self.mode, self.setup, self.setup.hooks, count)
+
+    def _prepare_hooks(self) -> None:
+        """Sort the fixes by how they act: once before the first step, from Python, compiled."""
+        fixes = list(self.hub.fixes.values())
+        lasting = [fix for fix in fixes if not fix.first_step_only]
+        new = [fix for fix in fixes if fix.first_step_only and fix.id not in self._begun]
+        self._python = PythonHooks(self, lasting)
+        self.staged = bool(self._python.by_stage) or any(
+            name in POINT_STAGES for fix in lasting for name in fix.hooks()
+        )
+        self._first = PythonHooks(self, [])
+        for fix in new:
+            if set(fix.hooks()) == {"initial_integrate"}:
+                # Nothing happens in a step before this hook: no step of its own is needed.
+                fix.initial_integrate(PointsView(self, fix.group, then=False))
+                self.version += 1
+            else:
+                both = PythonHooks(self, [*lasting, *new])
+                both.by_stage.pop(STAGES["initial_integrate"], None)
+                self._first = both
+        self._begun |= {fix.id for fix in new}
+
+    # --- state that can be returned to --------------------------------------------------------
+
+    def snapshot(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Every array that a step changes, with a copy."""
+        s = self.setup
+        arrays = [s.control.values, s.control.real, s.control.whole, s.spans]
+        for block in s.blocks:
+            points = [field for field in block.points if field is not None]
+            arrays += [block.x, *points, *block.tiling, block.id]
+        return [(array, array.copy()) for array in arrays]
+
+    def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:
+        """Return to a snapshot."""
+        for array, copy in snapshot:
+            array[...] = copy
+        self.version += 1
+
+    def wrong_points(self) -> Iterator[tuple[Any, int]]:
+        """Block and index of the points that the last sweep found wrong, one a tile at most."""
+        for block in self.setup.blocks:
+            tiling = block.tiling
+            for t in range(max(int(tiling.colour[-1]), 1)):
+                if tiling.report[t, 2] > 0:
+                    yield block, int(tiling.report[t, 2]) - 1

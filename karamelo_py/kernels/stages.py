@@ -7,10 +7,10 @@ point, and scatters to nodes again. *What* is gathered and scattered are tags, s
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compile import point_function, real, shared
+from karamelo_py.compile import index, point_function, real, shared
 from karamelo_py.points.basis import entry, inside, locate
 from karamelo_py.points.kinematics import (
     dimension,
@@ -25,8 +25,8 @@ from karamelo_py.points.materials import (
     initial_state,
     jacobian,
     kirchhoff_stress,
-    reference_density,
-    wave_speed,
+    specific_volume,
+    wave_speed_squared,
 )
 from karamelo_py.points.transfers import (
     add_moment,
@@ -156,39 +156,40 @@ def _(gather, transfer, kin, basis, stencil, k, nodes, total):
 
 
 @point_function()
-def settled(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
+def settled(gather, transfer, kin, basis, points, laws, x, to, p, dt, total, fastest):
     """Store what follows from `total`; return how far the point moved in cells, and its rate.
 
-    The rate, (c + max |v_i|) in lengths per time, bounds the stable step. A point that went wrong
-    (det F <= 0, NaN, outside the domain) returns a rate or a distance of NaN or infinity.
+    The rate, c + max |v_i|, bounds the stable step; what is returned is the larger of it and
+    `fastest`, the largest so far. A point that went wrong (det F <= 0, NaN, outside the domain)
+    returns a distance or a rate of NaN or infinity.
     """
 
 
 @settled.on(Nothing)
-def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
+def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total, fastest):
     if not inside(basis, kin, x):
-        return real(inf, dt), real(0, dt)
-    return real(0, dt), real(0, dt)
+        return real(inf, dt), fastest
+    return real(0, dt), fastest
 
 
 @settled.on(Velocity)
-def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
-    return _move(transfer, kin, basis, points, laws, x, to, p, dt, total), real(0, dt)
+def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total, fastest):
+    return _move(transfer, kin, basis, points, x, to, p, dt, total), fastest
 
 
 @settled.on(Gradient)
-def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
-    return real(0, dt), _strain(kin, points, laws, p, dt, total)
+def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total, fastest):
+    return real(0, dt), _strain(kin, points, laws, p, dt, total, fastest)
 
 
 @settled.on(VelocityAndGradient)
-def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total):
-    moved = _move(transfer, kin, basis, points, laws, x, to, p, dt, total)
-    return moved, _strain(kin, points, laws, p, dt, total[3])
+def _(gather, transfer, kin, basis, points, laws, x, to, p, dt, total, fastest):
+    moved = _move(transfer, kin, basis, points, x, to, p, dt, total)
+    return moved, _strain(kin, points, laws, p, dt, total[3], fastest)
 
 
 @shared
-def _move(transfer, kin, basis, points, laws, x, to, p, dt, total):
+def _move(transfer, kin, basis, points, x, to, p, dt, total):
     v = updated_velocity(transfer, vector_at(kin, points.v, p), total[0], total[1])
     put_at(points.v, p, 0, v)
     put_moment(points.moment, p, total[2])
@@ -201,14 +202,20 @@ def _move(transfer, kin, basis, points, laws, x, to, p, dt, total):
 
 
 @shared
-def _strain(kin, points, laws, p, dt, gradient):
-    law = record(laws, points.material[p])
+def _strain(kin, points, laws, p, dt, gradient, fastest):
+    law = record(laws, index(points.material[p]))
     like = initial_state(law, kin, dt)
     state = advance(law, kin, row(points.state, p, 0, like), scale(dt, gradient), dt)
     put_at(points.state, p, 0, state)
     if not jacobian(law, kin, state) > 0:
         return real(inf, dt)
-    return wave_speed(law, kin, state) + largest_component(kin, vector_at(kin, points.v, p))
+    # The square root is only taken of the few points that are faster than all before them.
+    squared = wave_speed_squared(law, kin, state)
+    speed = largest_component(kin, vector_at(kin, points.v, p))
+    slack = fastest - speed
+    if slack < 0 or squared > slack * slack:
+        return sqrt(squared) + speed
+    return fastest
 
 
 # --- scatter ----------------------------------------------------------------------------------
@@ -263,9 +270,9 @@ def _(scatter, transfer, kin, points, laws, p, like):
 @shared
 def _force(kin, points, laws, p, like):
     """Minus volume times stress: (m / rho) tau, with the sign of the internal force."""
-    law = record(laws, points.material[p])
+    law = record(laws, index(points.material[p]))
     state = row(points.state, p, 0, initial_state(law, kin, like))
-    volume = points.mass[p] / reference_density(law)
+    volume = points.mass[p] * specific_volume(law)
     return scale(-volume, kirchhoff_stress(law, kin, state))
 
 

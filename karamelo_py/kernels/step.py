@@ -7,7 +7,7 @@ that are written in Python are called between the parts.
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compile import kernel, over_blocks, point_function, real, shared
@@ -15,7 +15,7 @@ from karamelo_py.kernels.hooks import clear_point_totals, node_hooks, point_hook
 from karamelo_py.kernels.sweep import sweep_tiles
 from karamelo_py.points.basis import inside
 from karamelo_py.points.kinematics import largest_component, vector_at
-from karamelo_py.points.materials import initial_state, wave_speed
+from karamelo_py.points.materials import initial_state, wave_speed_squared
 from karamelo_py.state.arrays import (
     DRIFT,
     DRIFT_LIMIT,
@@ -272,7 +272,7 @@ def _fastest(kin, basis, points, laws, control):
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
         state = row(points.state, p, 0, initial_state(law, kin, basis.h))
-        speed = wave_speed(law, kin, state)
+        speed = sqrt(wave_speed_squared(law, kin, state))
         rate = max(rate, speed + largest_component(kin, vector_at(kin, points.v, p)))
     control.real[RATE] = max(control.real[RATE], rate)
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from numba import prange
 
-from karamelo_py.compile import kernel, point_function
+from karamelo_py.compile import index, kernel, point_function
 from karamelo_py.kernels.stages import (
     at_node,
     empty,
@@ -39,18 +39,21 @@ def sweep_tile(gather, scatter, kin, basis, transfer, nodes, points, laws, tilin
     furthest = dt - dt
     fastest = dt - dt
     wrong = 0
-    for p in range(tiling.range[t, 0], tiling.range[t, 1]):
+    for q in range(tiling.range[t, 0], tiling.range[t, 1]):
+        p = index(q)
         x = vector_at(kin, x_all, p)
         stencil = locate(basis, kin, x)
         total = empty(gather, transfer, kin, x)
         for k in range(support(basis, kin)):
             total = gathered(gather, transfer, kin, basis, stencil, k, nodes, total)
-        moved, rate = settled(gather, transfer, kin, basis, points, laws, x, y_all, p, dt, total)
+        moved, rate = settled(
+            gather, transfer, kin, basis, points, laws, x, y_all, p, dt, total, fastest
+        )
         if not (moved <= 1 and rate < 1e300):  # so written, NaN counts as wrong too
-            wrong = p + 1
+            wrong = q + 1
             continue
         furthest = max(furthest, moved)
-        fastest = max(fastest, rate)
+        fastest = rate
         stencil = restencil(scatter, kin, basis, stencil, vector_at(kin, y_all, p))
         burden = load(scatter, transfer, kin, points, laws, p, dt)
         for k in range(support(basis, kin)):
@@ -92,7 +95,7 @@ def _(mode, gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, 
 def visit_span(task, kin, nodes, spans, dt, s):
     """Do `task` at the nodes of the s-th span."""
     for n in range(spans[s, 0], spans[s, 1]):
-        at_node(task, kin, nodes, n, dt)
+        at_node(task, kin, nodes, index(n), dt)
 
 
 @kernel

@@ -51,6 +51,11 @@ class MUSL(NamedTuple):
     scheme(musl)
     """
 
+    stages = (
+        ("p2g and stress in one visit of the points", "update v*", "g2p, move, momentum to grid in one visit", "re-mapped velocity"),
+        ("p2g", "update v*", "g2p, move", "momentum to grid", "re-mapped velocity", "stress"),
+    )
+
 
 @begin.on(MUSL, Fused)
 def _(scheme, visits, mode, s):

@@ -49,6 +49,11 @@ class USF(NamedTuple):
     scheme(usf)
     """
 
+    stages = (
+        ("nodal velocity", "stress and force in one visit of the points", "update v*", "g2p, move, p2g in one visit"),
+        ("p2g mass and momentum", "nodal velocity", "stress and force", "update v*", "g2p, move"),
+    )
+
 
 @begin.on(USF, Fused)
 def _(scheme, visits, mode, s):

@@ -49,6 +49,11 @@ class USL(NamedTuple):
     scheme(usl)
     """
 
+    stages = (
+        ("p2g, g2p, move and stress in one visit of the points", "update v*"),
+        ("p2g", "update v*", "g2p, move", "stress"),
+    )
+
 
 @begin.on(USL, Fused)
 def _(scheme, visits, mode, s):

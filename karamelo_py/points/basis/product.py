@@ -6,7 +6,7 @@ first node and, for each direction, what `along` returned.
 
 from __future__ import annotations
 
-from karamelo_py.compile import point_function, real, shared
+from karamelo_py.compile import index, point_function, real, shared
 from karamelo_py.points.basis import affine_weight, entry, inside, locate, reach, support
 from karamelo_py.points.kinematics import Line, PlaneStrain, Space
 
@@ -88,7 +88,7 @@ def register(basis: type) -> None:
     @entry.on(basis, Line)
     def _(basis, kin, stencil, k):
         a = stencil[1][0]
-        return stencil[0] + k, a[2][k], (a[3][k],)
+        return index(stencil[0] + k), a[2][k], (a[3][k],)
 
     @entry.on(basis, PlaneStrain)
     def _(basis, kin, stencil, k):
@@ -97,7 +97,7 @@ def register(basis: type) -> None:
         j = k % width
         wa, wb = a[2][i], b[2][j]
         node = stencil[0] + i * basis.step_x + j
-        return node, wa * wb, (a[3][i] * wb, wa * b[3][j])
+        return index(node), wa * wb, (a[3][i] * wb, wa * b[3][j])
 
     @entry.on(basis, Space)
     def _(basis, kin, stencil, k):
@@ -108,7 +108,7 @@ def register(basis: type) -> None:
         wa, wb, wc = a[2][i], b[2][j], c[2][m]
         node = stencil[0] + i * basis.step_x + j * basis.step_y + m
         wab = wa * wb
-        return node, wab * wc, (a[3][i] * wb * wc, wa * b[3][j] * wc, wab * c[3][m])
+        return index(node), wab * wc, (a[3][i] * wb * wc, wa * b[3][j] * wc, wab * c[3][m])
 
     @reach.on(basis, Line)
     def _(basis, kin, stencil, k):

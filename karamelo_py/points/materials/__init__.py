@@ -34,8 +34,8 @@ def jacobian(law, kin, state):
 
 
 @point_function()
-def wave_speed(law, kin, state):
-    """Speed of the fastest small disturbance, for the stable step."""
+def wave_speed_squared(law, kin, state):
+    """Square of the speed of the fastest small disturbance, for the stable step."""
 
 
 @point_function()
@@ -54,5 +54,5 @@ def with_stress(law, kin, state, stress):
 
 
 @point_function()
-def reference_density(law):
-    """Mass per reference volume."""
+def specific_volume(law):
+    """Reference volume per mass."""

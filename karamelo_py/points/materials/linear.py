@@ -1,11 +1,10 @@
-"""Linear elasticity in rate form with an objective (Jaumann) stress rate."""
+"""Linear elasticity in rate form."""
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import NamedTuple
 
-from karamelo_py.compile import real
+from karamelo_py.compile import point_function, real
 from karamelo_py.points.kinematics import (
     add_pressure,
     contract,
@@ -23,57 +22,90 @@ from karamelo_py.points.materials import (
     initial_state,
     jacobian,
     kirchhoff_stress,
-    reference_density,
-    wave_speed,
+    specific_volume,
+    wave_speed_squared,
     with_stress,
 )
 from karamelo_py.tensors import add, scale
 
 
-class Hypoelastic(NamedTuple):
-    """Parameters of the law; the state of a point is (det F, Cauchy stress)."""
+class Jaumann(NamedTuple):
+    """Parameters of the law whose stress turns with the spin of the point.
 
-    rho: float  # reference density
+    The state of a point is (det F, Cauchy stress).
+    """
+
+    specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
     G: float  # shear modulus
-    c: float  # speed of pressure waves at the reference density
 
 
-@initial_state.on(Hypoelastic)
+class FixedFrame(NamedTuple):
+    """The same law without the turn: its stress stays behind when a point turns (Karamelo's)."""
+
+    specific_volume: float  # reference volume per mass
+    lam: float  # Lame's first parameter
+    G: float  # shear modulus
+
+
+@point_function()
+def turned(law, kin, dl, stress):
+    """The old stress in the frame after the increment dl."""
+
+
+@turned.on(Jaumann)
+def _(law, kin, dl, stress):
+    return spin(kin, dl, stress)
+
+
+@turned.on(FixedFrame)
+def _(law, kin, dl, stress):
+    return stress
+
+
+@initial_state.on(Jaumann)
+@initial_state.on(FixedFrame)
 def _(law, kin, like):
     return (real(1, like),) + zero_symmetric(kin, like)
 
 
-@advance.on(Hypoelastic)
+@advance.on(Jaumann)
+@advance.on(FixedFrame)
 def _(law, kin, state, dl, dt):
     strain = symmetric_part(kin, dl)
-    turned = spin(kin, dl, state[1:])
+    old = turned(law, kin, dl, state[1:])
     pressure = law.lam * trace(strain)
     increment = add_pressure(kin, real(2, law.G) * law.G, strain, pressure)
-    return (state[0] * volume_ratio(kin, dl),) + add(turned, increment)
+    return (state[0] * volume_ratio(kin, dl),) + add(old, increment)
 
 
-@kirchhoff_stress.on(Hypoelastic)
+@kirchhoff_stress.on(Jaumann)
+@kirchhoff_stress.on(FixedFrame)
 def _(law, kin, state):
     return scale(state[0], state[1:])
 
 
-@cauchy_stress.on(Hypoelastic)
+@cauchy_stress.on(Jaumann)
+@cauchy_stress.on(FixedFrame)
 def _(law, kin, state):
     return state[1:]
 
 
-@jacobian.on(Hypoelastic)
+@jacobian.on(Jaumann)
+@jacobian.on(FixedFrame)
 def _(law, kin, state):
     return state[0]
 
 
-@wave_speed.on(Hypoelastic)
+@wave_speed_squared.on(Jaumann)
+@wave_speed_squared.on(FixedFrame)
 def _(law, kin, state):
-    return law.c * sqrt(state[0])  # the density is rho / det F, the moduli are constant
+    # (lam + 2 G) / rho: the moduli are constant, the volume per mass has grown by det F
+    return (law.lam + real(2, law.G) * law.G) * law.specific_volume * state[0]
 
 
-@elastic_strain.on(Hypoelastic)
+@elastic_strain.on(Jaumann)
+@elastic_strain.on(FixedFrame)
 def _(law, kin, state):
     # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
     stress = state[1:]
@@ -82,17 +114,20 @@ def _(law, kin, state):
     return scale(half / law.G, add_pressure(kin, real(1, law.G), stress, -mean))
 
 
-@energy_density.on(Hypoelastic)
+@energy_density.on(Jaumann)
+@energy_density.on(FixedFrame)
 def _(law, kin, state):
     strain = elastic_strain(law, kin, state)
     return real(0.5, law.G) * state[0] * contract(kin, state[1:], strain)
 
 
-@with_stress.on(Hypoelastic)
+@with_stress.on(Jaumann)
+@with_stress.on(FixedFrame)
 def _(law, kin, state, stress):
     return (state[0],) + stress
 
 
-@reference_density.on(Hypoelastic)
+@specific_volume.on(Jaumann)
+@specific_volume.on(FixedFrame)
 def _(law):
-    return law.rho
+    return law.specific_volume

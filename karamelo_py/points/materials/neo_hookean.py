@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import log, sqrt
+from math import log
 from typing import NamedTuple
 
 from karamelo_py.compile import real
@@ -24,8 +24,8 @@ from karamelo_py.points.materials import (
     initial_state,
     jacobian,
     kirchhoff_stress,
-    reference_density,
-    wave_speed,
+    specific_volume,
+    wave_speed_squared,
 )
 from karamelo_py.tensors import scale
 
@@ -33,7 +33,7 @@ from karamelo_py.tensors import scale
 class Hyperelastic(NamedTuple):
     """Parameters of the law; the state of a point is the deformation gradient F."""
 
-    rho: float  # reference density
+    specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
     G: float  # shear modulus
 
@@ -66,14 +66,14 @@ def _(law, kin, state):
     return determinant(kin, state)
 
 
-@wave_speed.on(Hyperelastic)
+@wave_speed_squared.on(Hyperelastic)
 def _(law, kin, state):
     # Along a principal direction of stretch a, the tangent of P gives
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
     one = real(1, law.G)
     stretch = largest_row_sum(kin, left_cauchy_green(kin, state))
     bulk = law.lam * (one - log(determinant(kin, state)))
-    return sqrt((law.G * (one + stretch) + max(bulk, real(0, law.G))) / law.rho)
+    return (law.G * (one + stretch) + max(bulk, real(0, law.G))) * law.specific_volume
 
 
 @energy_density.on(Hyperelastic)
@@ -91,6 +91,6 @@ def _(law, kin, state):
     return add_pressure(kin, half, right_cauchy_green(kin, state), -half)
 
 
-@reference_density.on(Hyperelastic)
+@specific_volume.on(Hyperelastic)
 def _(law):
-    return law.rho
+    return law.specific_volume

@@ -1,0 +1,249 @@
+"""Commands about the physics: method, scheme, material, fix, compute."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from karamelo_py import registry, signature
+from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.signature import Argument
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+OPTIONS = ("mechanical", "thermo-mechanical", "gradient-enhanced")
+NOT_YET = {
+    "thermo-mechanical": "temperature is not there yet",
+    "gradient-enhanced": "the gradient-enhanced projection is not there yet",
+}
+
+
+def method(hub: Hub, kind: str, transfer: str, basis: str, *options: Argument) -> None:
+    """Choose the method, the transfer of velocity, and the basis functions.
+
+    Parameters
+    ----------
+    kind
+        Method style: ``ulmpm``.
+    transfer
+        ``PIC``, ``FLIP`` or ``APIC``.
+    basis
+        ``linear``.
+    options
+        For FLIP the share of FLIP, from 0 (PIC) to 1 (pure FLIP); then ``mechanical`` if you like.
+
+    Example
+    -------
+    method(ulmpm, FLIP, linear, 0.99)
+    method(ulmpm, APIC, linear)
+
+    Notes
+    -----
+    Comes before the first solid.
+
+    See Also
+    --------
+    scheme, solid
+    """
+    method_class = registry.find("method", kind)
+    transfer_class = registry.find("transfer", transfer)
+    basis_class = registry.find("basis", basis)
+    words = list(options)
+    parameters = []
+    for name in transfer_class._fields:
+        if not words or words[0].word() in OPTIONS:
+            raise ScriptError(
+                f"{transfer} needs a number {name} after the basis",
+                expected=f"method({kind}, {transfer}, {basis}, {name}) with {name} from 0 to 1",
+            )
+        parameters.append(_share(hub, name, words.pop(0)))
+    for argument in words:
+        word = argument.word() or argument.text
+        if word in NOT_YET:
+            raise ScriptError(NOT_YET[word], place=argument.place)
+        if word not in OPTIONS:
+            close = nearest(word, OPTIONS)
+            raise ScriptError(
+                f"'{argument.text}' is not an option of method({kind}, {transfer}, {basis})",
+                place=argument.place,
+                expected="nothing more, or the word mechanical",
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+    hub.update.method = method_class(hub, basis_class)
+    hub.update.transfer = transfer_class(*parameters)
+
+
+def _share(hub: Hub, name: str, argument: Argument) -> float:
+    """A number from 0 to 1."""
+    value = argument.value(hub)
+    if not isinstance(value, (int, float)) or value < 0 or value > 1:
+        raise ScriptError(
+            f"{name} is {value if isinstance(value, (int, float)) else argument.text}",
+            place=argument.place,
+            expected="a number from 0 (PIC) to 1 (pure FLIP)",
+        )
+    return float(value)
+
+
+def scheme(hub: Hub, style: str) -> None:
+    """Choose when in a step the stress is updated.
+
+    Parameters
+    ----------
+    style
+        ``musl`` (the default), ``usl`` or ``usf``.
+
+    Example
+    -------
+    scheme(usl)
+
+    See Also
+    --------
+    method
+    """
+    hub.update.scheme = registry.find("scheme", style)()
+
+
+def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
+    """Choose the precision of the numbers that points and nodes carry.
+
+    Parameters
+    ----------
+    kind
+        ``double`` (the default) or ``single``, which halves the memory.
+
+    Example
+    -------
+    precision(single)
+
+    Notes
+    -----
+    Comes before the first run.
+    """
+    if hub.update.step > 0:
+        raise ScriptError("the precision cannot change after the first run")
+    hub.settings.precision = kind
+
+
+def material(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+    """Define a material.
+
+    Parameters
+    ----------
+    ID
+        Name of the material.
+    style
+        ``linear``, ``neo-hookean``, or the style of a plug-in.
+    arguments
+        What the style asks for; see its page.
+
+    Example
+    -------
+    material(mat1, linear, 1000, 1000, 0.3)
+
+    See Also
+    --------
+    solid
+    """
+    target = registry.find("material", style)
+    if ID in hub.materials:
+        hub.materials.add(ID, None)
+    hub.materials.add(ID, signature.call(target, hub, list(arguments), f"material {style}"))
+
+
+def fix(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+    """Define something that acts on the run: a support, a load, an initial state.
+
+    Parameters
+    ----------
+    ID
+        Name of the fix. A name that is in use replaces the fix.
+    style
+        Style of the fix; ``karamelo-py styles`` lists them.
+    arguments
+        What the style asks for, beginning with the group it acts on; see its page.
+
+    Example
+    -------
+    fix(gravity, body_force, all, 0, -9.81)
+
+    See Also
+    --------
+    delete_fix, group, compute
+    """
+    target = registry.find("fix", style)
+    new = signature.call(target, hub, list(arguments), f"fix {style}")
+    hub.fixes.add(ID, new, replace=True)
+    hub.values.publish_vector(ID)
+    _warn_if_empty(hub, "fix", ID, new)
+
+
+def delete_fix(hub: Hub, ID: str) -> None:
+    """Remove a fix. Its published values stay as they are.
+
+    Parameters
+    ----------
+    ID
+        Name of the fix.
+
+    Example
+    -------
+    delete_fix(gravity)
+
+    See Also
+    --------
+    fix
+    """
+    hub.fixes.remove(ID)
+
+
+def compute(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+    """Define something to measure whenever the log is written.
+
+    Parameters
+    ----------
+    ID
+        Name of the compute.
+    style
+        Style of the compute; ``karamelo-py styles`` lists them.
+    arguments
+        What the style asks for, beginning with the group it measures; see its page.
+
+    Example
+    -------
+    compute(Ek, kinetic_energy, all)
+
+    See Also
+    --------
+    delete_compute, log_modify, fix
+    """
+    target = registry.find("compute", style)
+    new = signature.call(target, hub, list(arguments), f"compute {style}")
+    hub.computes.add(ID, new)
+    hub.values.publish_vector(ID)
+    _warn_if_empty(hub, "compute", ID, new)
+
+
+def delete_compute(hub: Hub, ID: str) -> None:
+    """Remove a compute. Its published values stay as they are.
+
+    Parameters
+    ----------
+    ID
+        Name of the compute.
+
+    Example
+    -------
+    delete_compute(Ek)
+
+    See Also
+    --------
+    compute
+    """
+    hub.computes.remove(ID)
+
+
+def _warn_if_empty(hub: Hub, kind: str, ID: str, item: object) -> None:
+    group = getattr(item, "group", None)
+    if group is not None and not group.all and len(group) == 0:
+        hub.warn(f"{kind} '{ID}' acts on the empty group '{group.id}': it will do nothing")

@@ -1,0 +1,128 @@
+"""Commands that let time go on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from karamelo_py.runner import Runner
+from karamelo_py.script.expressions import Expression
+from karamelo_py.signature import NonNegative, Positive
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
+    """Set a constant time step, instead of one that follows the fastest point.
+
+    Parameters
+    ----------
+    dt
+        Time step. Above the stable limit (cell size over wave speed plus velocity) a run warns.
+
+    Example
+    -------
+    set_dt(0.001)
+
+    See Also
+    --------
+    dt_factor
+    """
+    hub.update.fixed_dt = dt
+
+
+def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
+    """Set which share of the stable time step is taken.
+
+    Parameters
+    ----------
+    factor
+        Above 0; 0.9 without this command. Above 1 a run warns.
+
+    Example
+    -------
+    dt_factor(0.5)
+
+    See Also
+    --------
+    set_dt
+    """
+    hub.update.dt_factor = factor
+    if hub.update.fixed_dt is not None:
+        hub.warn("dt_factor has no effect: set_dt has fixed the step", hint="leave one of them out")
+
+
+def run(hub: Hub, steps: Annotated[int, NonNegative]) -> None:
+    """Take a number of steps.
+
+    Parameters
+    ----------
+    steps
+        How many; exactly so many are taken.
+
+    Example
+    -------
+    run(1000)
+
+    See Also
+    --------
+    run_time, run_until, run_while
+    """
+    Runner(hub, steps=steps).run()
+
+
+def run_time(hub: Hub, time: Annotated[float, NonNegative]) -> None:
+    """Run for a span of time; the last step is shortened to end there exactly.
+
+    Parameters
+    ----------
+    time
+        How long, from now.
+
+    Example
+    -------
+    run_time(3.5)
+
+    See Also
+    --------
+    run, run_until, run_while
+    """
+    Runner(hub, end_time=hub.update.time + time).run()
+
+
+def run_until(hub: Hub, condition: Expression) -> None:
+    """Run until a condition holds; it is looked at before every step.
+
+    Parameters
+    ----------
+    condition
+        Formula of time, timestep, dt and published values; anything but 0 ends the run.
+
+    Example
+    -------
+    run_until(Ek < 0.01 && time > 1)
+
+    See Also
+    --------
+    run, run_time, run_while
+    """
+    Runner(hub, condition=condition, until=True).run()
+
+
+def run_while(hub: Hub, condition: Expression) -> None:
+    """Run as long as a condition holds; it is looked at before every step.
+
+    Parameters
+    ----------
+    condition
+        Formula of time, timestep, dt and published values; 0 ends the run.
+
+    Example
+    -------
+    run_while(time < 2)
+
+    See Also
+    --------
+    run, run_time, run_until
+    """
+    Runner(hub, condition=condition, until=False).run()

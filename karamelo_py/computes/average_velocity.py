@@ -1,0 +1,36 @@
+"""compute average_velocity."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from karamelo_py.group import ParticleGroup
+from karamelo_py.modify import Compute
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+class AverageVelocity(Compute):
+    """Measure the plain mean of the velocities of points; published as ID_x, ID_y, ID_z.
+
+    Parameters
+    ----------
+    group
+        Group of points, or ``all``.
+
+    Example
+    -------
+    compute(v, average_velocity, all)
+    log_modify(custom, time, v_x)
+    """
+
+    def __init__(self, hub: Hub, group: ParticleGroup):
+        super().__init__(hub)
+        self.group = group
+
+    def refresh(self) -> None:
+        """Measure and publish."""
+        velocity = self.hub.fields.velocity[self.hub.fields.members(self.group)]
+        if len(velocity):
+            self.publish_components(velocity.mean(axis=0))

@@ -1,0 +1,125 @@
+"""What went wrong in a run: found, explained, and the last good state written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+import numpy as np
+
+from karamelo_py.kernels.step import ABOVE_LIMIT
+from karamelo_py.script.errors import Place, ScriptError
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+    from karamelo_py.simulation import Simulation
+
+LAST_GOOD = "last_good.*.LAMMPS"
+
+
+def warn_about_step(hub: Hub, simulation: Simulation) -> None:
+    """Say so before the first step when the step is above the stable limit."""
+    update, limit = hub.update, simulation.limit
+    if update.fixed_dt is not None and update.fixed_dt > limit * (1 + 1e-12):
+        hub.warn(
+            f"the step {update.fixed_dt:g} of set_dt is above the stable limit {limit:.4g}: "
+            "the run will most likely blow up, and be stopped then",
+            hint=f"set_dt({0.9 * limit:.3g}) or less, or leave set_dt out",
+        )
+    elif update.fixed_dt is None and update.dt_factor > 1:
+        hub.warn(
+            f"dt_factor {update.dt_factor:g} puts the step above the stable limit {limit:.4g}: "
+            "the run will most likely blow up, and be stopped then",
+            hint="dt_factor(0.9) or less",
+        )
+
+
+def stop(
+    hub: Hub, simulation: Simulation, status: int, snapshot: list, place: Place | None
+) -> NoReturn:
+    """Return to the last good state, write it, and raise what the user should know."""
+    step, time = simulation.step, simulation.time
+    if status == ABOVE_LIMIT:
+        message, hint = _above_limit(hub, simulation)
+        _write_last_good(hub)
+    else:
+        message, hint = _wrong_point(hub, simulation)
+        simulation.restore(snapshot)
+        if step > simulation.step:
+            simulation.advance(step - simulation.step)
+        message = f"step {step + 1}, time {time:.6g}: {message}"
+        _write_last_good(hub)
+    name = LAST_GOOD.replace("*", str(simulation.step))
+    raise ScriptError(
+        message, place=place, hint=f"{hint}. The last good state is in {name}"
+    )
+
+
+def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+    limit = simulation.limit
+    message = (
+        f"step {simulation.step}, time {simulation.time:.6g}: the step {simulation.dt:g} is above "
+        f"the stable limit, which has fallen to {limit:.4g}"
+    )
+    speeds = np.abs(simulation.v).max(axis=1)
+    fastest = int(np.argmax(speeds))
+    message += f" ({_named(hub, simulation, fastest)} moves at {speeds[fastest]:.4g})"
+    return message, f"set_dt({0.5 * limit:.3g}) or less, or leave set_dt out"
+
+
+def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+    """What is wrong with the first point that went wrong, and what can be done."""
+    wrong = [(int(block.id[p]), block, p) for block, p in simulation.wrong_points()]
+    if not wrong:
+        return "a point went wrong", "use a smaller step"
+    number, block, p = min(wrong, key=lambda item: item[0])
+    now = simulation.now
+    old, new = block.x[now][p].astype(float), block.x[1 - now][p].astype(float)
+    name = _named(hub, simulation, number)
+    above = hub.update.fixed_dt is not None or hub.update.dt_factor > 1
+    smaller = "use a smaller step (set_dt or dt_factor)" if above else "use a smaller dt_factor"
+    d = hub.domain.dimension
+    if not np.isfinite(old).all():
+        return f"{name} has no position (NaN)", f"look for a formula that gives NaN; {smaller}"
+    if not np.isfinite(new).all() or not np.isfinite(block.points.v[p]).all():
+        return (
+            f"{name} at {_place(old)} gets a velocity that is not a number",
+            f"look for a formula that gives NaN, such as a division by zero; else {smaller}",
+        )
+    lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
+    if (new < lo).any() or (new > hi).any():
+        side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
+        return (
+            f"{name} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
+            f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
+            "make the domain larger, hold the point back with fix velocity_nodes at the wall, "
+            f"or, if it should not have got there, {smaller}",
+        )
+    move = float(np.abs(new - old).max()) / hub.domain.h
+    if move > 1:
+        return (
+            f"{name} at {_place(old)} moves by {move:.3g} cells in one step",
+            f"the run is unstable: {smaller}",
+        )
+    return (
+        f"{name} at {_place(old)} is turned inside out (det F <= 0)",
+        f"{smaller}, or a finer grid, or a law that resists the compression (neo-hookean)",
+    )
+
+
+def _named(hub: Hub, simulation: Simulation, number: int) -> str:
+    solid = list(hub.solids.values())[int(simulation.solid_of[number])]
+    return f"point {number + 1} of solid '{solid.id}'"
+
+
+def _place(x: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
+
+
+def _write_last_good(hub: Hub) -> None:
+    """Write the present state: to the dumps of the script, and to a file of its own."""
+    from karamelo_py.dumps.particle import Particle
+
+    hub.output.write(last=True)
+    columns = ["x", "y", "z", "vx", "vy", "vz", "s11", "s22", "s33", "s12", "s13", "s23", "volume"]
+    Particle(hub, 1, Path(LAST_GOOD), *columns).write()

@@ -1,0 +1,210 @@
+"""Fields of points and nodes for output, in the order of their ids, whatever the order in memory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from karamelo_py.kernels.export import ENERGY, EXPORTED, JACOBIAN, STRAIN, export_energy, export_state
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+AXES = "xyz"
+COMPONENTS = ("11", "22", "33", "12", "13", "23")
+PARTICLE_NAMES = (
+    ["id", "type"]
+    + list(AXES)
+    + [axis + "0" for axis in AXES]
+    + ["v" + axis for axis in AXES]
+    + ["s" + c for c in COMPONENTS]
+    + ["e" + c for c in COMPONENTS]
+    + ["seq", "volume", "mass", "damage", "damage_init", "bx", "by", "bz", "ep", "epdot"]
+    + ["T", "ienergy", "gamma"]
+)
+NODE_NAMES = (
+    ["id", "type"]
+    + list(AXES)
+    + ["v" + axis for axis in AXES]
+    + ["v" + axis + "_update" for axis in AXES]
+    + ["f" + axis for axis in AXES]
+    + ["mass"]
+)
+
+
+class Fields:
+    """Named fields of the running scene; arrays are copies that are safe to keep."""
+
+    def __init__(self, hub: Hub):
+        self.hub = hub
+        self._key: Any = None
+        self._cache: dict[str, Any] = {}
+
+    @property
+    def _simulation(self):
+        """The simulation; the cache of derived fields is forgotten when it has gone on."""
+        simulation = self.hub.simulation
+        key = (id(simulation), simulation.step, simulation.version)
+        if key != self._key:
+            self._key = key
+            self._cache.clear()
+        return simulation
+
+    def _cached(self, name: str, make) -> Any:
+        simulation = self._simulation
+        if name not in self._cache:
+            self._cache[name] = make(simulation)
+        return self._cache[name]
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return self._simulation.count
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes."""
+        return self.hub.domain.node_count
+
+    @property
+    def position(self) -> np.ndarray:
+        """(N, d) positions."""
+        return self._cached("x", lambda s: s.x)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(N, d) velocities."""
+        return self._cached("v", lambda s: s.v)
+
+    @property
+    def mass(self) -> np.ndarray:
+        """(N,) masses."""
+        return self._cached("mass", lambda s: s.mass)
+
+    @property
+    def reference_position(self) -> np.ndarray:
+        """(N, d) positions before the first step."""
+        return self._simulation.x0
+
+    @property
+    def reference_volume(self) -> np.ndarray:
+        """(N,) volumes before the first step."""
+        return np.concatenate([s.volume0 for s in self.hub.solids.values()])
+
+    @property
+    def velocity_moment(self) -> np.ndarray | None:
+        """(N, d d) moment of velocity of affine transfers, or None."""
+        simulation = self._simulation
+        if simulation.setup.blocks[0].points.moment is None:
+            return None
+        return simulation.by_id(lambda block: block.points.moment)
+
+    def members(self, group: Any) -> np.ndarray:
+        """Ids (0-based) of a particle group."""
+        return self._simulation.members(group)
+
+    def kinetic_energy(self, group: Any) -> float:
+        """sum m v^2 / 2 of a particle group."""
+        v, mass = self.velocity.astype(float), self.mass.astype(float)
+        energy = 0.5 * mass * np.einsum("ij,ij->i", v, v)
+        return float(energy.sum() if group.all else energy[group.ids].sum())
+
+    def strain_energy(self, group: Any) -> float:
+        """Stored energy of a particle group."""
+        energy = self._cached("energy", _stored_energy)
+        return float(energy.sum() if group.all else energy[group.ids].sum())
+
+    def particle_names(self) -> list[str]:
+        """Names that `particle` knows."""
+        return list(PARTICLE_NAMES)
+
+    def node_names(self) -> list[str]:
+        """Names that `node` knows."""
+        return list(NODE_NAMES)
+
+    def particle(self, name: str) -> np.ndarray:
+        """A field of all points, (N,). What the scene does not have is zero, as in Karamelo."""
+        simulation = self._simulation
+        if name == "id":
+            return np.arange(1, simulation.count + 1)
+        if name == "type":
+            return simulation.solid_of + 1
+        if name in AXES:
+            return _column(self.position, AXES.index(name))
+        if name[:1] in AXES and name[1:] == "0":
+            return _column(self.reference_position, AXES.index(name[0]))
+        if name in ("vx", "vy", "vz"):
+            return _column(self.velocity, AXES.index(name[1]))
+        if name == "mass":
+            return self.mass.astype(float)
+        if name == "volume":
+            return self.reference_volume * self._exported[:, JACOBIAN]
+        if name == "ienergy":
+            return self._exported[:, ENERGY].copy()
+        if name == "seq":
+            return _von_mises(self._exported[:, :STRAIN])
+        if name[:1] in "se" and name[1:] in COMPONENTS:
+            first = 0 if name[0] == "s" else STRAIN
+            return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
+        return np.zeros(simulation.count)
+
+    def node(self, name: str) -> np.ndarray:
+        """A field of all nodes, (n,); nodes without mass are at rest."""
+        nodes = self._simulation.setup.nodes
+        d = self.hub.domain.dimension
+        mass = nodes.sums[:, 0].astype(float)
+        if name == "id":
+            return np.arange(self.node_count)
+        if name == "type":
+            return np.ones(self.node_count, np.int64)
+        if name in AXES:
+            return self.hub.domain.node_positions()[:, AXES.index(name)]
+        if name == "mass":
+            return mass
+        axis = AXES.index(name[1])
+        if axis >= d:
+            return np.zeros(self.node_count)
+        field = {
+            "v": nodes.velocity[:, axis],
+            "u": nodes.update[:, axis],
+            "f": nodes.sums[:, 1 + d + axis],
+        }["u" if name.endswith("_update") else name[0]]
+        return np.where(mass > 0, field, 0.0)
+
+    @property
+    def _exported(self) -> np.ndarray:
+        return self._cached("exported", _exported_state)
+
+
+def _exported_state(simulation: Any) -> np.ndarray:
+    s = simulation.setup
+    out = np.zeros((simulation.count, EXPORTED))
+    # A kinematics fills its own components: in the plane the fourth is 12, as in space.
+    for block in s.blocks:
+        rows = np.zeros((len(block.id), EXPORTED))
+        export_state(s.kin, s.basis.h, block.points, block.laws, rows)
+        out[block.id] = rows
+    return out
+
+
+def _stored_energy(simulation: Any) -> np.ndarray:
+    s = simulation.setup
+    out = np.zeros(simulation.count)
+    for block in s.blocks:
+        rows = np.zeros(len(block.id))
+        export_energy(s.kin, s.basis.h, block.points, block.laws, rows)
+        out[block.id] = rows
+    return out
+
+
+def _column(field: np.ndarray, k: int) -> np.ndarray:
+    if k >= field.shape[1]:
+        return np.zeros(len(field))
+    return field[:, k].astype(float)
+
+
+def _von_mises(s: np.ndarray) -> np.ndarray:
+    xx, yy, zz, xy, xz, yz = s.T
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return np.sqrt(0.5 * normal + 3 * (xy**2 + xz**2 + yz**2))

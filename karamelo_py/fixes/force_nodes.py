@@ -1,0 +1,50 @@
+"""fix force_nodes: a total force shared by nodes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from karamelo_py.fixes.formulas import per_direction
+from karamelo_py.group import NodeGroup
+from karamelo_py.modify import Fix, node_hook
+from karamelo_py.script.expressions import Expression
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+def push(mass, v, v_star, force, value, before, dt, share):
+    """Each member takes its share of the value."""
+    return v, v_star, force + value * share, value * share
+
+
+class ForceNodes(Fix):
+    """Apply a total force, split equally among the nodes of the group that carry mass.
+
+    Parameters
+    ----------
+    group
+        Group of nodes.
+    force
+        fx, fy, fz: numbers or formulas of time and published values. NULL leaves a component
+        alone; in fewer dimensions the last ones may be left out, NULL or 0.
+
+    Example
+    -------
+    fix(pull, force_nodes, tip, 0, -100*min(time, 1), NULL)
+
+    Notes
+    -----
+    Publishes the applied force as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    body_force
+    """
+
+    post_particles_to_grid = node_hook(push, shares=True)
+
+    def __init__(self, hub: Hub, group: NodeGroup, *force: Expression | None):
+        super().__init__(hub)
+        self.group = group
+        self.formulas = per_direction(hub, "f", force)

@@ -1,0 +1,59 @@
+"""What follows from the state of the points, for output: stress, strain, volume, stored energy."""
+
+from __future__ import annotations
+
+from karamelo_py.compile import kernel
+from karamelo_py.points.materials import (
+    cauchy_stress,
+    elastic_strain,
+    energy_density,
+    initial_state,
+    jacobian,
+    specific_volume,
+    with_stress,
+)
+from karamelo_py.tensors import put_at, record, row
+
+STRAIN, JACOBIAN, ENERGY = 6, 12, 13
+EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point
+
+
+@kernel
+def export_state(kin, like, points, laws, out):
+    """Fill ``out`` (n, EXPORTED) in the order of the points."""
+    for p in range(points.mass.size):
+        law = record(laws, points.material[p])
+        state = row(points.state, p, 0, initial_state(law, kin, like))
+        put_at(out, p, 0, cauchy_stress(law, kin, state))
+        put_at(out, p, STRAIN, elastic_strain(law, kin, state))
+        out[p, JACOBIAN] = jacobian(law, kin, state)
+        volume = points.mass[p] * specific_volume(law)
+        out[p, ENERGY] = volume * energy_density(law, kin, state)
+
+
+@kernel
+def export_energy(kin, like, points, laws, out):
+    """Stored energy ``out`` (n,) of each point."""
+    for p in range(points.mass.size):
+        law = record(laws, points.material[p])
+        state = row(points.state, p, 0, initial_state(law, kin, like))
+        volume = points.mass[p] * specific_volume(law)
+        out[p] = volume * energy_density(law, kin, state)
+
+
+@kernel
+def impose_stress(kin, like, points, laws, chosen, given, stress):
+    """Set the Cauchy stress of the chosen points, where ``given`` (6,) says so.
+
+    ``stress`` (n, 6) is in the order of the points and of the components of `kin`.
+    """
+    for p in range(points.mass.size):
+        if not chosen[p]:
+            continue
+        law = record(laws, points.material[p])
+        state = row(points.state, p, 0, initial_state(law, kin, like))
+        old = cauchy_stress(law, kin, state)
+        for k in range(len(old)):
+            if not given[k]:
+                stress[p, k] = old[k]
+        put_at(points.state, p, 0, with_stress(law, kin, state, row(stress, p, 0, old)))

@@ -1,0 +1,54 @@
+"""Materials: a constitutive law with its parameters, named in the script."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from karamelo_py.regions.base import look_up
+from karamelo_py.script.errors import ScriptError
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+    from karamelo_py.signature import Argument
+
+
+class Material:
+    """Base of the material styles.
+
+    Attributes
+    ----------
+    law
+        The law's NamedTuple of numbers; its class selects the point functions
+        (:mod:`karamelo_py.points.materials`).
+    """
+
+    id: str = ""
+    place: Any = None
+    law: NamedTuple
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Material:
+        """The material that `argument` names."""
+        return look_up(hub.materials, argument)
+
+
+class LameParameters(NamedTuple):
+    """Isotropic elasticity, in consistent units of stress."""
+
+    lam: float  # Lame's first parameter
+    G: float  # shear modulus
+
+
+def check_poisson_ratio(nu: float) -> None:
+    """Refuse a Poisson's ratio for which the elastic energy is not positive or not finite."""
+    if not -1 < nu < 0.5:
+        raise ScriptError(
+            f"Poisson's ratio {nu:g} is impossible",
+            argument="nu",
+            expected="a number above -1 and below 0.5",
+        )
+
+
+def lame_parameters(E: float, nu: float) -> LameParameters:
+    """Lame's parameters from Young's modulus and Poisson's ratio."""
+    return LameParameters(lam=E * nu / ((1 + nu) * (1 - 2 * nu)), G=E / (2 * (1 + nu)))

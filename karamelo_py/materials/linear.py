@@ -1,0 +1,58 @@
+"""material linear: isotropic linear elasticity for large rotations."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from karamelo_py.material import Material, check_poisson_ratio, lame_parameters
+from karamelo_py.points.materials.linear import FixedFrame, Jaumann
+from karamelo_py.signature import Positive
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+class LinearElastic(Material):
+    """Hooke's law in rate form: the stress rate follows the strain rate, and turns with the point.
+
+    Parameters
+    ----------
+    rho
+        Density.
+    E
+        Young's modulus.
+    nu
+        Poisson's ratio, above -1 and below 0.5.
+    rate
+        ``jaumann``: the stress turns with the point, as it must. ``none``: it does not, as in
+        Karamelo; only to repeat results of programs that leave the turn out.
+
+    Example
+    -------
+    material(rubber, linear, 1000, 1e6, 0.3)
+
+    Notes
+    -----
+    sigma' = R sigma R^T + 2 G d + lambda tr(d) I, with d the strain increment and R the rotation
+    increment of the step (Jaumann rate; Hughes & Winget 1980). For strains of more than some ten
+    per cent a hyperelastic law such as neo-hookean is the better model. One dimension means
+    uniaxial strain, as plane strain and space have it.
+
+    See Also
+    --------
+    material, neo-hookean
+    """
+
+    def __init__(
+        self,
+        hub: Hub,
+        rho: Annotated[float, Positive],
+        E: Annotated[float, Positive],
+        nu: float,
+        *,
+        rate: Literal["jaumann", "none"] = "jaumann",
+    ):
+        check_poisson_ratio(nu)
+        lam, G = lame_parameters(E, nu)
+        law = Jaumann if rate == "jaumann" else FixedFrame
+        self.law = law(1 / rho, lam, G)

@@ -1,0 +1,83 @@
+"""karamelo-py check: what a scene needs, before it runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from karamelo_py.kernels.step import Fused, Staged
+from karamelo_py.state.arrays import NoHooks
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+    from karamelo_py.simulation import Simulation
+
+
+def report(hub: Hub, simulation: Simulation) -> None:
+    """Print fields with bytes, kernels, stages, tiles, memory and the first dt."""
+    say = hub.console.say
+    s = simulation.setup
+    say(f"dimension      {s.kin.dimension}, kinematics {type(s.kin).__name__}")
+    say(f"precision      {hub.settings.precision}")
+    say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")
+    say(f"nodes          {hub.domain.node_count} ({' x '.join(map(str, hub.domain.shape))})")
+    tiles = simulation.tiles
+    used = int(np.count_nonzero(tiles.used == 1))
+    near = int(np.count_nonzero(tiles.used))
+    nodes = int(np.sum(s.spans[1 : 1 + s.spans[0, 0], 1] - s.spans[1 : 1 + s.spans[0, 0], 0]))
+    say(f"tiles          {used} of {tiles.count} hold points, {near} in use ({nodes} nodes)")
+    say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
+    say(f"threads        {simulation.threads}")
+    say("")
+    say("fields of a point                 shape       bytes")
+    total = 0
+    for block in s.blocks:
+        law = type(block.laws).__name__
+        for name, shape, size in point_fields(block):
+            say(f"  {name + ' (' + law + ')':<30}  {shape:<10} {size:>6}")
+            total += size * len(block.id)
+    say(f"  {'together, per point':<30}  {'':<10} {total / max(simulation.count, 1):>6.0f}")
+    say("fields of a node")
+    per_node = 0
+    for name, array in zip(s.nodes._fields, s.nodes, strict=True):
+        size = array.itemsize * array.shape[1]
+        per_node += size
+        say(f"  {name:<30}  {array.shape[1]!s:<10} {size:>6}")
+    say(f"memory         {(total + per_node * nodes) / 2**20:.3g} MiB touched")
+    say("")
+    visits = "stage by stage" if simulation.staged else "fused"
+    kernels = [type(x).__name__ for x in (s.kin, s.basis, s.transfer, hub.update.scheme)]
+    laws = [type(block.laws).__name__ for block in s.blocks]
+    say(f"kernels        {', '.join(kernels + laws)}; {visits}")
+    say("stages of a step")
+    for stage in stages(hub, simulation):
+        say(f"  {stage}")
+
+
+def point_fields(block: Any) -> list[tuple[str, str, int]]:
+    """Name, shape and bytes of each field that a point of this block carries."""
+    fields = [("x", block.x[0]), ("x moved", block.x[1])]
+    fields += [(name, array) for name, array in block.points._asdict().items() if array is not None]
+    fields.append(("id", block.id))
+    out = []
+    for name, array in fields:
+        shape = str(array.shape[1]) if array.ndim > 1 else "1"
+        out.append((name, shape, array.itemsize * (array.shape[1] if array.ndim > 1 else 1)))
+    return out
+
+
+def stages(hub: Hub, simulation: Simulation) -> list[str]:
+    """The stages of a step with the fixes that act in them."""
+    visits = Staged if simulation.staged else Fused
+    acting: dict[str, list[str]] = {}
+    for fix in hub.fixes.values():
+        for name in fix.hooks():
+            once = " (first step only)" if fix.first_step_only else ""
+            acting.setdefault(name, []).append(fix.id + once)
+    lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
+    first = type(hub.update.scheme).stages[0 if visits is Fused else 1]
+    hooks = simulation.setup.hooks
+    if isinstance(hooks, NoHooks) and not lines:
+        lines = ["no fix acts between them"]
+    return [*first, *lines]

@@ -1,0 +1,57 @@
+"""How the scene goes forward: method, scheme, transfer, step size, clock (Karamelo's Update)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from karamelo_py.schemes.musl import MUSL
+
+if TYPE_CHECKING:
+    from karamelo_py.script.values import Values
+
+DEFAULT_DT_FACTOR = 0.9
+
+
+class Update:
+    """What method, scheme, set_dt and dt_factor chose, and the clock.
+
+    Attributes
+    ----------
+    method
+        The method style, or None as long as there is none.
+    transfer
+        The transfer's NamedTuple (PIC, FLIP, APIC).
+    scheme
+        The scheme's tag.
+    fixed_dt
+        The constant step of set_dt, or None: the step follows the fastest point.
+    dt_factor
+        Share of the stable step that is taken.
+    """
+
+    def __init__(self, values: Values):
+        self.values = values
+        self.method: Any = None
+        self.transfer: NamedTuple | None = None
+        self.scheme: NamedTuple = MUSL()
+        self.fixed_dt: float | None = None
+        self.dt_factor = DEFAULT_DT_FACTOR
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken."""
+        return int(self.values.get("timestep"))
+
+    @property
+    def time(self) -> float:
+        """Present time."""
+        return self.values.get("time")
+
+    @property
+    def dt(self) -> float:
+        """The next step."""
+        return self.values.get("dt")
+
+    def transfer_tag(self, real: type) -> NamedTuple:
+        """The transfer with its numbers in the precision of the run."""
+        return type(self.transfer)(*(real(value) for value in self.transfer))
