@@ -51,6 +51,9 @@ def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argum
     hub.output.files[new.file] = ID
 
 
+dump.syntax = "ID, all, style, every, file[, ...]"  # the rest is the style's own
+
+
 def delete_dump(hub: Hub, ID: str) -> None:
     """Stop a dump. What it has written stays.
 
