@@ -117,7 +117,7 @@ class Argument:
         variable = self._interpreter.variables.get(self.text)
         if isinstance(variable, str):
             return variable
-        if " " in self.text:
+        if re.search(r"\s", self.text):
             first, second = self.text.split()[:2]
             raise ScriptError(
                 f"'{self.text}' is more than one word",

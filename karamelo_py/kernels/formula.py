@@ -224,7 +224,7 @@ def _binary(op, n, a, b):
     elif op == _MOD:
         # The sign of the divisor, as in Python.
         for i in range(n):
-            a[i] = a[i] - b[i] * np.floor(a[i] / b[i])
+            a[i] = a[i] % b[i]
     elif op == _ATAN2:
         for i in range(n):
             a[i] = math.atan2(a[i], b[i])
@@ -335,7 +335,7 @@ _NUMPY = {
     "*": np.multiply,
     "/": np.divide,
     "^": np.power,
-    "%": lambda a, b: a - b * np.floor(a / b),
+    "%": np.mod,
     "<": np.less,
     "<=": np.less_equal,
     ">": np.greater,

@@ -31,7 +31,7 @@ def _power(a: float, b: float) -> float:
 
 
 def _modulo(a: float, b: float) -> float:
-    return a - b * math.floor(a / b)
+    return a % b
 
 
 def _select(condition: float, a: float, b: float) -> float:

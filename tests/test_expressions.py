@@ -1,0 +1,162 @@
+"""Numbers, texts and formulas: what is folded, what stays, how formulas read."""
+
+import math
+
+import pytest
+
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression, Formula
+from karamelo_py.script.interpreter import Interpreter
+from karamelo_py.script.values import CAPACITY, Values
+
+
+class Hub:
+    def __init__(self):
+        self.values = Values()
+        self.place = None
+        self.rehearsing = False
+        self.warnings = []
+
+    def warn(self, message, place=None, hint=None):
+        self.warnings.append(message)
+
+
+@pytest.fixture
+def hub():
+    return Hub()
+
+
+def run(hub, text, **presets):
+    interpreter = Interpreter(hub, presets)
+    interpreter.run_text(text)
+    return interpreter.variables
+
+
+def test_constants_are_numbers_and_seeds_make_formulas(hub):
+    v = run(hub, "a = 2*3\nb = a*time\nc = b + a\nd = x0")
+    assert v["a"] == 6.0
+    assert isinstance(v["b"], Formula)
+    assert v["b"].text == "6*time"
+    assert v["c"].text == "6*time + 6"
+    assert v["c"].names == {"time"}
+    assert v["d"].names == {"x0"}
+
+
+def test_formulas_keep_the_values_of_their_making(hub):
+    v = run(hub, "a = 2\nf = a*time\na = 5\nf = f + a\nt = time")
+    assert v["f"].text == "2*time + 5"
+    assert v["t"].text == "time"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("(time + 1)*2", "(time + 1)*2"),
+        ("time + 1*2", "time + 2"),
+        ("-(time^2)", "-time^2"),
+        ("(-time)^2", "(-time)^2"),
+        ("time^2^x", "time^2^x"),
+        ("(time^2)^x", "(time^2)^x"),
+        ("time - (x - 1)", "time - (x - 1)"),
+        ("time/(x*y)", "time/(x*y)"),
+        ("-2*time", "-2*time"),
+        ("(-2)^time", "(-2)^time"),
+        ("!(time > 1)", "!time > 1"),
+        ("(!time)*2", "(!time)*2"),
+        ("1e-16*time + 1e-20", "1e-16*time + 1e-20"),
+        ("if(time < 1, x, 0)", "if(time < 1, x, 0)"),
+        ("time > 1 && x < 2 || y", "time > 1 && x < 2 || y"),
+    ],
+)
+def test_formulas_read_as_they_could_be_written(hub, text, shown):
+    formula = run(hub, f"f = {text}")["f"]
+    assert formula.text == shown
+    assert run(Hub(), f"f = {shown}")["f"].text == shown
+
+
+def test_numbers_are_double_precision(hub):
+    v = run(hub, "a = 0.1\nb = 1234567.891\nc = 16777217")
+    assert (v["a"], v["b"], v["c"]) == (0.1, 1234567.891, 16777217.0)
+
+
+def test_texts(hub):
+    v = run(hub, 'b = "cubic-spline"\nc = b + ".*"\nd = b == "linear"\ne = if(b != "x", 1, 2)')
+    assert (v["b"], v["c"], v["d"], v["e"]) == ("cubic-spline", "cubic-spline.*", 0.0, 1.0)
+
+
+def test_evaluation_now(hub):
+    hub.values.publish_vector("Ek")
+    hub.values.set("Ek_s", 4.0)
+    hub.values.set("time", 0.5)
+    v = run(hub, "f = sqrt(Ek_s) + sin(time) + Ek\nr = PI*2")
+    assert v["f"].names == {"Ek_s", "time", "Ek"}
+    assert v["f"].evaluate(hub.values) == 2 + math.sin(0.5)
+    assert v["r"] == 2 * math.pi
+
+
+def test_a_formula_of_positions_has_no_single_number(hub):
+    with pytest.raises(ScriptError, match="differs from point to point"):
+        run(hub, "f = x + time")["f"].evaluate(hub.values)
+
+
+def test_expression_wraps_numbers_and_formulas(hub):
+    constant, formula = Expression(3), Expression(Formula.seed("time"))
+    assert constant.is_constant
+    assert constant.constant == 3.0
+    assert constant.evaluate(hub.values) == 3.0
+    assert not formula.is_constant
+    assert formula.names == {"time"}
+    with pytest.raises(ValueError):
+        _ = formula.constant
+
+
+def test_formulas_cannot_grow_without_end(hub):
+    with pytest.raises(ScriptError, match="too long") as caught:
+        run(hub, "f = time\n" + "f = f*f + x\n" * 40)
+    assert caught.value.place.column == 5
+    deep = "time" + "+(time" * 60 + ")" * 60
+    with pytest.raises(ScriptError, match="too long"):
+        run(hub, f"f = {deep}")
+
+
+def test_presets_win_over_the_script(hub):
+    v = run(hub, 'h = 0.1\nb = 2*h\nk = "linear"\ns = 2*h', h="1/4", k="cubic-spline", s="3*h")
+    assert v == {"h": 0.25, "b": 0.5, "k": "cubic-spline", "s": 0.75}
+    assert hub.warnings == []
+
+
+def test_a_preset_that_the_script_does_not_know_is_mentioned(hub):
+    run(hub, "h = 0.1", hh="1")
+    assert len(hub.warnings) == 1
+
+
+@pytest.mark.parametrize("name", ["x", "time", "run", "sin", "PI", "1a", "NULL"])
+def test_presets_have_free_names(hub, name):
+    with pytest.raises(ScriptError, match="-var"):
+        run(hub, "", **{name: "1"})
+
+
+def test_nan_passes_through_what_a_rehearsal_does_not_know(hub):
+    interpreter = Interpreter(hub)
+    interpreter.variables["a"] = math.nan
+    interpreter.run_text("b = 1/a\nc = sqrt(a)\nd = if(a > 1, 1, 2)\ne = floor(a) % 2")
+    assert math.isnan(interpreter.variables["b"])
+    assert math.isnan(interpreter.variables["c"])
+
+
+def test_values_are_published_in_one_array_that_stays():
+    values = Values()
+    array = values.array
+    assert values.names() == ["time", "timestep", "dt"]
+    slots = values.publish_vector("F")
+    assert slots[:4] == (3, 4, 5, 6)
+    assert values.names()[3:] == ["F_x", "F_y", "F_z", "F_s", "F"]
+    assert values.publish("F_s", 2.0) == 6
+    assert array[6] == values.get("F_s") == 2.0
+    assert values.publish_vector("F") == slots
+    values.publish("G_x")
+    assert values.publish_vector("G")[:4] == (9, 10, 11, 12)
+    with pytest.raises(ScriptError, match=str(CAPACITY)):
+        for k in range(CAPACITY):
+            values.publish(f"v{k}")
+    assert values.array is array
