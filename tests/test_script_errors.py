@@ -1,0 +1,317 @@
+"""Wrong scripts: each ends with one message that marks the place and says what to do."""
+
+import pytest
+
+from karamelo_py.hub import Hub
+from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
+from karamelo_py.script.interpreter import Interpreter
+
+SCENE = """\
+method(ulmpm, FLIP, linear, 1)
+dimension(2, 0, 1, 0, 1, 0.1)
+region(b, block, 0, 1, 0, 1)
+material(m, linear, 1000, 1000, 0.3)
+solid(s, region, b, 2, m, 0.1, 0)
+group(n, nodes, region, b, all)
+group(p, particles, region, b, all)
+"""
+
+# What is wrong, the column of the mark, and parts of the message.
+SYNTAX = [
+    ("a =", 1, "nothing is assigned to 'a'"),
+    ("a = 1.2.3", 5, "'1.2.3' is not a number"),
+    ("a = 2 3", 7, "operator is missing between '2' and '3'"),
+    ("a = 2x", 5, "2*x"),
+    ("a = 1e", 5, "exponent"),
+    ("a = 1d5", 5, "1e5"),
+    ("a = 3)", 6, "closes nothing"),
+    ("run(10", 1, "call of run is not closed"),
+    ("a = (1 + 2", 5, "not closed"),
+    ("a = max(1, (2)", 5, "not closed"),
+    ("run(10))", 8, "closes nothing"),
+    ("f(a,,b)", 5, "argument 2 is missing"),
+    ("f(,b)", 3, "argument 1 is missing"),
+    ("f(a,)", 4, "argument 2 is missing"),
+    ('a = "text', 5, "quote is not closed"),
+    ('f(a, "text)', 6, "quote is not closed"),
+    ("a = “text”", 5, "typographic quote"),
+    ("a = 3 $ 4", 7, "without $"),
+    ("a = 3;", 6, "one statement per line"),
+    ("a = 'b'", 5, "double quotes"),
+    ("a = 1 & 2", 7, "write &&"),
+    ("a = 2 − 1", 7, "type -"),
+    ("a += 2", 3, "a = a + 2"),
+    ("f(x) = 3", 1, "f = 3"),
+    ("a = b = 4", 7, "'=' cannot stand here"),
+    ("= 3", 1, "no name on its left"),
+    ("3 = x", 3, "'=' cannot stand here"),
+    ("run 100", 5, "run(100)"),
+    ("a = 1,5", 6, "1.5"),
+    ("a = 3 *", 7, "ends after '*'"),
+    ("a = * 3", 5, "nothing on its left"),
+    ("a = 3 + * 4", 9, "'*' follows operator '+'"),
+    ("a = ()", 5, "nothing in these parentheses"),
+    ("a = max(1,)", 11, "missing after ','"),
+    ("run(1) run(2)", 8, "one statement per line"),
+    ("a = 2(3)", 6, "operator is missing"),
+    ("a = 1e400", 5, "too large"),
+    ("a = \x01", 5, "control character"),
+]
+
+NAMES = [
+    ("x = 3", 1, "'x' is a coordinate"),
+    ("time = 3", 1, "'time' is the time"),
+    ("PI = 3", 1, "cannot be assigned"),
+    ("run = 3", 1, "'run' is a command"),
+    ("log = 2", 1, "cannot be assigned"),
+    ("sin = 2", 1, "'sin' is a function"),
+    ("a = b", 5, "unknown name 'b'"),
+    ("length = 2\na = 2*lenght", 7, "did you mean 'length'?"),
+    ("b = a + 1\na = 3", 5, "'a' is used before it is set"),
+    ("c = Ek_s\nfix(Ek, kinetic_energy, all)", 5, "used before its fix is defined"),
+    ("a = a + 1", 5, "used before it is set"),
+    ("a = sn(1)", 5, "did you mean 'sin'?"),
+    ("a = sin", 5, "sin(a)"),
+    ("a = run", 5, "needs parentheses"),
+    ("run", 1, "needs parentheses"),
+    ("a = run(10)", 5, "gives no value"),
+    ("metod(ulmpm, FLIP, linear, 1)", 1, "did you mean 'method'?"),
+    ("Run(10)", 1, "did you mean 'run'?"),
+    ("a = 3\na(4)", 1, "a variable"),
+    ("a = 3\nb = a(4)", 5, "a*(...)"),
+    ("a = INF", 5, "INF is not a number"),
+    ("a = NULL + 1", 5, "NULL is not a number"),
+    ("a = cubic-spline", 5, 'quotes: "cubic-spline"'),
+]
+
+VALUES = [
+    ("a = 1/0", 7, "division by zero"),
+    ("a = 0\nb = 3/a", 7, "division by zero: a is 0"),
+    ("a = 5 % 0", 9, "division by zero"),
+    ("a = 0^-1", 5, "division by zero"),
+    ("a = 2*time + 1/0", 16, "division by zero"),
+    ("a = sqrt(-1)", 10, "sqrt(-1) is not a real number"),
+    ("a = log(0)", 9, "above 0"),
+    ("a = acos(2)", 10, "between -1 and 1"),
+    ("a = (-8)^(1/3)", 5, "whole exponent"),
+    ("a = 10^400", 5, "too large"),
+    ("a = exp(1000)", 5, "too large"),
+    ("a = sin(1, 2)", 5, "sin takes 1 operand, not 2"),
+    ("a = atan2(1)", 5, "atan2(y, x)"),
+    ("a = max(1)", 5, "at least 2"),
+    ("a = if(1, 2)", 5, "if(condition, a, b)"),
+    ('a = "text" * 2', 5, "'text' is text"),
+    ('a = -"text"', 6, "is text"),
+    ('a = sin("text")', 9, "is text"),
+    ("a = value(x)", 11, "differs from point to point"),
+]
+
+COMMANDS = [
+    ("fix(v, velocity_node, n, 1, 0)", 8, "did you mean 'velocity_nodes'?"),
+    ("fix(v, velocity_nodes, nn, 1, 0)", 24, "did you mean 'n'?"),
+    ("fix(v, velocity_nodes, p, 1, 0)", 24, "a group of particles"),
+    ("fix(v, velocity_nodes)", 1, "got 0 arguments"),
+    ("fix(v)", 1, "got 1 argument"),
+    ("fix(f, body_force, all, 0, -9.81*)", 33, "ends after '*'"),
+    ("fix(f, body_force, all, 0, 1/0)", 30, "division by zero"),
+    ("fix(f, body_force, all, 0, dt=3)", 28, "leave out 'dt ='"),
+    ("material(m2, linear, 1000, 1000)", 1, "got 2 arguments"),
+    ("material(m2, linear, 1000, 1000, 0.3, 4)", 39, "got 4 arguments"),
+    ("material(m2, linear, 0, 1000, 0.3)", 22, "above 0"),
+    ("material(m2, linear, NULL, 1000, 0.3)", 22, "not NULL"),
+    ("material(m2, linear, time, 1000, 0.3)", 22, "value(time)"),
+    ('material(m2, linear, "abc", 1000, 0.3)', 22, "not the text 'abc'"),
+    ("material(m, linear, 1000, 1000, 0.3)", 10, "already used (line 4)"),
+    ("material(3, linear, 1000, 1000, 0.3)", 10, "a word, not the number 3"),
+    ("solid(s2, region, b, 2.5, m, 0.1, 0)", 22, "whole number"),
+    ("solid(s2, region, c, 2, m, 0.1, 0)", 19, "unknown region 'c'"),
+    ("dump(d, all, particle, 10, nodir/d.*.gz, x)", 28, "folder nodir does not exist"),
+    ("axisymmetric(yes)", 14, "true or false"),
+    ("run(1.5)", 5, "whole number"),
+    ("run(-1)", 5, "at least 0"),
+    ("set_dt(0)", 8, "above 0"),
+    ("group(g, node, region, b, all)", 10, "did you mean 'nodes'?"),
+    ("group(g, nodes region, b, all)", 10, "is a comma missing"),
+    ("group(g,\n  nodes,\n  region, bb, all)", 11, "unknown region 'bb'"),
+    ("log_modify(custom, step, Ekk)", 26, "unknown"),
+    ("include(nofile.in)", 9, "no file"),
+    ("print()", 1, "got 0 arguments"),
+    ('run_while("abc")', 11, "not the text 'abc'"),
+    ("scheme(mus)", 8, "did you mean 'musl'?"),
+]
+
+
+def run(text, tmp_path):
+    hub = Hub()
+    hub.folder = tmp_path
+    Interpreter(hub).run_text(text, "in.wrong")
+    return hub
+
+
+def check(script, lines_before, column, part, tmp_path):
+    with pytest.raises(ScriptError) as caught:
+        run(script, tmp_path)
+    error = caught.value
+    message = error.render()
+    assert part in message
+    assert message.startswith(f"in.wrong:{error.place.line}:{error.place.column}: error: ")
+    assert error.place.line > lines_before
+    assert error.place.column == column
+    lines = message.splitlines()
+    assert lines[1].endswith(
+        script.splitlines()[error.place.line - 1].rstrip().replace("\x01", "�")
+    )
+    assert lines[2].strip().startswith("|")
+    assert set(lines[2].replace("|", "").strip()) == {"^"}
+    # No word of the machinery.
+    for word in ("Token", "LPAR", "RPAR", "NAME", "Traceback", "None"):
+        assert word not in message
+
+
+@pytest.mark.parametrize(("text", "column", "part"), SYNTAX)
+def test_syntax(text, column, part, tmp_path):
+    check("good = 1\n" + text, 1, column, part, tmp_path)
+
+
+@pytest.mark.parametrize(("text", "column", "part"), [*NAMES, *VALUES])
+def test_names_and_values(text, column, part, tmp_path):
+    check("# nothing\n" + text, 1, column, part, tmp_path)
+
+
+@pytest.mark.parametrize(("text", "column", "part"), COMMANDS)
+def test_commands(text, column, part, tmp_path):
+    check(SCENE + text, 7, column, part, tmp_path)
+
+
+@pytest.mark.parametrize("text", ["a = 1/0", "run(10"])
+def test_nothing_runs_when_something_later_cannot_be_read(text, tmp_path):
+    if text == "run(10":
+        with pytest.raises(ScriptError):
+            run("nosuchcommand(1)\n" + text, tmp_path)
+    else:
+        with pytest.raises(ScriptError, match="unknown command"):
+            run("nosuchcommand(1)\n" + text, tmp_path)
+
+
+def test_mistakes_after_a_run_are_found_before_its_first_step(tmp_path):
+    hub = Hub()
+    hub.folder = tmp_path
+    script = SCENE + "run(3)\na = 1\nfix(f, body_force, nowhere, 0, 0)\n"
+    with pytest.raises(ScriptError, match="unknown group 'nowhere'") as caught:
+        Interpreter(hub).run_text(script)
+    assert caught.value.place.line == 10
+    assert hub.update.step == 0
+
+
+def test_results_that_a_rehearsal_does_not_have_raise_nothing(tmp_path):
+    script = SCENE + (
+        "fix(Ek, kinetic_energy, all)\nrun(2)\nE0 = value(Ek_s)\nratio = 1/E0 + sqrt(E0 - 1)\n"
+        "quit\nnosuchcommand(1)\n"
+    )
+    hub = Hub()
+    hub.folder = tmp_path
+    with pytest.raises(ScriptError, match="division by zero"):
+        # Nothing moves: E0 is 0, and only the real value can say so.
+        Interpreter(hub).run_text(script)
+    assert hub.update.step == 2
+
+
+def test_multi_line_text_marks_the_line_of_the_word(tmp_path):
+    with pytest.raises(ScriptError) as caught:
+        run(SCENE + "fix(v, velocity_nodes,\n    nowhere, # where\n    0, 0)", tmp_path)
+    place = caught.value.place
+    assert (place.line, place.column, place.length) == (9, 5, 7)
+    assert place.text == "    nowhere, # where"
+
+
+def test_tabs_keep_the_marks_in_line():
+    text = render_message("error", "m", Place("f", 1, 3, 1, "a\tb"))
+    assert text.splitlines()[2].endswith("|  \t^")
+
+
+def test_long_lines_are_cut_around_the_mark():
+    line = "a = " + "1 + " * 200 + "b"
+    text = render_message("error", "m", Place("f", 1, len(line), 1, line)).splitlines()
+    assert len(text[1]) < 200
+    assert text[1].index("b") == text[2].index("^")
+
+
+@pytest.mark.parametrize(
+    ("name", "names", "expected"),
+    [
+        ("Run", ["run", "runs"], "run"),
+        ("metod", ["method", "mesh"], "method"),
+        ("zzz", ["a", "b"], None),
+        ("a", [], None),
+    ],
+)
+def test_nearest(name, names, expected):
+    assert nearest(name, names) == expected
+
+
+# ---- files --------------------------------------------------------------------------------------
+
+
+def run_file(path):
+    hub = Hub()
+    hub.folder = path.parent
+    interpreter = Interpreter(hub)
+    interpreter.run_file(path)
+    return interpreter.variables
+
+
+def test_include_is_relative_to_its_script(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "in.main").write_text("a = 1\ninclude(sub/one.in)\nd = b + c\n")
+    (tmp_path / "sub" / "one.in").write_text("b = a + 1\ninclude(two.in)\n")
+    (tmp_path / "sub" / "two.in").write_text("c = 10")
+    assert run_file(tmp_path / "in.main")["d"] == 12
+
+
+def test_mistakes_in_an_included_script_are_marked_there(tmp_path):
+    (tmp_path / "in.main").write_text("include(one.in)\n")
+    (tmp_path / "one.in").write_text("\na = nothing\n")
+    with pytest.raises(ScriptError) as caught:
+        run_file(tmp_path / "in.main")
+    assert caught.value.place.file.endswith("one.in")
+    assert caught.value.place.line == 2
+
+
+def test_include_of_itself_is_refused(tmp_path):
+    (tmp_path / "in.main").write_text("include(one.in)\n")
+    (tmp_path / "one.in").write_text("include(in.main)\n")
+    with pytest.raises(ScriptError, match="includes itself"):
+        run_file(tmp_path / "in.main")
+
+
+def test_quit_ends_everything_quietly(tmp_path):
+    (tmp_path / "in.main").write_text("include(one.in)\na = 2\n")
+    (tmp_path / "one.in").write_text("a = 1\nquit # enough\na = 3")
+    assert run_file(tmp_path / "in.main") == {"a": 1.0}
+
+
+def test_a_missing_file_a_folder_and_a_binary_file(tmp_path):
+    (tmp_path / "in.main").write_text("")
+    with pytest.raises(ScriptError) as caught:
+        run_file(tmp_path / "in.mian")
+    assert "in.main" in caught.value.hint
+    with pytest.raises(ScriptError, match="is a folder"):
+        run_file(tmp_path)
+    (tmp_path / "binary").write_bytes(b"a\0b")
+    with pytest.raises(ScriptError, match="not a text file"):
+        run_file(tmp_path / "binary")
+
+
+def test_other_encodings_are_read(tmp_path):
+    (tmp_path / "latin").write_bytes("a = 1 # größer\r\nb = 2".encode("latin-1"))
+    assert run_file(tmp_path / "latin") == {"a": 1.0, "b": 2.0}
+    (tmp_path / "utf16").write_bytes("a = 3".encode("utf-16"))
+    assert run_file(tmp_path / "utf16") == {"a": 3.0}
+
+
+def test_print_shows_values(tmp_path, capsys):
+    hub = run('a = 2\nf = a*time\nw = "linear"\nprint(a, f, w, "done")\nprint(x0)', tmp_path)
+    assert hub.place.line == 5
+    out = capsys.readouterr().out
+    assert 'a = 2, f = 2*time = 0, w = "linear", done' in out
+    assert "x0 = x0" in out
