@@ -1,0 +1,127 @@
+"""karamelo-py styles and karamelo-py help, as a user calls them."""
+
+import importlib.metadata
+
+import pytest
+
+from karamelo_py import catalogue, registry
+from karamelo_py.cli import main
+
+
+def call(capsys, *arguments):
+    status = main(list(arguments))
+    output = capsys.readouterr()
+    return status, output.out, output.err
+
+
+def test_styles_lists_every_command_and_style_with_its_package(capsys):
+    status, out, _ = call(capsys, "styles")
+    assert status == 0
+    version = importlib.metadata.version("karamelo-py")
+    rows = [line.split() for line in out.splitlines() if line.startswith("  ")]
+    listed = [row[0] for row in rows if f"karamelo-py {version}" == " ".join(row[1:3])]
+    known = [name for family in catalogue.families() for name in registry.names(family)]
+    assert sorted(listed) == sorted(known)
+    assert all(len(row) > 4 for row in rows), "each has a summary"
+
+
+@pytest.mark.parametrize("word", ["fix", "fixes", "Fix"])
+def test_styles_of_a_family(capsys, word):
+    status, out, _ = call(capsys, "styles", word)
+    assert status == 0
+    assert "body_force" in out
+    assert "set_dt" not in out
+
+
+def test_help_alone_says_how_to_use_it(capsys):
+    status, out, _ = call(capsys, "help")
+    assert status == 0
+    assert "karamelo-py help FAMILY STYLE" in out
+
+
+def test_help_of_a_style(capsys):
+    status, out, _ = call(capsys, "help", "fix", "velocity_nodes")
+    assert status == 0
+    for part in (
+        "fix(ID, velocity_nodes, group[, velocity, ...])",
+        "Prescribe the velocity of nodes",
+        "the ID of a node group",
+        "a number or a formula or NULL, any number of them",
+        "fix(base, velocity_nodes, bottom, 0, 0)",
+        "Publishes the reaction",
+        "velocity_particles",
+    ):
+        assert part in out
+
+
+def test_help_finds_a_style_in_whatever_family(capsys):
+    assert call(capsys, "help", "body_force")[1] == call(capsys, "help", "fix", "body_force")[1]
+
+
+def test_help_of_a_command_comes_before_styles_of_that_name_and_lists_its_styles(capsys):
+    status, out, _ = call(capsys, "help", "material")
+    assert status == 0
+    assert "material(ID, style[, arguments, ...])" in out
+    assert "linear, neo-hookean" in out
+
+
+def test_help_of_a_part_of_the_method(capsys):
+    assert "method(kind, FLIP, basis, alpha)" in call(capsys, "help", "transfer", "FLIP")[1]
+    assert "scheme(usl)" in call(capsys, "help", "usl")[1]
+
+
+def test_defaults_and_words_are_told(capsys):
+    _, out, _ = call(capsys, "help", "material", "linear")
+    assert "rate=jaumann|none" in out
+    assert "jaumann when left out" in out
+    _, out, _ = call(capsys, "help", "angular_momentum")
+    assert "a number, 0 when left out" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["help", "bodyforce"], "did you mean 'body_force'?"),
+        (["help", "fix", "body_forc"], "did you mean 'body_force'?"),
+        (["help", "fixx", "body_force"], "did you mean 'fix'?"),
+        (["help", "a", "b", "c"], "too many arguments"),
+        (["help", "qqqqq"], "karamelo-py styles lists them all"),
+        (["styles", "comput"], "did you mean 'compute'?"),
+        (["styles", "fix", "compute"], "too many arguments"),
+        (["help", "kinetic_energy"], "karamelo-py help fix kinetic_energy"),
+    ],
+)
+def test_what_is_unknown_or_means_several_things(capsys, arguments, message):
+    status, out, err = call(capsys, *arguments)
+    assert status == 1
+    assert out == ""
+    assert message in err
+
+
+def test_every_style_can_be_explained():
+    for family in catalogue.families():
+        for name in registry.names(family):
+            help_ = catalogue.help_of(family, name)
+            assert help_.summary and help_.syntax, (family, name)
+
+
+def test_a_broken_plug_in_is_listed_as_such(capsys, tmp_path, monkeypatch):
+    package = tmp_path / "broken-1.2.dist-info"
+    package.mkdir()
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.2\n")
+    (package / "entry_points.txt").write_text(
+        "[karamelo_py.fix]\nbroken_fix = broken_package_that_is_not_there:Fix\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    registry.forget()
+    try:
+        status, out, _ = call(capsys, "styles", "fix")
+        assert status == 0
+        (line,) = [line for line in out.splitlines() if "broken_fix" in line]
+        assert "broken 1.2" in line and "cannot be loaded" in line
+        assert "body_force" in out
+        status, _, err = call(capsys, "help", "fix", "broken_fix")
+        assert status == 1 and "of broken 1.2" in err and "Traceback" not in err
+    finally:
+        monkeypatch.undo()
+        registry.forget()
