@@ -18,10 +18,10 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from karamelo_py import registry
+from karamelo_py import docstrings, registry
 from karamelo_py.arguments import NULL, Argument
 from karamelo_py.kinds import (
     AtLeast,
@@ -42,6 +42,7 @@ __all__ = [
     "Argument",
     "AtLeast",
     "Constraint",
+    "Help",
     "In",
     "InputFile",
     "NonNegative",
@@ -49,6 +50,7 @@ __all__ = [
     "Parameter",
     "Positive",
     "call",
+    "describe",
     "parameters",
     "syntax",
 ]
@@ -326,3 +328,52 @@ def syntax(target: Callable, name: str) -> str:
     elif own:
         own = ", " + own
     return f"{family}({', '.join([*before, style])}{own})"
+
+
+# ---- help ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Help:
+    """What there is to say about a command or style.
+
+    Attributes
+    ----------
+    syntax
+        How it is called.
+    summary, text
+        First line and the rest of the docstring's head.
+    parameters
+        With kinds, defaults and descriptions.
+    sections
+        The other sections of the docstring: Example, Notes, See Also.
+    """
+
+    name: str
+    syntax: str
+    summary: str
+    text: str
+    parameters: list[Parameter]
+    sections: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def example(self) -> str:
+        """Lines of script."""
+        return self.sections.get("Example", "")
+
+
+def describe(target: Callable, name: str) -> Help:
+    """Help about a command or style, from its signature and its docstring."""
+    doc = inspect.cleandoc(target.__doc__ or "")
+    if inspect.isclass(target) and "Parameters\n---" not in doc and target.__init__.__doc__:
+        doc = doc + "\n\n" + inspect.cleandoc(target.__init__.__doc__)
+    head, sections = docstrings.sections(doc)
+    summary, _, text = head.partition("\n\n")
+    descriptions = docstrings.descriptions(sections.pop("Parameters", ""))
+    described = [
+        Parameter(**{**vars(p), "description": descriptions.get(p.name, "")})
+        for p in parameters(target)
+    ]
+    return Help(
+        name, syntax(target, name), " ".join(summary.split()), text.strip(), described, sections
+    )

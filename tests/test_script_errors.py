@@ -52,7 +52,7 @@ SYNTAX = [
     ("a = 3 + * 4", 9, "'*' follows operator '+'"),
     ("a = ()", 5, "nothing in these parentheses"),
     ("a = max(1,)", 11, "missing after ','"),
-    ("run(1) run(2)", 8, "one statement per line"),
+    ("run(1) run(2)", 8, "two statements stand on two lines"),
     ("a = 2(3)", 6, "operator is missing"),
     ("a = 1e400", 5, "too large"),
     ("a = \x01", 5, "control character"),

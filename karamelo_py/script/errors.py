@@ -59,6 +59,8 @@ class ScriptError(Exception):
         self.hint = hint
         # Command or style that complains, put in front of the message.
         self.command: str | None = None
+        # Whether the statement it belongs to is known: nothing outside of it may add to it.
+        self.complete = False
 
     def __str__(self) -> str:
         return self.message

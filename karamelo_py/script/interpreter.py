@@ -159,6 +159,7 @@ class Interpreter:
                 self._execute(statement)
             except ScriptError as error:
                 error.place = error.place or statement.place
+                error.complete = True
                 raise
             except RecursionError:
                 raise ScriptError(
@@ -175,7 +176,23 @@ class Interpreter:
             node = statement.node
             if isinstance(node, Name) and node.name == "quit":
                 raise Quit
+            if isinstance(node, Name) and not self._means_something(node.name):
+                raise self._unknown_statement(node.name)
             self.evaluate(node, statement.raw)
+
+    def _means_something(self, name: str) -> bool:
+        known = self.knows(name) or name in WORDS or name in FUNCTIONS
+        return known or registry.knows("command", name) or self._later(name) is not None
+
+    def _unknown_statement(self, name: str) -> ScriptError:
+        close = nearest(name, ["quit", *registry.names("command"), *self.variables])
+        if name.lower() in ("exit", "stop", "end"):
+            close = "quit"
+        return ScriptError(
+            f"'{name}' is neither a command nor a variable",
+            expected="name = expression, or command(arguments)",
+            hint=f"did you mean '{close}'?" if close else None,
+        )
 
     # -- assignments ------------------------------------------------------------------------------
 
@@ -374,13 +391,16 @@ class Interpreter:
             return later(place)
         known = [*self.variables, *self.hub.values.names(), *SEEDS, *CONSTANTS]
         close = nearest(name, known)
+        hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
+        if name.lower() in ("true", "false"):
+            hint = f"write {int(name.lower() == 'true')}"
         defined = ", ".join(self.variables) or "none so far"
         return ScriptError(
             f"unknown name '{name}'",
             place=place,
             expected=f"a variable that is set ({_shortened(defined)}), a value of a fix or a "
             "compute, or x, y, z, x0, y0, z0, time, timestep, dt, PI",
-            hint=f"did you mean '{close}'?" if close else f"set it first: {name} = ...",
+            hint=hint,
         )
 
     def _later(self, name: str) -> Any:

@@ -293,6 +293,8 @@ def _equals(code: str, tokens: list[_Token], index: int) -> Mistake:
         )
     if all(token.text != "=" for token in tokens[:index]) and first.start < here.start:
         hint = "compare with ==" if _opened(tokens[:index]) else None
+        if all(token.kind in ("name", "number", "operator") for token in tokens[:index]):
+            hint = "a name begins with a letter and has letters, digits and _ only"
         return Mistake("'=' cannot stand here", here.start, here.end, expected=expected, hint=hint)
     return Mistake("a second '='", here.start, here.end, expected=expected)
 
@@ -375,16 +377,50 @@ def _side_by_side(code: str, tokens: list[_Token], index: int) -> Mistake:
             here.start,
             here.end,
             expected="name = expression, or command(arguments)",
-            hint=f"arguments go in parentheses: {before.text}({', '.join(words)})",
+            hint=_block_or_call(before.text, words),
         )
+    two_statements = _is_call(tokens[:index]) and here.kind == "name"
     what = f"'{_short(before)}' and '{_short(here)}'"
     return Mistake(
         f"an operator is missing between {what}",
         here.start,
         here.end,
         expected="an operator, such as *, or a comma between arguments",
-        hint="one statement per line" if before.text == ")" and here.kind == "name" else None,
+        hint="multiply with *; two statements stand on two lines"
+        if _is_call(tokens[:index]) and here.kind == "name"
+        else None,
     )
+
+
+def _is_call(tokens: list[_Token]) -> bool:
+    """Whether `tokens` are one call from end to end."""
+    if len(tokens) < 3 or tokens[0].kind != "name" or tokens[1].text != "(":
+        return False
+    return bool(_opened(tokens[:-1])) and not _opened(tokens)
+
+
+_BLOCKS = ("for", "while", "if", "else", "elif", "def", "do", "import", "loop", "next", "jump")
+
+
+def _block_or_call(name: str, words: list[str]) -> str | None:
+    """What to write instead of ``name word word``."""
+    if name in (
+        "for",
+        "while",
+        "if",
+        "else",
+        "elif",
+        "def",
+        "do",
+        "import",
+        "loop",
+        "next",
+        "jump",
+    ):
+        return "there are no loops and blocks; if(condition, a, b) chooses a value"
+    if all(re.fullmatch(r"[\w.*/+-]+", word) for word in words):
+        return f"arguments go in parentheses: {name}({', '.join(words)})"
+    return f"arguments go in parentheses: {name}(...)"
 
 
 def _short(token: _Token) -> str:

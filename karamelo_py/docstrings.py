@@ -1,0 +1,29 @@
+"""Docstrings in NumPy's form: their head, sections, and descriptions of parameters."""
+
+from __future__ import annotations
+
+import inspect
+import re
+
+
+def sections(doc: str) -> tuple[str, dict[str, str]]:
+    """The head of a docstring, and its sections by title."""
+    pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}$", doc, flags=re.MULTILINE)
+    titles = [title.replace("Examples", "Example") for title in pieces[1::2]]
+    texts = (text.strip("\n") for text in pieces[2::2])
+    return pieces[0].strip(), dict(zip(titles, texts, strict=True))
+
+
+def documented(doc: str) -> dict[str, str]:
+    """Parameters that a docstring describes: name to description."""
+    return _descriptions(_sections(inspect.cleandoc(doc))[1].get("Parameters", ""))
+
+
+def descriptions(section: str) -> dict[str, str]:
+    """Descriptions by name, from a section in NumPy's form."""
+    found: dict[str, str] = {}
+    for block in re.split(r"\n(?=\S)", section):
+        head, _, text = block.partition("\n")
+        for name in filter(str.strip, head.partition(":")[0].split(",")):
+            found[name.strip().lstrip("*")] = inspect.cleandoc(text)
+    return found
