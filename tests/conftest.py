@@ -1,0 +1,156 @@
+"""What the tests share: scripts run through the real command line, and read back."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import dedent
+
+import numpy as np
+import pytest
+
+from karamelo_py.cli import main
+
+TESTS = Path(__file__).parent
+INPUTS = TESTS.parent / "inputs"
+# Numbers of other programs, beside the repository; tests that need them are skipped without.
+REFERENCE = TESTS.parent.parent / "shared" / "reference" / "data"
+
+
+class Table(dict):
+    """Columns by name: a log or one snapshot of a dump."""
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(f"no column {name}; there are {', '.join(self)}") from None
+
+
+def read_log(path: Path) -> Table:
+    """The table of log.mpm; lines that begin with # repeat headers."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    rows = [line.split() for line in lines[1:] if not line.startswith("#")]
+    columns = np.array(rows, float).reshape(len(rows), -1).T
+    return Table(zip(lines[0].split(), columns, strict=True))
+
+
+def read_dump(path: Path) -> list[Table]:
+    """The snapshots of a LAMMPS dump, each with TIMESTEP, TIME and its columns in order of ids."""
+    opener = gzip.open if path.suffix == ".gz" else open
+    with opener(path, "rt", encoding="utf-8") as file:
+        lines = file.read().splitlines()
+    snapshots = []
+    k = 0
+    while k < len(lines):
+        assert lines[k].startswith("ITEM: "), lines[k]
+        item = lines[k][len("ITEM: ") :]
+        if item == "TIMESTEP":
+            snapshot = Table(TIMESTEP=int(lines[k + 1]))
+            snapshots.append(snapshot)
+            k += 2
+        elif item == "TIME":
+            snapshot["TIME"] = float(lines[k + 1])
+            k += 2
+        elif item.startswith("NUMBER OF ATOMS"):
+            count = int(lines[k + 1])
+            k += 2
+        elif item.startswith("BOX BOUNDS"):
+            k += 4
+        elif item.startswith("ATOMS"):
+            names = item.split()[1:]
+            rows = np.array([line.split() for line in lines[k + 1 : k + 1 + count]], float)
+            rows = rows[np.argsort(rows[:, 0])]
+            snapshot.update(zip(names, rows.T, strict=True))
+            k += 1 + count
+        else:
+            k += 2
+    return snapshots
+
+
+@dataclass
+class Result:
+    """What a run left behind."""
+
+    status: int
+    out: str
+    err: str
+    folder: Path
+
+    @property
+    def log(self) -> Table:
+        """The table in log.mpm."""
+        return read_log(self.folder / "log.mpm")
+
+    def dump(self, name: str) -> Table:
+        """The last (or only) snapshot in a dump."""
+        return read_dump(self.folder / name)[-1]
+
+
+def _prepared(folder: Path, script: str | Path) -> Path:
+    """The path of a script, written to `folder` if it is given as a text."""
+    if isinstance(script, Path):
+        return script
+    path = folder / "in.script"
+    path.write_text(dedent(script), encoding="utf-8")
+    return path
+
+
+def _checked(result: Result, status: int) -> Result:
+    assert "Traceback" not in result.out + result.err
+    assert result.status == status, result.err
+    return result
+
+
+@pytest.fixture
+def run_script(tmp_path, monkeypatch, capsys) -> Callable[..., Result]:
+    """``run_script(text or path, *options, status=0, folder="run")``: compiled, in this process."""
+
+    def run(script: str | Path, *options: str, status: int = 0, folder: str = "run") -> Result:
+        place = tmp_path / folder
+        place.mkdir(exist_ok=True)
+        monkeypatch.chdir(place)
+        capsys.readouterr()
+        result = main([str(_prepared(place, script)), *options])
+        captured = capsys.readouterr()
+        return _checked(Result(result, captured.out, captured.err, place), status)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def _interpreter() -> Iterator[subprocess.Popen]:
+    process = subprocess.Popen(
+        [sys.executable, str(TESTS / "uncompiled.py")],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        text=True,
+        encoding="utf-8",
+    )
+    yield process
+    process.stdin.close()
+    process.wait(timeout=30)
+
+
+@pytest.fixture
+def run_interpreted(tmp_path, _interpreter) -> Callable[..., Result]:
+    """As `run_script`, but interpreted: for many kinds of tiny scenes, which need no compiling."""
+
+    def run(script: str | Path, *options: str, status: int = 0, folder: str = "run") -> Result:
+        place = tmp_path / folder
+        place.mkdir(exist_ok=True)
+        arguments = [str(_prepared(place, script)), *options]
+        request = {"folder": str(place), "arguments": arguments}
+        _interpreter.stdin.write(json.dumps(request) + "\n")
+        _interpreter.stdin.flush()
+        answer = json.loads(_interpreter.stdout.readline())
+        return _checked(Result(answer["status"], answer["out"], answer["err"], place), status)
+
+    return run

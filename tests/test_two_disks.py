@@ -1,0 +1,112 @@
+"""The two colliding disks (Sulsky, Chen & Schreyer 1994), against Karamelo's own history."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import INPUTS, REFERENCE, read_dump
+
+# 416 points of 1/1600 each weigh 260, and move at sqrt(0.1^2 + 0.1^2).
+INITIAL_ENERGY = 0.5 * 260 * 0.02
+
+
+@pytest.fixture(scope="module")
+def karamelo():
+    """Karamelo's energies by step."""
+    path = REFERENCE / "two_disks_karamelo.csv"
+    if not path.exists():
+        pytest.skip(f"Karamelo's history of the two disks is not there ({path.name})")
+    return np.genfromtxt(path, delimiter=",", names=True, skip_header=1)
+
+
+def at_steps(log, steps):
+    """Rows of the log at `steps`."""
+    rows = np.searchsorted(log.Step, steps)
+    assert (log.Step[rows] == steps).all()
+    return rows
+
+
+def test_energies_are_those_of_karamelo(run_script, karamelo):
+    """Within 1 % of the initial energy at every logged time, with Karamelo's own stress rate.
+
+    The issue's tolerance. The two programs differ by rounding only (Karamelo reads numbers in
+    single precision), which has grown to about 2e-6 of the initial energy by the end.
+    """
+    log = run_script(INPUTS / "in.two_disks").log
+    rows = at_steps(log, karamelo["step"])
+    assert len(rows) == 70
+    assert np.abs(log.Ek[rows] - karamelo["Ek"]).max() < 0.01 * INITIAL_ENERGY
+    assert np.abs(log.Es[rows] - karamelo["Es"]).max() < 0.01 * INITIAL_ENERGY
+
+
+def test_an_objective_rate_changes_the_rebound_by_a_few_per_cent(run_script, karamelo):
+    """The points turn a little during the contact; Karamelo leaves their stress behind.
+
+    With the stress turned, the rebound comes about 15 ms later; kinetic energy changes by up to
+    6.8 a second then (Karamelo's history), so that is worth up to 0.10 or 3.9 % of the 2.6 at the start.
+    """
+    text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
+    assert ", rate=none" in text
+    log = run_script(text.replace(", rate=none", "")).log
+    rows = at_steps(log, karamelo["step"])
+    worst = np.abs(log.Ek[rows] - karamelo["Ek"]).max() / INITIAL_ENERGY
+    assert 0.001 < worst < 0.04
+
+
+def test_output_of_the_two_disks(run_script):
+    """The first state, every 250th step, the last state; the plot."""
+    result = run_script(INPUTS / "in.two_disks")
+    dumps = {int(path.name.split(".")[1]) for path in result.folder.glob("two_disks.*.LAMMPS")}
+    assert dumps == set(range(0, 3501, 250))
+    [last] = read_dump(result.folder / "two_disks.3500.LAMMPS")
+    assert last.TIMESTEP == 3500
+    assert last.TIME == 3.5
+    assert len(last.id) == 416
+    assert (result.folder / "two_disks.png").stat().st_size > 1000
+    assert list(result.log) == ["Step", "dt", "Time", "Ek", "Es", "Etot"]
+    assert result.log.Ek[0] == pytest.approx(INITIAL_ENERGY, rel=1e-9)  # ten digits in the log
+    assert result.log.Time[-1] == 3.5
+
+
+def test_momentum_is_conserved(run_script):
+    """What one disk gains the other loses; masses are equal, so the mean velocities add to zero.
+
+    The masses and the sums are exact to round-off: 3500 steps of 1e-16 relative to 0.1.
+    """
+    text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
+    extra = """
+compute(v1, average_velocity, disk1)
+compute(v2, average_velocity, disk2)
+sum_x = v1_x + v2_x
+sum_y = v1_y + v2_y
+log_modify(custom, step, v1_x, v2_x, sum_x, sum_y)
+run_time(3.5)
+"""
+    log = run_script(text.replace("run_time(3.5)", extra)).log
+    assert log.v1_x[0] == pytest.approx(0.1)
+    assert log.v1_x[-1] < -0.08  # they have bounced
+    assert np.abs(log.sum_x).max() < 1e-13
+    assert np.abs(log.sum_y).max() < 1e-13
+
+
+@pytest.mark.parametrize("name, kinetic", [("2020", "Ek_s"), ("karamelo", "Ek")])
+def test_scripts_as_others_write_them(run_script, karamelo, name, kinetic):
+    """The published forms of the script compute the same (they have no word for rate=none)."""
+    result = run_script(INPUTS / f"in.two_disks_{name}", "-var", "N_log", "250")
+    log = result.log
+    steps = karamelo["step"]
+    chosen = steps % 250 == 0
+    rows = at_steps(log, steps[chosen])
+    worst = np.abs(log[kinetic][rows] - karamelo["Ek"][chosen]).max() / INITIAL_ENERGY
+    assert worst < 0.04  # as above
+    # The sum dips by 7 % while they touch (in Karamelo too) and comes back; Karamelo ends 0.13 %
+    # above the start.
+    dip = (INITIAL_ENERGY - log.Etot).max() / INITIAL_ENERGY
+    assert 0.05 < dip < 0.09
+    apart = log.Time >= 3
+    assert np.abs(log.Etot[apart] - INITIAL_ENERGY).max() < 0.01 * INITIAL_ENERGY
+    assert (result.folder / "dump_p.3500.LAMMPS").exists()
+    assert (result.folder / "dump_g.3500.LAMMPS").exists()
+    if name == "2020":
+        assert len(list(result.folder.glob("dump.*.png"))) == 15
+        assert (result.folder / "plot.png").exists()

@@ -1,0 +1,36 @@
+"""Runs scripts without compiling anything: the same Python sources, interpreted.
+
+Started by the fixture `interpreted` as a process of its own (``NUMBA_DISABLE_JIT=1`` must be set
+before Numba is imported). Reads one JSON request a line, answers with one JSON line.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import sys
+import warnings
+
+
+def main() -> None:
+    """Serve requests until the input ends."""
+    requests, answers = sys.stdin, sys.stdout
+    from karamelo_py.cli import main as command
+
+    # Interpreted arithmetic warns about what compiled kernels pass over in silence.
+    warnings.simplefilter("ignore")
+    for line in requests:
+        request = json.loads(line)
+        os.chdir(request["folder"])
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            status = command(request["arguments"])
+        answer = {"status": status, "out": out.getvalue(), "err": err.getvalue()}
+        answers.write(json.dumps(answer) + "\n")
+        answers.flush()
+
+
+if __name__ == "__main__":
+    main()
