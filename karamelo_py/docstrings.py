@@ -16,7 +16,7 @@ def sections(doc: str) -> tuple[str, dict[str, str]]:
 
 def documented(doc: str) -> dict[str, str]:
     """Parameters that a docstring describes: name to description."""
-    return _descriptions(_sections(inspect.cleandoc(doc))[1].get("Parameters", ""))
+    return descriptions(sections(inspect.cleandoc(doc))[1].get("Parameters", ""))
 
 
 def descriptions(section: str) -> dict[str, str]:

@@ -23,6 +23,7 @@ from typing import Any
 
 from karamelo_py import docstrings, registry
 from karamelo_py.arguments import NULL, Argument
+from karamelo_py.docstrings import documented
 from karamelo_py.kinds import (
     AtLeast,
     Constraint,
@@ -51,6 +52,8 @@ __all__ = [
     "Positive",
     "call",
     "describe",
+    "documented",
+    "kind_of",
     "parameters",
     "syntax",
 ]

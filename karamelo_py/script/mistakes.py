@@ -386,9 +386,7 @@ def _side_by_side(code: str, tokens: list[_Token], index: int) -> Mistake:
         here.start,
         here.end,
         expected="an operator, such as *, or a comma between arguments",
-        hint="multiply with *; two statements stand on two lines"
-        if _is_call(tokens[:index]) and here.kind == "name"
-        else None,
+        hint="multiply with *; two statements stand on two lines" if two_statements else None,
     )
 
 
