@@ -88,15 +88,15 @@ def _dispatch(arguments: list[str]) -> int:
     return _run(arguments)
 
 
-class _Parser(argparse.ArgumentParser):
-    """Errors in our own form."""
+class CommandLine(argparse.ArgumentParser):
+    """A command line whose errors are messages in our own form."""
 
     def error(self, message: str):
         raise ScriptError(message, expected=USAGE.partition("\n\n")[0])
 
 
-def _script_parser() -> _Parser:
-    parser = _Parser(prog="karamelo-py", add_help=False, allow_abbrev=False)
+def _script_parser() -> CommandLine:
+    parser = CommandLine(prog="karamelo-py", add_help=False, allow_abbrev=False)
     parser.add_argument("script", nargs="?")
     parser.add_argument("-i", "-in", dest="input")
     parser.add_argument("-var", "--var", nargs=2, action="append", default=[])

@@ -3,6 +3,8 @@
 A sweep visits every point once: it gathers from the nodes of the point's stencil, settles the
 point, and scatters to nodes again. *What* is gathered and scattered are tags, so that one loop
 (:mod:`karamelo_py.kernels.sweep`) serves every scheme, fused or stage by stage.
+
+The tags name the fields of a point that they read and write, for `karamelo-py bench` to count.
 """
 
 from __future__ import annotations
@@ -51,33 +53,57 @@ from karamelo_py.tensors import (
 class Nothing(NamedTuple):
     """Gather or scatter nothing."""
 
+    reads = ()
+    writes = ()
+
 
 class Velocity(NamedTuple):
     """Gather v* and its change; settle velocity and new position."""
+
+    reads = ("x", "v")
+    writes = ("x moved", "v", "moment")
 
 
 class Gradient(NamedTuple):
     """Gather the gradient of the nodal velocity; settle the state of the law."""
 
+    reads = ("x", "v", "state", "material")
+    writes = ("state",)
+
 
 class VelocityAndGradient(NamedTuple):
     """Gather both from v*, in one visit."""
+
+    reads = ("x", "v", "state", "material")
+    writes = ("x moved", "v", "moment", "state")
 
 
 class Momentum(NamedTuple):
     """Scatter momentum to the velocity array, with the weights of the gather."""
 
+    reads = ("mass", "v", "moment")
+    writes = ()
+
 
 class Force(NamedTuple):
     """Scatter the internal force, with the weights of the gather."""
+
+    reads = ("mass", "state", "material")
+    writes = ()
 
 
 class MassMomentum(NamedTuple):
     """Scatter mass and momentum, with the weights of the present position."""
 
+    reads = ("x moved", "mass", "v", "moment")
+    writes = ()
+
 
 class Everything(NamedTuple):
     """Scatter mass, momentum and internal force, with the weights of the present position."""
+
+    reads = ("x moved", "mass", "v", "moment", "state", "material")
+    writes = ()
 
 
 # --- gather -----------------------------------------------------------------------------------

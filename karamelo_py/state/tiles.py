@@ -6,13 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.sorting import (
-    find_nodes,
-    list_tiles,
-    order_points,
-    reorder,
-    reorder_scalars,
-)
+from karamelo_py.kernels.sorting import order_points
 from karamelo_py.kernels.stages import ClearSums
 from karamelo_py.kernels.step import step_size
 from karamelo_py.kernels.sweep import sweep_nodes
@@ -86,20 +80,60 @@ class Tiles:
         self.used[:] = 0
         for block in s.blocks:
             self._sort_block(s, block)
-        find_nodes(s.kin, self.size, self.shape, self.nodes, self.used, s.spans)
+        self._find_nodes(s.spans)
         s.control.real[DRIFT] = 0.0
         self.sorts += 1
 
     def _sort_block(self, s: Setup, block: Block) -> None:
         x = block.x[s.control.whole[NOW]]
-        order = np.empty((2, len(x)), np.int64)
-        order_points(s.kin, s.basis, self.size, self.shape, x, self._start, order)
-        list_tiles(s.kin, self.shape, self._start, self.used, block.tiling)
-        points = block.points
-        fields = [block.x[0], block.x[1], points.v, points.state]
-        if points.moment is not None:
-            fields.append(points.moment)
-        spare = np.empty((len(x), max(field.shape[1] for field in fields)), x.dtype)
-        for field in fields:
-            reorder(field, order[1], spare)
-        reorder_scalars(points.mass, points.material, block.id, order[1], spare)
+        tile, order = np.empty((2, len(x)), np.int64)
+        order_points(s.kin, s.basis, self.size, self.shape, x, self._start, tile, order)
+        ends = self._start[:-1]
+        begins = np.concatenate([[0], ends[:-1]])
+        occupied = np.flatnonzero(ends > begins)
+        self.used[occupied] = 1
+        # Tiles of one colour have places of the same parity in every direction.
+        places = np.unravel_index(occupied, self.shape)[: self.dimension]
+        colour = sum(place % 2 << axis for axis, place in enumerate(places))
+        by_colour = occupied[np.argsort(colour, kind="stable")]
+        tiling = block.tiling
+        tiling.range[: len(occupied)] = np.stack([begins[by_colour], ends[by_colour]], axis=1)
+        tiling.colour[:] = np.searchsorted(np.sort(colour), np.arange(len(tiling.colour)))
+        for field in (*block.x, *block.points, block.id):
+            if field is not None:
+                field[:] = field[order]
+
+    def _find_nodes(self, spans: np.ndarray) -> None:
+        """List the spans of nodes that points may reach before the next sort.
+
+        A tile of nodes is in use when it or a neighbour holds points.
+        """
+        used = self.used.reshape(self.shape) > 0
+        for axis in range(self.dimension):
+            ahead = np.moveaxis(used, axis, 0)
+            wider = ahead.copy()
+            wider[1:] |= ahead[:-1]
+            wider[:-1] |= ahead[1:]
+            used = np.moveaxis(wider, 0, axis)
+        self.used[(self.used == 0) & used.ravel()] = 2
+        # Rows of nodes run along the last direction; each lies in a line of tiles.
+        last = self.dimension - 1
+        lines = used.reshape(*self.shape[:last], self.shape[last])
+        edges = np.diff(np.pad(lines, [(0, 0)] * last + [(1, 1)]).astype(np.int8), axis=last)
+        *line, begin = np.nonzero(edges == 1)
+        end = np.nonzero(edges == -1)[-1]
+        begin, end = begin * self.size, np.minimum(end * self.size, self.nodes[last])
+        row = np.zeros(len(begin), np.int64)
+        for axis, place in enumerate(line):
+            # Each line of tiles holds `size` rows in every direction across it.
+            nodes = (place[:, None] * self.size + np.arange(self.size)).ravel()
+            inside = nodes < self.nodes[axis]
+            row, begin, end = (
+                np.repeat(values, self.size)[inside] for values in (row, begin, end)
+            )
+            row = row * self.nodes[axis] + nodes[inside]
+            for later in range(axis + 1, len(line)):
+                line[later] = np.repeat(line[later], self.size)[inside]
+        spans[0, 0] = len(row)
+        spans[1 : 1 + len(row), 0] = row * self.nodes[last] + begin
+        spans[1 : 1 + len(row), 1] = row * self.nodes[last] + end
