@@ -19,6 +19,9 @@ from karamelo_py.script.functions import WORDS
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
+# Beyond it a number cannot tell one integer from the next.
+_LARGEST_INTEGER = 2**53
+
 # ---- constraints and files ----------------------------------------------------------------------
 
 
@@ -170,6 +173,8 @@ def _to_integer(hub: Any, argument: Argument) -> int:
         return 1  # A result that a rehearsal does not have; 1 passes every check.
     if math.isinf(value) or value != math.floor(value):
         raise Unfit(number_text(value))
+    if abs(value) > _LARGEST_INTEGER:
+        raise Unfit(f"{number_text(value)}, which is too large")
     return int(value)
 
 

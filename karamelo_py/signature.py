@@ -164,6 +164,11 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         except OSError as error:
             what = f"{error.filename}: " if error.filename else ""
             raise ScriptError(f"{what}{error.strerror or error}") from error
+        except OverflowError as error:
+            raise ScriptError(
+                "a number is too large for what is done with it",
+                expected="numbers in proportion to each other",
+            ) from error
         except MemoryError as error:
             raise ScriptError(
                 "there is not enough memory for this", hint="use larger cells or fewer points"

@@ -108,6 +108,7 @@ def test_conversion(hub, annotation, text, expected):
         (float, "foo", "unknown name 'foo'"),
         (int, "2.5", "a whole number, not 2.5"),
         (int, "1/0", "division by zero"),
+        (int, "1e300", "too large"),
         (bool, "yes", "true or false, not 'yes'"),
         (str, "3", "a word, not the number 3"),
         (str, "NULL", "not NULL"),
