@@ -1,0 +1,40 @@
+"""fix damp_nodes: nodes are held back by a force, inside the compiled loop."""
+
+from karamelo_py.fixes.formulas import per_direction
+from karamelo_py.group import NodeGroup
+from karamelo_py.modify import Fix, node_hook
+from karamelo_py.script.expressions import Expression
+
+
+def damp(mass, v, v_star, force, value, before, dt, share):
+    """A force against the velocity; its total is published."""
+    drag = -mass * value * v
+    return v, v_star, force + drag, drag
+
+
+class DampNodes(Fix):
+    """Hold nodes back with a force -rate m v in each direction.
+
+    Parameters
+    ----------
+    group
+        Group of nodes, or ``all``.
+    rate
+        cx, cy, cz, as many as the domain has dimensions: numbers or formulas. NULL leaves a
+        direction alone.
+
+    Example
+    -------
+    fix(settle, damp_nodes, all, 0.5, 0.5)
+
+    Notes
+    -----
+    Publishes the total force as ID_x, ID_y, ID_z.
+    """
+
+    post_particles_to_grid = node_hook(damp)
+
+    def __init__(self, hub, group: NodeGroup, *rate: Expression | None):
+        super().__init__(hub)
+        self.group = group
+        self.formulas = per_direction(hub, "c", rate)

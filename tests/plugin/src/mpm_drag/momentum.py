@@ -1,0 +1,29 @@
+"""compute momentum."""
+
+from karamelo_py.group import ParticleGroup
+from karamelo_py.modify import Compute
+
+
+class Momentum(Compute):
+    """Measure the momentum sum m v of points; published as ID_x, ID_y, ID_z.
+
+    Parameters
+    ----------
+    group
+        Group of points, or ``all``.
+
+    Example
+    -------
+    compute(p, momentum, all)
+    log_modify(custom, time, p_x)
+    """
+
+    def __init__(self, hub, group: ParticleGroup):
+        super().__init__(hub)
+        self.group = group
+
+    def refresh(self) -> None:
+        """Measure and publish."""
+        fields = self.hub.fields
+        ids = fields.members(self.group)
+        self.publish_components(fields.mass[ids] @ fields.velocity[ids])

@@ -1,0 +1,122 @@
+"""The example plug-in: installed by pip somewhere else, found by its entry points, right."""
+
+import os
+import shutil
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from math import exp
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+PLUGIN = Path(__file__).parent / "plugin"
+
+# What the example script leaves out: the fix whose hook is compiled.
+DAMP = """
+fix(settle, damp_nodes, all, 0.25 + 0*time)
+log_modify(custom, step, time, p_x, settle_x)
+"""
+
+
+def require_build_tools():
+    """Skip where a package cannot be built without a network."""
+    for package, least in (("pip", 0), ("setuptools", 77)):
+        try:
+            found = version(package)
+        except PackageNotFoundError:
+            pytest.skip(f"{package} is not installed")
+        if int(found.partition(".")[0]) < least:
+            pytest.skip(f"{package} {found} is too old to build the plug-in")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """A folder of packages with the plug-in, as pip installs it."""
+    require_build_tools()
+    folder = tmp_path_factory.mktemp("plugin")
+    source = shutil.copytree(PLUGIN, folder / "source")  # building leaves files behind
+    options = ["--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check"]
+    command = [sys.executable, "-m", "pip", "install", "-q", *options]
+    command += ["--target", str(folder / "site"), str(source)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return folder / "site"
+
+
+def karamelo_py(site, folder, *arguments, compiled=False):
+    """Run the command line in a process of its own that sees the plug-in."""
+    path = os.pathsep.join(filter(None, [str(site), os.environ.get("PYTHONPATH")]))
+    environment = os.environ | {"PYTHONPATH": path, "KARAMELO_PY_CACHE": str(site.parent / "cache")}
+    environment["NUMBA_DISABLE_JIT"] = "0" if compiled else "1"
+    command = [sys.executable, "-m", "karamelo_py.cli", *map(str, arguments)]
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
+    )
+
+
+def read_log(folder):
+    rows = np.loadtxt(folder / "log.mpm", skiprows=1)
+    return rows.T
+
+
+def test_styles_names_the_package(site, tmp_path):
+    done = karamelo_py(site, tmp_path, "styles")
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in done.stdout.splitlines() if "mpm-drag 0.1.0" in line]
+    listed = {line.split()[0]: line for line in lines}
+    assert set(listed) == {"drag", "damp_nodes", "momentum"}
+    assert "Slow points down" in listed["drag"]
+
+
+def test_help_explains_it(site, tmp_path):
+    done = karamelo_py(site, tmp_path, "help", "drag")
+    assert done.returncode == 0, done.stderr
+    assert "fix(ID, drag, group, rate)" in done.stdout
+    assert "from mpm-drag 0.1.0" in done.stdout
+    assert "a number of at least 0" in done.stdout
+
+
+@pytest.mark.parametrize("scheme", ["musl", "usl", "usf"])
+def test_free_flight_under_drag_decays_exponentially(site, tmp_path, scheme):
+    # Exact: p = m v0 exp(-rate t).
+    script = (PLUGIN / "in.drag").read_text()
+    (tmp_path / "in.drag").write_text(script.replace("dimension(", f"scheme({scheme})\ndimension("))
+    done = karamelo_py(site, tmp_path, "in.drag")
+    assert done.returncode == 0, done.stderr
+    step, time, p, lost = read_log(tmp_path)
+    assert step[-1] == 100
+    mass, v0, rate, dt = 3.0, 2.0, 0.5, 0.01
+    np.testing.assert_allclose(p, mass * v0 * np.exp(-rate * time), rtol=1e-9)
+    np.testing.assert_allclose(lost[1:], p[1:] * (exp(rate * dt) - 1), rtol=1e-7)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_both_kinds_of_hook_act_in_one_run(site, tmp_path, compiled):
+    # Exact: each step multiplies the velocity by exp(-rate dt) and by 1 - c dt.
+    script = (PLUGIN / "in.drag").read_text().replace("run(", DAMP + "run(")
+    (tmp_path / "in.both").write_text(script)
+    done = karamelo_py(site, tmp_path, "in.both", compiled=compiled)
+    assert done.returncode == 0, done.stderr
+    step, time, p, force = read_log(tmp_path)
+    np.testing.assert_allclose(p, 6 * np.exp(-0.5 * time) * (1 - 0.25 * 0.01) ** step, rtol=1e-9)
+    np.testing.assert_allclose(force[1:], -0.25 * p[1:] / (1 - 0.0025), rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("fix(air, drag, all, -1)", "argument 2 'rate' must be a number of at least 0"),
+        ("fix(air, drag, all)", "fix(ID, drag, group, rate)"),
+        ("fix(air, dragg, all, 1)", "did you mean 'drag'?"),
+    ],
+)
+def test_mistakes_in_its_arguments_are_marked(site, tmp_path, line, message):
+    script = (PLUGIN / "in.drag").read_text().replace("fix(air, drag, all, rate)", line)
+    (tmp_path / "in.wrong").write_text(script)
+    done = karamelo_py(site, tmp_path, "in.wrong")
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert "in.wrong:11:" in done.stderr
+    assert "Traceback" not in done.stderr
