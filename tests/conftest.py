@@ -14,6 +14,7 @@ from textwrap import dedent
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from karamelo_py.cli import main
 
@@ -21,6 +22,10 @@ TESTS = Path(__file__).parent
 INPUTS = TESTS.parent / "inputs"
 # Numbers of other programs, beside the repository; tests that need them are skipped without.
 REFERENCE = TESTS.parent.parent / "shared" / "reference" / "data"
+
+# No test asserts a time, and a failure is the same in every run.
+settings.register_profile("tests", deadline=None, derandomize=True)
+settings.load_profile("tests")
 
 
 class Table(dict):

@@ -43,7 +43,7 @@ def test_an_objective_rate_changes_the_rebound_by_a_few_per_cent(run_script, kar
     """The points turn a little during the contact; Karamelo leaves their stress behind.
 
     With the stress turned, the rebound comes about 15 ms later; kinetic energy changes by up to
-    6.8 a second then (Karamelo's history), so that is worth up to 0.10 or 3.9 % of the 2.6 at the start.
+    6.8 a second then (Karamelo's history), so 15 ms are worth up to 3.9 % of the 2.6 at the start.
     """
     text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
     assert ", rate=none" in text

@@ -1,0 +1,65 @@
+"""Flat tuples of a kinematics as NumPy matrices (3, 3), and back; strategies for Hypothesis."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+
+from karamelo_py.points.kinematics import Line, PlaneStrain, Space
+
+KINEMATICS = [Line(), PlaneStrain(), Space()]
+# Places of the symmetric components xx yy zz xy xz yz in a matrix.
+SYMMETRIC = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+
+
+def matrix(kin, flat, rest=0.0):
+    """(3, 3) of a tensor; the diagonal out of the kinematics is `rest` (1 for F, 0 for grad v)."""
+    d = kin.dimension
+    out = np.eye(3) * rest
+    out[:d, :d] = np.reshape(flat, (d, d))
+    return out
+
+
+def flat(kin, full):
+    """The components that the kinematics has, of a (3, 3) tensor."""
+    d = kin.dimension
+    return tuple(float(a) for a in full[:d, :d].ravel())
+
+
+def symmetric_matrix(kin, components):
+    """(3, 3) of a symmetric tensor."""
+    out = np.zeros((3, 3))
+    for (i, j), value in zip(SYMMETRIC, components, strict=False):
+        out[i, j] = out[j, i] = value
+    return out
+
+
+def symmetric_flat(kin, full):
+    """The components that the kinematics has, of a symmetric (3, 3) tensor."""
+    count = len(kin.symmetric_names)
+    return tuple(float(full[i, j]) for i, j in SYMMETRIC[:count])
+
+
+def numbers(size, low=-1.0, high=1.0):
+    """Tuples of `size` ordinary numbers (no denormals: their rounding errors are relative to 1)."""
+    one = st.floats(low, high, allow_subnormal=False)
+    return st.tuples(*[one] * size)
+
+
+def tensors(kin, size=1.0):
+    """Tensors such as grad v."""
+    return numbers(kin.tensor_size, -size, size)
+
+
+def symmetric_tensors(kin, size=1.0):
+    """Tensors such as stress."""
+    return numbers(len(kin.symmetric_names), -size, size)
+
+
+def deformations(kin):
+    """F with det F well above 0: the identity and something smaller."""
+    d = kin.dimension
+    unit = np.eye(d).ravel()
+    return numbers(kin.tensor_size, -0.3 / d, 0.3 / d).map(
+        lambda a: tuple(float(x) for x in np.add(unit, a))
+    )
