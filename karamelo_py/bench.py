@@ -154,18 +154,19 @@ def stages(simulation: Simulation, seconds: float) -> dict[str, float]:
     s, scheme = simulation.setup, simulation.hub.update.scheme
     timed = Timed(simulation.mode, {})
     begin(scheme, Fused(), timed, s)
-    _take_step(scheme, timed, s)
+    _take_step(simulation, timed)
     timed.seconds.clear()
     count = 0
     begun = time.perf_counter()
     while count < 3 or (time.perf_counter() - begun < seconds and count < MOST_STEPS):
-        _take_step(scheme, timed, s)
+        _take_step(simulation, timed)
         count += 1
     return {name: total / count for name, total in timed.seconds.items()}
 
 
-def _take_step(scheme: Any, mode: Any, s: Any) -> None:
-    if not step(scheme, Fused(), mode, s, s.hooks, True):
+def _take_step(simulation: Simulation, mode: Any) -> None:
+    s, scheme = simulation.setup, simulation.hub.update.scheme
+    if not step(scheme, Fused(), mode, s, simulation.hooks, True):
         raise ScriptError("a workload went wrong")
     finish(s.control)
 
@@ -207,7 +208,7 @@ def traffic(simulation: Simulation) -> float:
     recorder = _Recorder([])
     control = s.control
     kept = control.values.copy(), control.real.copy(), control.whole.copy()
-    step(scheme, Fused(), recorder, s, s.hooks, True)
+    step(scheme, Fused(), recorder, s, simulation.hooks, True)
     control.values[:], control.real[:], control.whole[:] = kept
     sizes = {name: size for name, _, size in point_fields(s.blocks[0])}
     active = float(np.sum(s.spans[1 : 1 + s.spans[0, 0], 1] - s.spans[1 : 1 + s.spans[0, 0], 0]))

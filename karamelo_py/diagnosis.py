@@ -76,8 +76,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     now = simulation.now
     old, new = block.x[now][p].astype(float), block.x[1 - now][p].astype(float)
     name = _named(hub, simulation, number)
-    above = hub.update.fixed_dt is not None or hub.update.dt_factor > 1
-    smaller = "use a smaller step (set_dt or dt_factor)" if above else "use a smaller dt_factor"
+    smaller = _smaller_step(hub, simulation)
     d = hub.domain.dimension
     if not np.isfinite(old).all():
         return f"{name} has no position (NaN)", f"look for a formula that gives NaN; {smaller}"
@@ -89,6 +88,8 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
     if (new < lo).any() or (new > hi).any():
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
+        if simulation.above_limit():
+            return f"{name} at {_place(old)} is thrown out of the domain", smaller
         return (
             f"{name} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
@@ -105,6 +106,17 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         f"{name} at {_place(old)} is turned inside out (det F <= 0)",
         f"{smaller}, or a finer grid, or a law that resists the compression (neo-hookean)",
     )
+
+
+def _smaller_step(hub: Hub, simulation: Simulation) -> str:
+    """How to take a smaller step, and whether the present one is too large for sure."""
+    if simulation.above_limit():
+        return (
+            f"the step {simulation.dt:.4g} is above the stable limit {simulation.limit:.4g}: "
+            "set_dt to less, or leave set_dt out and dt_factor at 0.9"
+        )
+    fixed = hub.update.fixed_dt is not None
+    return "use a smaller step (set_dt)" if fixed else "use a smaller dt_factor"
 
 
 def _named(hub: Hub, simulation: Simulation, number: int) -> str:

@@ -29,8 +29,12 @@ NODE_NAMES = (
     + ["v" + axis for axis in AXES]
     + ["v" + axis + "_update" for axis in AXES]
     + ["f" + axis for axis in AXES]
-    + ["mass"]
+    + ["mass", "mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez"]
 )
+
+
+# Columns of Karamelo that are always zero here: nothing keeps them apart, or there is none.
+ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez")
 
 
 class Fields:
@@ -162,6 +166,8 @@ class Fields:
             return self.hub.domain.node_positions()[:, AXES.index(name)]
         if name == "mass":
             return mass
+        if name in ABSENT_AT_NODES:
+            return np.zeros(self.node_count)
         axis = AXES.index(name[1])
         if axis >= d:
             return np.zeros(self.node_count)

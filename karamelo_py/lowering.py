@@ -24,7 +24,6 @@ from karamelo_py.state.arrays import (
     Points,
     Setup,
 )
-from karamelo_py.state.hooks import lower_hooks
 from karamelo_py.state.tiles import Tiles
 
 if TYPE_CHECKING:
@@ -94,7 +93,6 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         blocks=lower_blocks(hub, kin, transfer, tiles, real, previous),
         spans=tiles.empty_spans(),
         shape=shape,
-        hooks=lower_hooks(hub),
         control=control,
     )
     return setup, tiles

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from karamelo_py.kernels.step import Fused, Staged
-from karamelo_py.state.arrays import NoHooks
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -77,7 +76,6 @@ def stages(hub: Hub, simulation: Simulation) -> list[str]:
             acting.setdefault(name, []).append(fix.id + once)
     lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
     first = type(hub.update.scheme).stages[0 if visits is Fused else 1]
-    hooks = simulation.setup.hooks
-    if isinstance(hooks, NoHooks) and not lines:
+    if not lines:
         lines = ["no fix acts between them"]
     return [*first, *lines]

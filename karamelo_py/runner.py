@@ -65,7 +65,8 @@ class Runner:
             simulation.begin(self.end_time)
             report(hub, simulation)
             raise Quit
-        self._run(simulation)
+        with self._telling_of_compilation():
+            self._run(simulation)
 
     def _check_condition(self) -> None:
         names = self.condition.names if self.condition is not None else frozenset()
@@ -89,7 +90,7 @@ class Runner:
             hub.output.begin(self)
         hub.console.begin_run(simulation.step, 0.0)
         try:
-            with self._interruptible(), self._telling_of_compilation():
+            with self._interruptible():
                 self._loop(simulation, first_step, first_time)
             with self._timed("output"):
                 hub.console.end_run()

@@ -40,6 +40,8 @@ from karamelo_py.state.arrays import (
     TIME,
     TIMESTEP,
     WATCH_LIMIT,
+    Hooks,
+    NoHooks,
     Setup,
 )
 
@@ -77,14 +79,14 @@ class PythonHooks:
 
 @at_nodes.on(PythonHooks)
 def _(hooks, stage, target, s):
-    at_nodes(s.hooks, stage, target, s)
+    at_nodes(hooks.simulation.hooks, stage, target, s)
     for fix, hook in hooks.by_stage.get(stage, ()):
         hook(NodesView(s, fix.group, stage, before_update=target == ON_VELOCITY))
 
 
 @at_points.on(PythonHooks)
 def _(hooks, stage, then, s):
-    at_points(s.hooks, stage, then, s)
+    at_points(hooks.simulation.hooks, stage, then, s)
     for fix, hook in hooks.by_stage.get(stage, ()):
         view = PointsView(hooks.simulation, fix.group, bool(then))
         hook(view)
@@ -111,6 +113,7 @@ class Simulation:
         self.version = 0  # grows when fields change without a step
         self._begun: set[str] = set()
         self.staged = False
+        self.hooks: Hooks | NoHooks = NoHooks()
 
     # --- fields by id -------------------------------------------------------------------------
 
@@ -187,16 +190,16 @@ class Simulation:
             numba.set_num_threads(self.threads)
         update = self.hub.update
         control = self.setup.control
-        self.setup = self.setup._replace(hooks=lower_hooks(self.hub))
+        self.hooks = lower_hooks(self.hub)
         control.real[FIXED_DT] = update.fixed_dt or 0.0
         control.real[DT_FACTOR] = update.dt_factor
         control.real[END_TIME] = end_time
         control.whole[OVER_LIMIT] = 0
+        self._prepare_hooks()
         measure(self.setup)
         choose_dt(self.setup.control)
         control.whole[WATCH_LIMIT] = int(not self.above_limit())
         control.whole[OVER_LIMIT] = 0
-        self._prepare_hooks()
         if control.real[DRIFT] > control.real[DRIFT_LIMIT]:
             self.tiles.sort(self.setup, self.mode)
 
@@ -246,7 +249,7 @@ class Simulation:
         if self._python.by_stage:
             return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
         visits = Staged() if self.staged else Fused()
-        return advance(scheme, visits, self.mode, self.setup, self.setup.hooks, count)
+        return advance(scheme, visits, self.mode, self.setup, self.hooks, count)
 
     def _prepare_hooks(self) -> None:
         """Sort the fixes by how they act: once before the first step, from Python, compiled."""

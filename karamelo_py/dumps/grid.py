@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from karamelo_py.dumps.lammps import LammpsDump
+from karamelo_py.fields import ABSENT_AT_NODES
 from karamelo_py.signature import OutputFile, Positive
 
 if TYPE_CHECKING:
@@ -28,8 +29,8 @@ class Grid(LammpsDump):
         File name. The first ``*`` becomes the step number; without ``*`` all snapshots follow each
         other in one file.
     columns
-        What to write of each node: x y z (position), vx vy vz (velocity), bx by bz (external
-        force), mass and so on. ``x, y, z`` by default.
+        What to write of each node: x y z (position), vx vy vz (velocity), vx_update ... (velocity
+        after the momentum update), fx fy fz (force), mass. ``x, y, z`` by default.
     occupied
         true: leave out nodes without mass, which makes the files of a large and sparsely filled
         domain small.
@@ -48,6 +49,12 @@ class Grid(LammpsDump):
         occupied: bool = False,
     ):
         super().__init__(hub, every, file, *columns)
+        absent = [name for name in columns if name in ABSENT_AT_NODES]
+        if absent:
+            hub.warn(
+                f"dump grid: {', '.join(absent)} will be 0: nodes do not keep it",
+                hint="fx, fy, fz are the total nodal forces",
+            )
         self.occupied = occupied
         self._rows: np.ndarray | slice = slice(None)
 

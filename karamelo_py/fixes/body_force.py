@@ -43,6 +43,8 @@ class BodyForce(Fix):
     force_nodes
     """
 
+    syntax = "group, bx[, by[, bz]]"
+
     post_particles_to_grid = node_hook(accelerate)
 
     def __init__(self, hub: Hub, group: NodeGroup, *acceleration: Expression | None):

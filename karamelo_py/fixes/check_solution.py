@@ -36,6 +36,8 @@ class CheckSolution(Fix):
     far; and ID_z = sqrt(ID_x / ID_y), the relative error of the whole history.
     """
 
+    syntax = "group, ux[, uy[, uz]]"
+
     def __init__(self, hub: Hub, group: ParticleGroup, *displacement: Expression | None):
         super().__init__(hub)
         self.group = group

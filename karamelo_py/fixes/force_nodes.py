@@ -42,6 +42,8 @@ class ForceNodes(Fix):
     body_force
     """
 
+    syntax = "group, fx[, fy[, fz]]"
+
     post_particles_to_grid = node_hook(push, shares=True)
 
     def __init__(self, hub: Hub, group: NodeGroup, *force: Expression | None):

@@ -33,6 +33,8 @@ class InitialVelocityNodes(Fix):
     initial_velocity_particles
     """
 
+    syntax = "group, vx[, vy[, vz]]"
+
     first_step_only = True
 
     def __init__(self, hub: Hub, group: NodeGroup, *velocity: Expression | None):

@@ -34,6 +34,8 @@ class InitialVelocityParticles(Fix):
     initial_velocity_nodes, velocity_particles
     """
 
+    syntax = "group, vx[, vy[, vz]]"
+
     first_step_only = True
 
     def __init__(self, hub: Hub, group: ParticleGroup, *velocity: Expression | None):

@@ -49,6 +49,8 @@ class VelocityNodes(Fix):
     velocity_particles, initial_velocity_nodes
     """
 
+    syntax = "group, vx[, vy[, vz]]"
+
     post_update_grid_state = node_hook(prescribe, uses_before=True)
     post_velocities_to_grid = node_hook(hold, publishes=False)
 

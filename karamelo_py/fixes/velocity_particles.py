@@ -47,6 +47,8 @@ class VelocityParticles(Fix):
     velocity_nodes, initial_velocity_particles
     """
 
+    syntax = "group, vx[, vy[, vz]]"
+
     initial_integrate = point_hook(start, uses_before=True)
     post_advance_particles = point_hook(carry, publishes=True)
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 from llvmlite import ir
 from numba import cfunc, config, types
 from numba.extending import intrinsic
@@ -102,7 +103,7 @@ def _evaluate(hooks, h, component, count, control, out, shift):
     program = Program(hooks.code[row[0] : row[1]], hooks.constants[row[2] : row[3]])
     time = control.values[TIME]
     control.values[TIME] = time + shift
-    evaluate(program, control.values, where, count, hooks.scratch[out], stack)
+    evaluate(program, control.values, where, count, out, stack)
     control.values[TIME] = time
 
 
@@ -132,9 +133,9 @@ def _apply_at_nodes(target, kin, basis, nodes, shape, hooks, control, dt, h, cou
     for c in range(d):
         if hooks.table[h, CODE + 4 * c] < 0:
             continue
-        _evaluate(hooks, h, c, count, control, VALUE, 0.0)
+        _evaluate(hooks, h, c, count, control, hooks.scratch[VALUE], 0.0)
         if hooks.table[h, USES_BEFORE]:
-            _evaluate(hooks, h, c, count, control, BEFORE, -dt)
+            _evaluate(hooks, h, c, count, control, hooks.scratch[BEFORE], -dt)
         total = 0.0
         for q in range(count):
             n = hooks.chosen[q]
@@ -188,7 +189,7 @@ def node_hooks(stage, target, kin, basis, nodes, shape, spans, hooks, control, d
             if counting and not hooks.table[h, USES_SHARE]:
                 continue
             heavy = 0
-            count = 0
+            count = np.int64(0)  # a bare 0 would be a type of its own
             begin = hooks.table[h, FROM]
             everything = begin < 0
             ranges = spans[0, 0] if everything else 1
@@ -208,7 +209,7 @@ def node_hooks(stage, target, kin, basis, nodes, shape, spans, hooks, control, d
                         _apply_at_nodes(
                             target, kin, basis, nodes, shape, hooks, control, dt, h, count, share
                         )
-                        count = 0
+                        count = np.int64(0)
             if counting:
                 share = 1.0 / max(heavy, 1)
             elif count > 0:
@@ -230,9 +231,9 @@ def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y):
     for c in range(d):
         if hooks.table[h, CODE + 4 * c] < 0:
             continue
-        _evaluate(hooks, h, c, count, control, VALUE, 0.0)
+        _evaluate(hooks, h, c, count, control, hooks.scratch[VALUE], 0.0)
         if hooks.table[h, USES_BEFORE]:
-            _evaluate(hooks, h, c, count, control, BEFORE, -dt)
+            _evaluate(hooks, h, c, count, control, hooks.scratch[BEFORE], -dt)
         total = 0.0
         for q in range(count):
             p = hooks.chosen[q]
@@ -271,7 +272,7 @@ def point_hooks(stage, kin, v, mass, ids, hooks, control, dt, x, y):
     for h in range(len(hooks.table)):
         if hooks.table[h, STAGE] != stage:
             continue
-        count = 0
+        count = np.int64(0)
         begin = hooks.table[h, FROM]
         for p in range(mass.size):
             if begin >= 0 and hooks.members[begin + ids[p]] == 0:
@@ -280,6 +281,6 @@ def point_hooks(stage, kin, v, mass, ids, hooks, control, dt, x, y):
             count += 1
             if count == BLOCK:
                 _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y)
-                count = 0
+                count = np.int64(0)
         if count > 0:
             _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y)

@@ -104,5 +104,4 @@ class Setup(NamedTuple):
     blocks: tuple  # of Block, one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
     shape: tuple  # (3,) nodes per direction
-    hooks: Hooks | NoHooks
     control: Control
