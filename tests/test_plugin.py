@@ -13,6 +13,32 @@ import pytest
 
 PLUGIN = Path(__file__).parent / "plugin"
 
+# One period of the first mode of a bar with fixed ends.
+VIBRATION = """
+L = 10
+E = 100
+rho = 4
+c = sqrt(E/rho)
+method(ulmpm, FLIP, linear, 1)
+dimension(1, 0, L, 0.5)
+region(bar, block, 0, L)
+material(m, {law})
+solid(bar, region, bar, 2, m, 0.5)
+region(left, block, -INF, 0)
+region(right, block, L, INF)
+group(left, nodes, region, left, all)
+group(right, nodes, region, right, all)
+fix(left, velocity_nodes, left, 0)
+fix(right, velocity_nodes, right, 0)
+fix(mode, initial_velocity_particles, all, 0.001*c*sin(PI*x0/L))
+compute(Ek, kinetic_energy, all)
+compute(Es, strain_energy, all)
+log_modify(custom, time, Ek, Es)
+set_dt(0.02)
+set_output(10)
+run_time(2*L/c)
+"""
+
 # What the example script leaves out: the fix whose hook is compiled.
 DAMP = """
 fix(settle, damp_nodes, all, 0.25 + 0*time)
@@ -66,7 +92,7 @@ def test_styles_names_the_package(site, tmp_path):
     assert done.returncode == 0, done.stderr
     lines = [line for line in done.stdout.splitlines() if "mpm-drag 0.1.0" in line]
     listed = {line.split()[0]: line for line in lines}
-    assert set(listed) == {"drag", "damp_nodes", "momentum"}
+    assert set(listed) == {"drag", "damp_nodes", "momentum", "elastic-fluid"}
     assert "Slow points down" in listed["drag"]
 
 
@@ -120,3 +146,20 @@ def test_mistakes_in_its_arguments_are_marked(site, tmp_path, line, message):
     assert message in done.stderr
     assert "in.wrong:11:" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_the_material_is_a_linear_one_at_small_strain(site, tmp_path):
+    # In one dimension both laws are sigma = E du/dx; the exact period is 2 L / c = 4.
+    logs = []
+    for number, law in enumerate(("elastic-fluid, rho, E", "linear, rho, E, 0")):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "in.bar").write_text(VIBRATION.replace("{law}", law))
+        done = karamelo_py(site, folder, "in.bar")
+        assert done.returncode == 0, done.stderr
+        logs.append(read_log(folder))
+    (time, kinetic, stored), (_, reference, stored_reference) = logs
+    start = kinetic[0]
+    np.testing.assert_allclose(kinetic, reference, atol=0.002 * start)
+    np.testing.assert_allclose(stored, stored_reference, atol=0.002 * start)
+    np.testing.assert_allclose(kinetic, start * np.cos(np.pi * time / 2) ** 2, atol=0.05 * start)
