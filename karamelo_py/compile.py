@@ -1,4 +1,4 @@
-"""How the package compiles: one cache folder per state of the sources, one decorator for point functions.
+"""How the package compiles: a cache folder for each state of the sources, point functions.
 
 Numba does not notice when a function in *another* file changes, so the folder of its on-disk cache
 is named by a hash of every source that can end up in a kernel: this package's and every plug-in's.
@@ -88,11 +88,13 @@ def kernel(function: Callable | None = None, **options: Any) -> Callable:
     """
     if function is None:
         return lambda f: kernel(f, **options)
-    return njit(cache=True, nogil=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options)(function)
+    return njit(
+        cache=True, nogil=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options
+    )(function)
 
 
 def shared(function: Callable) -> Callable:
-    """A helper of point functions that needs no choice by type: plain Python, and itself in kernels."""
+    """Mark a helper of point functions that needs no choice by type: kernels may call it."""
     overload(function, _INLINED, strict=False)(lambda *arguments: function)
     return function
 

@@ -50,9 +50,7 @@ def stop(
         message = f"step {step + 1}, time {time:.6g}: {message}"
         _write_last_good(hub)
     name = LAST_GOOD.replace("*", str(simulation.step))
-    raise ScriptError(
-        message, place=place, hint=f"{hint}. The last good state is in {name}"
-    )
+    raise ScriptError(message, place=place, hint=f"{hint}. The last good state is in {name}")
 
 
 def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""Fields of points and nodes for output, in the order of their ids, whatever the order in memory."""
+"""Fields of points and nodes for output, in the order of their ids."""
 
 from __future__ import annotations
 
@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from karamelo_py.kernels.export import ENERGY, EXPORTED, JACOBIAN, STRAIN, export_energy, export_state
+from karamelo_py.kernels.export import (
+    ENERGY,
+    EXPORTED,
+    JACOBIAN,
+    STRAIN,
+    export_energy,
+    export_state,
+)
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub

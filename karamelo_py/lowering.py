@@ -1,7 +1,7 @@
 """Lowering: the scene becomes the smallest set of arrays and tags that can run it.
 
-Read once at the start of every run: kinematics, basis, transfer, scheme, laws and fixes decide which
-fields exist (`karamelo-py check` prints them) and, by their types, what is compiled.
+Read once at the start of every run: kinematics, basis, transfer, scheme, laws and fixes decide
+which fields exist (`karamelo-py check` prints them) and, by their types, what is compiled.
 """
 
 from __future__ import annotations
@@ -123,7 +123,9 @@ def lower_block(solids, kin, transfer, tiles: Tiles, real: type, previous: State
     d = kin.dimension
     materials = list({id(s.material): s.material for s in solids}.values())
     law = type(materials[0].law)
-    laws = law(*(np.array(column, real) for column in zip(*(m.law for m in materials), strict=True)))
+    laws = law(
+        *(np.array(column, real) for column in zip(*(m.law for m in materials), strict=True))
+    )
     x0 = np.concatenate([s.x0 for s in solids])
     n = len(x0)
     ids = np.concatenate([np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids])

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.group import ParticleGroup
 from karamelo_py.state.arrays import (
     FINAL_INTEGRATE,
     INITIAL_INTEGRATE,
@@ -115,13 +116,13 @@ class Fix:
 
 
 class Compute:
-    """Base of all computes: measures its `group` when the log or a dump is written."""
+    """Base of all computes: measures its `group` of points when the log is written."""
 
-    group: Any = None
     id: str = ""
 
-    def __init__(self, hub: Hub):
+    def __init__(self, hub: Hub, group: ParticleGroup):
         self.hub = hub
+        self.group = group
 
     publish = Fix.publish
     publish_components = Fix.publish_components
@@ -164,7 +165,11 @@ class NodesView:
         """(n, 3) positions of the nodes."""
         places = np.stack(np.unravel_index(self.index, self._shape), axis=1)
         used = np.arange(3) < self._d
-        return np.where(used, np.array([self._basis.x0, self._basis.y0, self._basis.z0]) + places * self._basis.h, 0.0)
+        return np.where(
+            used,
+            np.array([self._basis.x0, self._basis.y0, self._basis.z0]) + places * self._basis.h,
+            0.0,
+        )
 
     @property
     def mass(self) -> np.ndarray:

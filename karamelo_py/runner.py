@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
-
 from karamelo_py import diagnosis
 from karamelo_py.lowering import check_scene
 from karamelo_py.script.errors import Quit, ScriptError
@@ -129,7 +128,9 @@ class Runner:
                 if simulation.step < last_step and simulation.time < self.end_time:
                     output.write()
                 hub.console.progress(
-                    simulation.step, simulation.time, self._fraction(simulation, first_step, first_time)
+                    simulation.step,
+                    simulation.time,
+                    self._fraction(simulation, first_step, first_time),
                 )
 
     def _goes_on(self) -> bool:
@@ -210,7 +211,9 @@ class Runner:
     def _banner(self, simulation: Simulation) -> None:
         hub = self.hub
         update = hub.update
-        parameters = ", ".join(f"{name} {value:g}" for name, value in update.transfer._asdict().items())
+        parameters = ", ".join(
+            f"{name} {value:g}" for name, value in update.transfer._asdict().items()
+        )
         method = " ".join(
             [
                 type(update.method).__name__.lower(),

@@ -25,7 +25,6 @@ from karamelo_py.kernels.sweep import Serial, Threaded
 from karamelo_py.lowering import State, lower, thread_count
 from karamelo_py.modify import POINT_STAGES, STAGES, CompiledHook, NodesView, PointsView
 from karamelo_py.points.materials import with_stress
-from karamelo_py.state.hooks import lower_hooks
 from karamelo_py.state.arrays import (
     DRIFT,
     DRIFT_LIMIT,
@@ -42,8 +41,8 @@ from karamelo_py.state.arrays import (
     WATCH_LIMIT,
     Hooks,
     NoHooks,
-    Setup,
 )
+from karamelo_py.state.hooks import lower_hooks
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub

@@ -37,8 +37,7 @@ class AngularMomentum(Compute):
     def __init__(
         self, hub: Hub, group: ParticleGroup, cx: float = 0.0, cy: float = 0.0, cz: float = 0.0
     ):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.centre = np.array([cx, cy, cz])
 
     def refresh(self) -> None:

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from karamelo_py.group import ParticleGroup
 from karamelo_py.modify import Compute
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
 
 
 class StrainEnergy(Compute):
@@ -28,10 +22,6 @@ class StrainEnergy(Compute):
     --------
     kinetic_energy
     """
-
-    def __init__(self, hub: Hub, group: ParticleGroup):
-        super().__init__(hub)
-        self.group = group
 
     def refresh(self) -> None:
         """Measure and publish."""

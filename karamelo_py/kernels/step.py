@@ -11,8 +11,15 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compile import kernel, over_blocks, point_function, real, shared
-from karamelo_py.kernels.hooks import clear_point_totals, node_hooks, point_hooks
-from karamelo_py.kernels.sweep import sweep_tiles
+from karamelo_py.kernels.hooks import (
+    ON_SUMS,
+    ON_UPDATE,
+    clear_point_totals,
+    node_hooks,
+    point_hooks,
+)
+from karamelo_py.kernels.stages import ClearSums, Nothing, Update, Velocity
+from karamelo_py.kernels.sweep import sweep_nodes, sweep_tiles
 from karamelo_py.points.basis import inside
 from karamelo_py.points.kinematics import largest_component, vector_at
 from karamelo_py.points.materials import initial_state, wave_speed_squared
@@ -27,6 +34,10 @@ from karamelo_py.state.arrays import (
     NEW_RATE,
     NOW,
     OVER_LIMIT,
+    POST_ADVANCE_PARTICLES,
+    POST_GRID_TO_POINT,
+    POST_PARTICLES_TO_GRID,
+    POST_UPDATE_GRID_STATE,
     RATE,
     SPACING,
     TIME,
@@ -228,7 +239,37 @@ def _(hooks, stage, then, s):
     hook_points(s, hooks, stage, now, 1 - now if then else now)
 
 
+# --- stages that schemes share ----------------------------------------------------------------
+
+
+@shared
+def map_to_nodes(s, mode, scatter):
+    """Fresh sums on the nodes, from the positions now; whether all points are on the grid."""
+    dt = step_size(s)
+    sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
+    return sweep_here(s, mode, Nothing(), scatter, dt)
+
+
+@shared
+def update_nodes(s, mode, hooks):
+    """v* = v + dt f / m, with what the fixes add and prescribe."""
+    at_nodes(hooks, POST_PARTICLES_TO_GRID, ON_SUMS, s)
+    sweep_nodes(mode, Update(), s.kin, s.nodes, s.spans, step_size(s))
+    at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_UPDATE, s)
+
+
+@shared
+def move_points(s, mode, hooks):
+    """New velocities and positions, stage by stage; whether all points are on the grid."""
+    if not sweep(s, mode, Velocity(), Nothing(), step_size(s)):
+        return False
+    at_points(hooks, POST_GRID_TO_POINT, 1, s)
+    at_points(hooks, POST_ADVANCE_PARTICLES, 1, s)
+    return check_moves(s)
+
+
 # --- loop -------------------------------------------------------------------------------------
+
 
 @point_function(tags=2)
 def begin(scheme, visits, mode, s):

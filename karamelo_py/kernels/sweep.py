@@ -34,7 +34,9 @@ class Threaded(NamedTuple):
 
 
 @kernel
-def sweep_tile(gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x_all, y_all, dt, t):
+def sweep_tile(
+    gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x_all, y_all, dt, t
+):
     """Visit the points of the t-th occupied tile of a block."""
     furthest = dt - dt
     fastest = dt - dt
@@ -73,7 +75,9 @@ def _tiles_serial(gather, scatter, kin, basis, transfer, nodes, points, laws, ti
 def _tiles_threaded(gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt):
     for c in range(tiling.colour.size - 1):
         for t in prange(tiling.colour[c], tiling.colour[c + 1]):
-            sweep_tile(gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt, t)
+            sweep_tile(
+                gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt, t
+            )
 
 
 @point_function()

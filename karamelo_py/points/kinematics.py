@@ -432,19 +432,16 @@ def zero_tensor(kin, like):
     return scale(real(0, like), identity(kin, like))
 
 
-
 @shared
 def zero_symmetric(kin, like):
     """The zero of symmetric tensors such as stress, in the number type of `like`."""
     return symmetric_part(kin, zero_tensor(kin, like))
 
 
-
 @shared
 def trace(s):
     """s_xx + s_yy + s_zz of a symmetric tensor."""
     return s[0] + s[1] + s[2]
-
 
 
 @point_function()

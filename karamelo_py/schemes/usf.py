@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from karamelo_py.compile import shared
-from karamelo_py.kernels.hooks import ON_SUMS, ON_UPDATE, ON_VELOCITY
+from karamelo_py.kernels.hooks import ON_VELOCITY
 from karamelo_py.kernels.stages import (
     ClearSums,
     Force,
@@ -13,7 +13,6 @@ from karamelo_py.kernels.stages import (
     MassMomentum,
     Nothing,
     SumsToVelocity,
-    Update,
     Velocity,
 )
 from karamelo_py.kernels.step import (
@@ -22,19 +21,17 @@ from karamelo_py.kernels.step import (
     at_nodes,
     at_points,
     begin,
-    check_moves,
+    map_to_nodes,
+    move_points,
     step,
     step_size,
     sweep,
-    sweep_here,
+    update_nodes,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
 from karamelo_py.state.arrays import (
     FINAL_INTEGRATE,
     INITIAL_INTEGRATE,
-    POST_ADVANCE_PARTICLES,
-    POST_GRID_TO_POINT,
-    POST_PARTICLES_TO_GRID,
     POST_UPDATE_GRID_STATE,
 )
 
@@ -50,39 +47,42 @@ class USF(NamedTuple):
     """
 
     stages = (
-        ("nodal velocity", "stress and force in one visit of the points", "update v*", "g2p, move, p2g in one visit"),
+        (
+            "nodal velocity",
+            "stress and force in one visit of the points",
+            "update v*",
+            "g2p, move, p2g in one visit",
+        ),
         ("p2g mass and momentum", "nodal velocity", "stress and force", "update v*", "g2p, move"),
     )
 
 
 @begin.on(USF, Fused)
 def _(scheme, visits, mode, s):
-    sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, step_size(s))
-    sweep_here(s, mode, Nothing(), MassMomentum(), step_size(s))
+    map_to_nodes(s, mode, MassMomentum())
+
+
+@shared
+def _stress_first(s, mode, hooks):
+    """From the momentum on the nodes to v*, by way of the stress."""
+    dt = step_size(s)
+    sweep_nodes(mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
+    at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_VELOCITY, s)
+    if not sweep(s, mode, Gradient(), Force(), dt):
+        return False
+    update_nodes(s, mode, hooks)
+    return True
 
 
 @step.on(USF, Fused)
 def _(scheme, visits, mode, s, hooks, more):
     dt = step_size(s)
-    if not _stress_first(s, mode, hooks, dt):
+    if not _stress_first(s, mode, hooks):
         return False
     if not more:
         return sweep(s, mode, Velocity(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
     return sweep(s, mode, Velocity(), MassMomentum(), dt)
-
-
-@shared
-def _stress_first(s, mode, hooks, dt):
-    """From the momentum on the nodes to v*, by way of the stress."""
-    sweep_nodes(mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
-    at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_VELOCITY, s)
-    if not sweep(s, mode, Gradient(), Force(), dt):
-        return False
-    at_nodes(hooks, POST_PARTICLES_TO_GRID, ON_SUMS, s)
-    sweep_nodes(mode, Update(), s.kin, s.nodes, s.spans, dt)
-    at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_UPDATE, s)
-    return True
 
 
 @begin.on(USF, Staged)
@@ -92,18 +92,10 @@ def _(scheme, visits, mode, s):
 
 @step.on(USF, Staged)
 def _(scheme, visits, mode, s, hooks, more):
-    dt = step_size(s)
     at_points(hooks, INITIAL_INTEGRATE, 0, s)
-    sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    if not sweep_here(s, mode, Nothing(), MassMomentum(), dt):
+    if not map_to_nodes(s, mode, MassMomentum()):
         return False
-    if not _stress_first(s, mode, hooks, dt):
-        return False
-    if not sweep(s, mode, Velocity(), Nothing(), dt):
-        return False
-    at_points(hooks, POST_GRID_TO_POINT, 1, s)
-    at_points(hooks, POST_ADVANCE_PARTICLES, 1, s)
-    if not check_moves(s):
+    if not _stress_first(s, mode, hooks) or not move_points(s, mode, hooks):
         return False
     at_points(hooks, FINAL_INTEGRATE, 1, s)
     return True

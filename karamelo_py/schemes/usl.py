@@ -4,37 +4,30 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.kernels.hooks import ON_SUMS, ON_UPDATE
 from karamelo_py.kernels.stages import (
     ClearSums,
     Everything,
     Gradient,
     Nothing,
-    Update,
     UpdateToVelocity,
-    Velocity,
     VelocityAndGradient,
 )
 from karamelo_py.kernels.step import (
     Fused,
     Staged,
-    at_nodes,
     at_points,
     begin,
-    check_moves,
+    map_to_nodes,
+    move_points,
     step,
     step_size,
     sweep,
-    sweep_here,
+    update_nodes,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
 from karamelo_py.state.arrays import (
     FINAL_INTEGRATE,
     INITIAL_INTEGRATE,
-    POST_ADVANCE_PARTICLES,
-    POST_GRID_TO_POINT,
-    POST_PARTICLES_TO_GRID,
-    POST_UPDATE_GRID_STATE,
 )
 
 
@@ -57,16 +50,13 @@ class USL(NamedTuple):
 
 @begin.on(USL, Fused)
 def _(scheme, visits, mode, s):
-    sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, step_size(s))
-    sweep_here(s, mode, Nothing(), Everything(), step_size(s))
+    map_to_nodes(s, mode, Everything())
 
 
 @step.on(USL, Fused)
 def _(scheme, visits, mode, s, hooks, more):
     dt = step_size(s)
-    at_nodes(hooks, POST_PARTICLES_TO_GRID, ON_SUMS, s)
-    sweep_nodes(mode, Update(), s.kin, s.nodes, s.spans, dt)
-    at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_UPDATE, s)
+    update_nodes(s, mode, hooks)
     if not more:
         return sweep(s, mode, VelocityAndGradient(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
@@ -82,18 +72,11 @@ def _(scheme, visits, mode, s):
 def _(scheme, visits, mode, s, hooks, more):
     dt = step_size(s)
     at_points(hooks, INITIAL_INTEGRATE, 0, s)
-    sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    if not sweep_here(s, mode, Nothing(), Everything(), dt):
+    if not map_to_nodes(s, mode, Everything()):
         return False
-    at_nodes(hooks, POST_PARTICLES_TO_GRID, ON_SUMS, s)
-    sweep_nodes(mode, Update(), s.kin, s.nodes, s.spans, dt)
-    at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_UPDATE, s)
+    update_nodes(s, mode, hooks)
     sweep_nodes(mode, UpdateToVelocity(), s.kin, s.nodes, s.spans, dt)
-    if not sweep(s, mode, Velocity(), Nothing(), dt):
-        return False
-    at_points(hooks, POST_GRID_TO_POINT, 1, s)
-    at_points(hooks, POST_ADVANCE_PARTICLES, 1, s)
-    if not check_moves(s):
+    if not move_points(s, mode, hooks):
         return False
     if not sweep(s, mode, Gradient(), Nothing(), dt):
         return False

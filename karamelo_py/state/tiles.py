@@ -75,7 +75,7 @@ class Tiles:
         )
 
     def sort(self, s: Setup, mode: Any) -> None:
-        """Sort all points by tile and find the nodes in use; the sums of all nodes are zero then."""
+        """Sort all points by tile and find the nodes in use; all sums are zero then."""
         sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, step_size(s))
         self.used[:] = 0
         for block in s.blocks:
@@ -128,9 +128,7 @@ class Tiles:
             # Each line of tiles holds `size` rows in every direction across it.
             nodes = (place[:, None] * self.size + np.arange(self.size)).ravel()
             inside = nodes < self.nodes[axis]
-            row, begin, end = (
-                np.repeat(values, self.size)[inside] for values in (row, begin, end)
-            )
+            row, begin, end = (np.repeat(values, self.size)[inside] for values in (row, begin, end))
             row = row * self.nodes[axis] + nodes[inside]
             for later in range(axis + 1, len(line)):
                 line[later] = np.repeat(line[later], self.size)[inside]
