@@ -1,0 +1,44 @@
+"""Small scenes for tests of the engine, as scripts."""
+
+from __future__ import annotations
+
+TRANSFERS = {
+    "PIC": "PIC, linear",
+    "FLIP": "FLIP, linear, 1",
+    "FLIP 0.9": "FLIP, linear, 0.9",
+    "APIC": "APIC, linear",
+}
+SCHEMES = ["musl", "usl", "usf"]
+LAWS = {
+    "linear": "linear, 2, 100, 0.3",
+    "rate=none": "linear, 2, 100, 0.3, rate=none",
+    "neo-hookean": "neo-hookean, 2, 100, 0.3",
+    "soft": "linear, 2, 1, 0.3",
+}
+H = 0.1
+
+
+def block(
+    d: int,
+    *lines: str,
+    transfer: str = "FLIP",
+    scheme: str = "musl",
+    law: str = "linear",
+    ppc: int = 2,
+    size: tuple[float, ...] = (0.3, 0.2, 0.1),
+) -> str:
+    """A block of `size` with its lower corner at 0.3 in a domain of side 1.2, and more `lines`.
+
+    E = 100, nu = 0.3, rho = 2; cells of 0.1 with `ppc` points per direction.
+    """
+    domain = ", ".join(["0, 1.2"] * d)
+    extent = ", ".join(f"0.3, {0.3 + size[k]}" for k in range(d))
+    head = [
+        f"method(ulmpm, {TRANSFERS[transfer]})",
+        f"scheme({scheme})",
+        f"dimension({d}, {domain}, {H})",
+        f"region(box, block, {extent})",
+        f"material(rubber, {LAWS[law]})",
+        f"solid(body, region, box, {ppc}, rubber, {H}, 0)",
+    ]
+    return "\n".join([*head, *lines]) + "\n"
