@@ -1,0 +1,170 @@
+"""README, documentation and docstrings: what they show is right."""
+
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from karamelo_py import catalogue, registry
+from karamelo_py.hub import Hub
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.functions import FUNCTIONS
+from karamelo_py.script.interpreter import Interpreter
+from karamelo_py.script.parser import parse
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+STYLES = [(f, n) for f in catalogue.families() for n in registry.names(f)]
+# Scenes on which the examples of docstrings are tried: domain, the region "disk", a wall.
+STAGES = {
+    1: ("1, 0, 100, 1", "block, 1, 9", "block, 0, 5"),
+    2: ("2, -1, 1, -1, 1, 0.1", "cylinder, 0, 0, 0.3", "block, -1, 0, -1, 1"),
+    3: ("3, -1, 1, -1, 1, -1, 1, 0.1", "sphere, 0, 0, 0, 0.3", "block, -1, 0, -1, 1, -1, 1"),
+}
+
+
+def blocks(path, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", path.read_text("utf-8"), re.S | re.M)
+
+
+SNIPPETS = [(page, block) for page in PAGES for block in blocks(page, "karamelo")]
+
+
+@pytest.mark.parametrize(
+    ("page", "snippet"), SNIPPETS, ids=[f"{p.name}-{k}" for k, (p, _) in enumerate(SNIPPETS)]
+)
+def test_snippets_of_pages_parse_and_name_what_exists(page, snippet):
+    for statement in parse(snippet, page.name):
+        name = getattr(statement, "name", None)
+        if name and hasattr(statement, "arguments"):
+            assert registry.knows("command", name), name
+            family = {"fix": "fix", "compute": "compute", "region": "region", "dump": "dump"}
+            words = [argument.code.strip() for argument in statement.arguments]
+            if name in family:
+                style = words[2 if name == "dump" else 1]
+                assert registry.knows(name, style), style
+
+
+def test_readme_tells_the_whole_script():
+    """The tour of README, put together, is inputs/in.two_disks without its comments."""
+    tour = "".join(blocks(ROOT / "README.md", "karamelo"))
+    script = (ROOT / "inputs" / "in.two_disks").read_text("utf-8")
+
+    def statements(text):
+        lines = (re.sub(r"\s+", " ", line.partition("#")[0]).strip() for line in text.splitlines())
+        return [line for line in lines if line]
+
+    assert statements(tour) == statements(script)
+
+
+def test_every_function_is_in_the_language_page():
+    page = (ROOT / "docs" / "script.md").read_text("utf-8")
+    table = page[page.index("## Functions") : page.index("## Commands")]
+    named = set(re.findall(r"\b[a-z]\w+\b", table))
+    assert set(FUNCTIONS) <= named
+
+
+def test_links_of_pages_lead_somewhere():
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#:]+?)(?:#[^)]*)?\)", page.read_text("utf-8")):
+            generated = re.search(r"reference/generated/([^/]+)/(.+)\.md$", target)
+            if generated:
+                assert registry.knows(generated[1], generated[2].replace("-gz", "/gz")), target
+            else:
+                assert (page.parent / target).exists() or "generated/" in target, (page, target)
+
+
+@pytest.mark.parametrize(("family", "name"), STYLES, ids=[f"{f}-{n}" for f, n in STYLES])
+def test_every_style_is_documented(family, name):
+    help_ = catalogue.help_of(family, name)
+    assert help_.summary.endswith("."), help_.summary
+    assert help_.example, "an example"
+    for parameter in help_.parameters:
+        assert parameter.description, f"{parameter.name} is not described"
+    assert parse(help_.example, f"the example of {name}")
+    for title in help_.sections:
+        assert title in ("Example", "Notes", "See Also", "Raises"), title
+
+
+def _scene(dimension, folder):
+    """A scene in `dimension` dimensions that is only tried: it runs and writes nothing."""
+    hub = Hub()
+    hub.console.quiet = True
+    hub.folder = folder
+    hub.rehearsing = True
+    interpreter = Interpreter(hub)
+    domain, disk, wall = STAGES[dimension]
+    interpreter.run_text(
+        f"method(ulmpm, FLIP, linear, 1)\ndimension({domain})\nregion(disk, {disk})\n"
+        f"region(wall, {wall})\nmaterial(steel, linear, 1000, 1000, 0.3)\n"
+        f"solid(s1, region, disk, 2, steel, {domain.split()[-1]}, 0)"
+    )
+    return interpreter
+
+
+def _tried(lines, dimension, folder):
+    """The last of these lines, on a scene that has the groups and regions they speak of."""
+    interpreter = _scene(dimension, folder)
+    for line in lines:
+        words = re.findall(r"\w+", line)
+        kind = "nodes" if words[2] in ("body_force",) or "_nodes" in words[2] else "particles"
+        if words[0] in ("fix", "compute") and words[3] != "all":
+            interpreter.run_text(f"group({words[3]}, {kind}, region, wall, all)")
+        if words[2] in ("union", "intersection", "difference"):
+            for region in set(words[3:]) - {"disk", "wall"}:
+                interpreter.run_text(f"region({region}, {STAGES[dimension][2]})")
+        interpreter.run_text(line.replace("region(disk,", "region(this,"))
+
+
+SCENE_FAMILIES = ("fix", "compute", "region", "material", "dump")
+TRIED = [(f, n) for f, n in STYLES if f in SCENE_FAMILIES]
+
+
+@pytest.mark.parametrize(("family", "name"), TRIED, ids=[f"{f}-{n}" for f, n in TRIED])
+def test_examples_of_styles_fit_their_signatures(family, name, tmp_path):
+    """Each line of an example is right in at least one number of dimensions."""
+    first, *others = catalogue.help_of(family, name).example.splitlines()
+    for line in (first, *others):
+        complaints = []
+        for dimension in STAGES:
+            try:
+                # A line about the log speaks of what the first one defines.
+                _tried([first, line] if line.startswith("log") else [line], dimension, tmp_path)
+                break
+            except ScriptError as error:
+                complaints.append(f"{dimension}D: {error.render()}")
+        else:
+            pytest.fail("\n\n".join(complaints))
+
+
+def test_modules_say_what_they_are_for():
+    for path in sorted((ROOT / "karamelo_py").rglob("*.py")):
+        text = path.read_text("utf-8")
+        if text.strip():
+            assert text.lstrip().startswith(('"""', 'r"""')), path
+
+
+def test_the_reference_is_written_for_every_style(tmp_path):
+    sys.path.insert(0, str(ROOT / "docs" / "_ext"))
+    try:
+        import reference_pages
+    finally:
+        sys.path.pop(0)
+    reference_pages.write_pages(tmp_path / "generated")
+    for family, name in STYLES:
+        if registry.origin(family, name).startswith("karamelo-py "):
+            page = tmp_path / "generated" / family / (name.replace("/", "-") + ".md")
+            assert "## Example" in page.read_text("utf-8")
+    assert inspect.getdoc(reference_pages)
+
+
+def test_the_site_builds_without_warnings(tmp_path):
+    for module in ("sphinx", "myst_parser", "furo"):
+        pytest.importorskip(module)
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
+    command += ["-d", str(tmp_path / "doctrees"), str(ROOT / "docs"), str(tmp_path / "html")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
