@@ -11,10 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from karamelo_py.points.kinematics import KINEMATICS
-from karamelo_py.points.materials import initial_state
-from karamelo_py.script.errors import ScriptError
-from karamelo_py.state.arrays import (
+from karamelo_py.kernels.arrays import (
     DRIFT,
     DRIFT_LIMIT,
     SPACING,
@@ -24,6 +21,9 @@ from karamelo_py.state.arrays import (
     Points,
     Setup,
 )
+from karamelo_py.points.kinematics import KINEMATICS
+from karamelo_py.points.materials import initial_state
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.state.tiles import Tiles
 
 if TYPE_CHECKING:

@@ -7,25 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from karamelo_py.kernels.export import impose_stress
-from karamelo_py.kernels.hooks import ON_VELOCITY
-from karamelo_py.kernels.step import (
-    DONE,
-    SORT,
-    Fused,
-    Staged,
-    advance,
-    at_nodes,
-    at_points,
-    choose_dt,
-    measure,
-    run_steps,
-)
-from karamelo_py.kernels.sweep import Serial, Threaded
-from karamelo_py.lowering import State, lower, thread_count
-from karamelo_py.modify import POINT_STAGES, STAGES, CompiledHook, NodesView, PointsView
-from karamelo_py.points.materials import with_stress
-from karamelo_py.state.arrays import (
+from karamelo_py.kernels.arrays import (
     DRIFT,
     DRIFT_LIMIT,
     DT,
@@ -42,12 +24,28 @@ from karamelo_py.state.arrays import (
     Hooks,
     NoHooks,
 )
+from karamelo_py.kernels.export import impose_stress
+from karamelo_py.kernels.hooks import ON_VELOCITY, POINT_STAGES, STAGES, CompiledHook
+from karamelo_py.kernels.step import (
+    DONE,
+    SORT,
+    Fused,
+    Staged,
+    advance,
+    at_nodes,
+    at_points,
+    choose_dt,
+    measure,
+    run_steps,
+)
+from karamelo_py.kernels.sweep import Serial, Threaded
+from karamelo_py.lowering import State, lower, thread_count
+from karamelo_py.points.materials import with_stress
 from karamelo_py.state.hooks import lower_hooks
+from karamelo_py.views import NodesView, PointsView
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
-
-CHUNK = 100  # steps between two looks at the run from Python, and between two snapshots
 
 
 def scene_key(hub: Hub) -> tuple:

@@ -13,6 +13,7 @@ Point function ``(mass, v, x_old, x, value, before, dt) -> (v, x, total)``
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -20,13 +21,18 @@ from numba import cfunc, config, types
 from numba.extending import intrinsic
 
 from karamelo_py.compile import kernel
-from karamelo_py.kernels.formula import BLOCK, Program, evaluate
-from karamelo_py.points.kinematics import dimension
-from karamelo_py.state.arrays import (
+from karamelo_py.kernels.arrays import (
     ADDRESS,
     BEFORE,
     CODE,
+    FINAL_INTEGRATE,
     FROM,
+    INITIAL_INTEGRATE,
+    POST_ADVANCE_PARTICLES,
+    POST_GRID_TO_POINT,
+    POST_PARTICLES_TO_GRID,
+    POST_UPDATE_GRID_STATE,
+    POST_VELOCITIES_TO_GRID,
     SLOT,
     STACK,
     STAGE,
@@ -36,6 +42,8 @@ from karamelo_py.state.arrays import (
     USES_SHARE,
     VALUE,
 )
+from karamelo_py.kernels.formula import BLOCK, Program, evaluate
+from karamelo_py.points.kinematics import dimension
 
 _F8 = types.float64
 NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)
@@ -93,6 +101,44 @@ def _caller(signature: types.Type) -> Callable:
 
 _call_node_function = _caller(NODE_FUNCTION)
 _call_point_function = _caller(POINT_FUNCTION)
+
+
+NODE_STAGES = {
+    "post_particles_to_grid": POST_PARTICLES_TO_GRID,
+    "post_update_grid_state": POST_UPDATE_GRID_STATE,
+    "post_velocities_to_grid": POST_VELOCITIES_TO_GRID,
+}
+POINT_STAGES = {
+    "initial_integrate": INITIAL_INTEGRATE,
+    "post_grid_to_point": POST_GRID_TO_POINT,
+    "post_advance_particles": POST_ADVANCE_PARTICLES,
+    "final_integrate": FINAL_INTEGRATE,
+}
+STAGES = NODE_STAGES | POINT_STAGES
+
+
+class CompiledHook(NamedTuple):
+    """A scalar function that the compiled loop applies to each component of each member."""
+
+    function: Callable
+    on_nodes: bool
+    publishes: bool  # its totals become ID_x, ID_y, ID_z
+    uses_before: bool  # needs the formulas one step earlier as well
+    uses_share: bool  # needs one over the number of members with mass
+
+
+def node_hook(
+    function: Callable, *, publishes: bool = True, uses_before: bool = False, shares: bool = False
+) -> CompiledHook:
+    """A compiled hook on nodes: `function` as described at the head of this file."""
+    return CompiledHook(function, True, publishes, uses_before, shares)
+
+
+def point_hook(
+    function: Callable, *, publishes: bool = False, uses_before: bool = False
+) -> CompiledHook:
+    """A compiled hook on points: `function` as described at the head of this file."""
+    return CompiledHook(function, False, publishes, uses_before, False)
 
 
 @kernel

@@ -1,8 +1,8 @@
 """The parts of a step that schemes put together, and the loop over steps.
 
-Every part takes the :class:`~karamelo_py.state.arrays.Setup` and runs over all its blocks. The same
-source serves two drivers: compiled, where many steps run in one call, and plain Python, where hooks
-that are written in Python are called between the parts.
+Every part takes a :class:`~karamelo_py.kernels.arrays.Setup` and runs over all its blocks. The
+same source serves two drivers: compiled, where many steps run in one call, and plain Python, where
+hooks that are written in Python are called between the parts.
 """
 
 from __future__ import annotations
@@ -11,19 +11,7 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compile import kernel, over_blocks, point_function, real, shared
-from karamelo_py.kernels.hooks import (
-    ON_SUMS,
-    ON_UPDATE,
-    clear_point_totals,
-    node_hooks,
-    point_hooks,
-)
-from karamelo_py.kernels.stages import ClearSums, Nothing, Update, Velocity
-from karamelo_py.kernels.sweep import sweep_nodes, sweep_tiles
-from karamelo_py.points.basis import inside
-from karamelo_py.points.kinematics import largest_component, vector_at
-from karamelo_py.points.materials import initial_state, wave_speed_squared
-from karamelo_py.state.arrays import (
+from karamelo_py.kernels.arrays import (
     DRIFT,
     DRIFT_LIMIT,
     DT,
@@ -47,6 +35,18 @@ from karamelo_py.state.arrays import (
     Hooks,
     NoHooks,
 )
+from karamelo_py.kernels.hooks import (
+    ON_SUMS,
+    ON_UPDATE,
+    clear_point_totals,
+    node_hooks,
+    point_hooks,
+)
+from karamelo_py.kernels.stages import ClearSums, Nothing, Update, Velocity
+from karamelo_py.kernels.sweep import sweep_nodes, sweep_tiles
+from karamelo_py.points.basis import inside
+from karamelo_py.points.kinematics import largest_component, vector_at
+from karamelo_py.points.materials import initial_state, wave_speed_squared
 from karamelo_py.tensors import record, row, subtract
 
 

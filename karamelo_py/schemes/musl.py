@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from karamelo_py.kernels.arrays import (
+    FINAL_INTEGRATE,
+    INITIAL_INTEGRATE,
+    POST_VELOCITIES_TO_GRID,
+)
 from karamelo_py.kernels.hooks import ON_VELOCITY
 from karamelo_py.kernels.stages import (
     ClearSums,
@@ -30,11 +35,6 @@ from karamelo_py.kernels.step import (
     update_nodes,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
-from karamelo_py.state.arrays import (
-    FINAL_INTEGRATE,
-    INITIAL_INTEGRATE,
-    POST_VELOCITIES_TO_GRID,
-)
 
 
 class MUSL(NamedTuple):

@@ -5,6 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from karamelo_py.compile import shared
+from karamelo_py.kernels.arrays import (
+    FINAL_INTEGRATE,
+    INITIAL_INTEGRATE,
+    POST_UPDATE_GRID_STATE,
+)
 from karamelo_py.kernels.hooks import ON_VELOCITY
 from karamelo_py.kernels.stages import (
     ClearSums,
@@ -29,11 +34,6 @@ from karamelo_py.kernels.step import (
     update_nodes,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
-from karamelo_py.state.arrays import (
-    FINAL_INTEGRATE,
-    INITIAL_INTEGRATE,
-    POST_UPDATE_GRID_STATE,
-)
 
 
 class USF(NamedTuple):

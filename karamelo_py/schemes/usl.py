@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from karamelo_py.kernels.arrays import (
+    FINAL_INTEGRATE,
+    INITIAL_INTEGRATE,
+)
 from karamelo_py.kernels.stages import (
     ClearSums,
     Everything,
@@ -25,10 +29,6 @@ from karamelo_py.kernels.step import (
     update_nodes,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
-from karamelo_py.state.arrays import (
-    FINAL_INTEGRATE,
-    INITIAL_INTEGRATE,
-)
 
 
 class USL(NamedTuple):

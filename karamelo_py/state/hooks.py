@@ -6,10 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from karamelo_py.kernels.arrays import HOOK_COLUMNS, STACK, Hooks, NoHooks
 from karamelo_py.kernels.formula import BLOCK, MAX_DEPTH
-from karamelo_py.kernels.hooks import NODE_FUNCTION, POINT_FUNCTION, address_of
-from karamelo_py.modify import STAGES, CompiledHook
-from karamelo_py.state.arrays import HOOK_COLUMNS, STACK, Hooks, NoHooks
+from karamelo_py.kernels.hooks import (
+    NODE_FUNCTION,
+    POINT_FUNCTION,
+    STAGES,
+    CompiledHook,
+    address_of,
+)
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.kernels.arrays import DRIFT, NOW, Block, Setup, Tiling
 from karamelo_py.kernels.sorting import order_points
 from karamelo_py.kernels.stages import ClearSums
 from karamelo_py.kernels.step import step_size
 from karamelo_py.kernels.sweep import sweep_nodes
-from karamelo_py.state.arrays import DRIFT, NOW, Block, Setup, Tiling
 
 TILE_SIZES = {1: 32, 2: 8, 3: 4}
 

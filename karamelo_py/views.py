@@ -1,0 +1,169 @@
+"""Views of nodes and points for hooks that are written in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import (
+    DT,
+    POST_PARTICLES_TO_GRID,
+    POST_UPDATE_GRID_STATE,
+    POST_VELOCITIES_TO_GRID,
+    TIME,
+)
+
+
+class NodesView:
+    """The nodes of a group that carry mass, at one stage of a step.
+
+    Reading a field gives an array with a row for each node; assigning it writes it back::
+
+        nodes.force += nodes.mass[:, None] * self.gravity
+
+    Attributes
+    ----------
+    index : (n,) int
+        Node numbers.
+    """
+
+    def __init__(self, s: Any, group: Any, stage: int, before_update: bool):
+        self._nodes = s.nodes
+        self._basis = s.basis
+        self._shape = s.shape
+        self._stage = stage
+        self._before_update = before_update
+        self._d = s.nodes.velocity.shape[1]
+        self.dt = float(s.control.values[DT])
+        self.time = float(s.control.values[TIME])
+        if group.all:
+            spans = s.spans[1 : 1 + s.spans[0, 0]]
+            members = np.concatenate([np.arange(a, b) for a, b in spans] or [np.empty(0, int)])
+        else:
+            members = group.nodes
+        self.index = members[s.nodes.sums[members, 0] > 0]
+
+    @property
+    def position(self) -> np.ndarray:
+        """(n, 3) positions of the nodes."""
+        places = np.stack(np.unravel_index(self.index, self._shape), axis=1)
+        used = np.arange(3) < self._d
+        return np.where(
+            used,
+            np.array([self._basis.x0, self._basis.y0, self._basis.z0]) + places * self._basis.h,
+            0.0,
+        )
+
+    @property
+    def mass(self) -> np.ndarray:
+        """(n,) nodal mass; read only."""
+        return self._nodes.sums[self.index, 0]
+
+    @property
+    def force(self) -> np.ndarray:
+        """(n, d) internal plus external force; set it in ``post_particles_to_grid``."""
+        return self._nodes.sums[self.index, 1 + self._d :]
+
+    @force.setter
+    def force(self, value: np.ndarray) -> None:
+        self._nodes.sums[self.index, 1 + self._d :] = value
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(n, d) velocity: v before the momentum update, or the one that deforms the points."""
+        if self._stage == POST_VELOCITIES_TO_GRID or self._before_update:
+            return self._nodes.velocity[self.index]
+        if self._stage == POST_PARTICLES_TO_GRID:
+            return self._nodes.sums[self.index, 1 : 1 + self._d] / self.mass[:, None]
+        update = self._nodes.update[self.index]
+        return update[:, : self._d] - update[:, self._d :]
+
+    @velocity.setter
+    def velocity(self, value: np.ndarray) -> None:
+        if self._stage == POST_VELOCITIES_TO_GRID or self._before_update:
+            self._nodes.velocity[self.index] = value
+        elif self._stage == POST_UPDATE_GRID_STATE:
+            star = self._nodes.update[self.index, : self._d]
+            self._nodes.update[self.index, self._d :] = star - value
+        else:
+            self._nodes.sums[self.index, 1 : 1 + self._d] = self.mass[:, None] * value
+
+    @property
+    def velocity_update(self) -> np.ndarray:
+        """(n, d) v*, the velocity after the momentum update (``post_update_grid_state``)."""
+        if self._before_update:
+            return self.velocity
+        return self._nodes.update[self.index, : self._d]
+
+    @velocity_update.setter
+    def velocity_update(self, value: np.ndarray) -> None:
+        if self._before_update:
+            self.velocity = value
+            return
+        old = self.velocity
+        self._nodes.update[self.index, : self._d] = value
+        self._nodes.update[self.index, self._d :] = self._nodes.update[self.index, : self._d] - old
+
+
+class PointsView:
+    """The points of a group, at one stage of a step, in the order of their ids.
+
+    Reading a field gives an array with a row for each point; assigning it writes it back.
+    """
+
+    def __init__(self, simulation: Any, group: Any, then: bool):
+        self._simulation = simulation
+        self._then = then
+        control = simulation.setup.control
+        self.dt = float(control.values[DT])
+        self.time = float(control.values[TIME])
+        self.ids = simulation.members(group)
+        self.moved = False
+
+    def _gather(self, field: Callable) -> np.ndarray:
+        return self._simulation.by_id(field)[self.ids]
+
+    def _scatter(self, field: Callable, value: np.ndarray) -> None:
+        full = self._simulation.by_id(field)
+        full[self.ids] = value
+        for block in self._simulation.setup.blocks:
+            field(block)[...] = full[block.id]
+
+    def _place(self, block: Any) -> np.ndarray:
+        now = self._simulation.now
+        return block.x[1 - now if self._then else now]
+
+    @property
+    def position(self) -> np.ndarray:
+        """(n, d) positions."""
+        return self._gather(self._place)
+
+    @position.setter
+    def position(self, value: np.ndarray) -> None:
+        self._scatter(self._place, value)
+        self.moved = True
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(n, d) velocities."""
+        return self._gather(lambda block: block.points.v)
+
+    @velocity.setter
+    def velocity(self, value: np.ndarray) -> None:
+        self._scatter(lambda block: block.points.v, value)
+
+    @property
+    def mass(self) -> np.ndarray:
+        """(n,) masses; read only."""
+        return self._gather(lambda block: block.points.mass)
+
+    def set_stress(self, given: dict[str, np.ndarray]) -> None:
+        """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
+        self._simulation.set_stress(self.ids, given)
+
+    @property
+    def reference_position(self) -> np.ndarray:
+        """(n, d) positions before the first step; read only."""
+        return self._simulation.x0[self.ids]
