@@ -1,0 +1,84 @@
+"""Time steps: the stable step, fixed steps, exact ends of runs, runs that follow each other."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import pytest
+from scenes import block
+
+# E 100, nu 0.3, rho 2: lambda + 2 G = E (1 - nu) / ((1 + nu)(1 - 2 nu))
+SPEED = sqrt(100 * 0.7 / (1.3 * 0.4) / 2)
+H = 0.1
+LOG = "log_modify(custom, step, dt, time)"
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("law", ["linear", "neo-hookean"])
+@pytest.mark.parametrize("factor", [None, 0.5])
+def test_first_step_follows_the_fastest_point(run_interpreted, d, law, factor):
+    """dt = 0.9 h / (c + max |v_i|) with c = sqrt((lambda + 2 G) / rho) (reference, 3.7)."""
+    velocity = ", ".join(["-2", "3*x0/x0", "1"][:d])
+    lines = [f"fix(v, initial_velocity_particles, all, {velocity})", LOG, "run(1)"]
+    if factor:
+        lines.insert(0, f"dt_factor({factor})")
+    log = run_interpreted(block(d, *lines, law=law, ppc=1)).log
+    fastest = 2 if d == 1 else 3
+    assert log.dt[0] == pytest.approx((factor or 0.9) * H / (SPEED + fastest), rel=1e-9)
+    assert log.Time[1] == pytest.approx(log.dt[0], rel=1e-9)
+
+
+def test_a_body_at_rest_steps_at_its_wave_speed(run_interpreted):
+    log = run_interpreted(block(2, LOG, "run(3)", ppc=1)).log
+    assert log.dt == pytest.approx(np.full(4, 0.9 * H / SPEED), rel=1e-9)
+
+
+def test_set_dt(run_interpreted):
+    log = run_interpreted(block(1, "set_dt(0.003)", LOG, "run(4)")).log
+    assert log.Time == pytest.approx([0, 0.003, 0.006, 0.009, 0.012], rel=1e-9)
+    assert (log.Step == range(5)).all()
+
+
+@pytest.mark.parametrize("time", ["0.0471", "1e-7", "PI/50"])
+def test_run_time_ends_exactly(run_interpreted, time):
+    """The last step is shortened, for any magnitude of the time."""
+    script = block(1, "set_dt(0.01)", "log_modify(custom, step, time, dt, time - (" + time + "))",
+                   f"run_time({time})")  # fmt: skip
+    log = run_interpreted(script).log
+    rest = list(log.values())[-1]
+    assert rest[-1] == 0
+
+
+@pytest.mark.parametrize("dt", [0.1, 0.01, 1 / 3])
+def test_whole_numbers_of_steps_get_no_extra_step(run_interpreted, dt):
+    """30 additions of dt need not make 30 dt; the rounding is not a step of its own."""
+    script = block(1, f"set_dt({dt!r}/1000)", LOG, f"run_time({dt!r}*30/1000)")
+    log = run_interpreted(script).log
+    assert log.Step[-1] == 30
+    assert log.dt[-2] == pytest.approx(dt / 1000, rel=1e-6)
+
+
+def test_runs_follow_each_other(run_interpreted):
+    """Steps and time go on; the log keeps its rhythm, with the ends of the runs beside it."""
+    script = block(1, "set_dt(0.001)", "set_output(7)", LOG, "run(18)", "run(10)",
+                   "run_time(0.0045)", "run(0)")  # fmt: skip
+    log = run_interpreted(script).log
+    assert list(log.Step) == [0, 7, 14, 18, 21, 28, 33]
+    assert log.Time[-1] == pytest.approx(0.0325, rel=1e-9)
+
+
+def test_conditions(run_interpreted):
+    """run_until and run_while look before every step."""
+    script = block(1, "set_dt(0.001)", "set_output(100)", LOG, "run_until(timestep >= 5)",
+                   "run_while(time < 0.0075)", "run_while(timestep < 3)")  # fmt: skip
+    log = run_interpreted(script).log
+    assert list(log.Step) == [0, 5, 8]
+
+
+def test_the_step_follows_a_body_that_gets_faster(run_interpreted):
+    """A body force g speeds the body up: dt = 0.9 h / (c + g t), with c as it was (no strain)."""
+    script = block(1, "fix(g, body_force, all, 50)", LOG, "run(5)", size=(0.2,))
+    log = run_interpreted(script).log
+    expected = 0.9 * H / (SPEED + 50 * log.Time)
+    assert log.dt == pytest.approx(expected, rel=1e-9)
