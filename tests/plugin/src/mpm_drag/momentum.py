@@ -1,6 +1,5 @@
 """compute momentum."""
 
-from karamelo_py.group import ParticleGroup
 from karamelo_py.modify import Compute
 
 
@@ -17,10 +16,6 @@ class Momentum(Compute):
     compute(p, momentum, all)
     log_modify(custom, time, p_x)
     """
-
-    def __init__(self, hub, group: ParticleGroup):
-        super().__init__(hub)
-        self.group = group
 
     def refresh(self) -> None:
         """Measure and publish."""
