@@ -79,11 +79,11 @@ class Runner:
 
     def _run(self, simulation: Simulation) -> None:
         hub = self.hub
+        started = time.perf_counter()
         simulation.begin(self.end_time)
         diagnosis.warn_about_step(hub, simulation)
         first_step = simulation.step
         first_time = simulation.time
-        started = time.perf_counter()
         self._banner(simulation)
         with self._timed("output"):
             hub.output.begin(self)
