@@ -108,7 +108,8 @@ class Simulation:
         self.mode = Threaded() if self.threads > 1 else Serial()
         self.steps_taken = 0
         self.version = 0  # grows when fields change without a step
-        self._begun: set[str] = set()
+        # Fixes of the first step that have acted: not again when the scene is lowered anew.
+        self._begun: set[Any] = set(previous._begun) if previous else set()
         self.staged = False
         self.hooks: Hooks | NoHooks = NoHooks()
 
@@ -153,7 +154,7 @@ class Simulation:
         for block in self.setup.blocks:
             points = block.points
             rows = np.zeros((self.count, points.state.shape[1]), points.state.dtype)
-            rows[points.id] = points.state
+            rows[block.id] = points.state
             laws[type(block.laws)] = rows
         keeps = self.setup.blocks[0].points.moment is not None
         moment = self.by_id(lambda block: block.points.moment) if keeps else None
@@ -252,7 +253,7 @@ class Simulation:
         """Sort the fixes by how they act: once before the first step, from Python, compiled."""
         fixes = list(self.hub.fixes.values())
         lasting = [fix for fix in fixes if not fix.first_step_only]
-        new = [fix for fix in fixes if fix.first_step_only and fix.id not in self._begun]
+        new = [fix for fix in fixes if fix.first_step_only and fix not in self._begun]
         self._python = PythonHooks(self, lasting)
         self.staged = bool(self._python.by_stage) or any(
             name in POINT_STAGES for fix in lasting for name in fix.hooks()
@@ -267,7 +268,7 @@ class Simulation:
                 both = PythonHooks(self, [*lasting, *new])
                 both.by_stage.pop(STAGES["initial_integrate"], None)
                 self._first = both
-        self._begun |= {fix.id for fix in new}
+        self._begun |= set(new)
 
     # --- state that can be returned to --------------------------------------------------------
 
