@@ -87,15 +87,14 @@ _INLINED = {"forceinline": True}
 def kernel(function: Callable | None = None, **options: Any) -> Callable:
     """Compile a loop over points or nodes; cached on disk, free of the interpreter lock.
 
-    Multiplication and addition may contract to one rounding (a seventh of the time of a sweep):
-    that changes neither the order of sums nor what happens to NaN. Kernels allocate nothing, so
-    Numba's reference counting is left out.
+    No fast mathematics: products and sums that contract to one rounding save a seventh of a sweep,
+    but where they do depends on what a loop is inlined into, so that results would differ between
+    one thread and two, or a run in pieces and a whole. Kernels allocate nothing, so Numba's
+    reference counting is left out.
     """
     if function is None:
         return lambda f: kernel(f, **options)
-    return njit(
-        cache=True, nogil=True, error_model="numpy", _nrt=False, fastmath={"contract"}, **options
-    )(function)
+    return njit(cache=True, nogil=True, error_model="numpy", _nrt=False, **options)(function)
 
 
 def shared(function: Callable) -> Callable:
