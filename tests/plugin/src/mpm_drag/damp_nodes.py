@@ -32,6 +32,8 @@ class DampNodes(Fix):
     Publishes the total force as ID_x, ID_y, ID_z.
     """
 
+    syntax = "group, cx[, cy[, cz]]"  # says it better than the signature: group[, rate, ...]
+
     post_particles_to_grid = node_hook(damp)
 
     def __init__(self, hub, group: NodeGroup, *rate: Expression | None):
