@@ -17,7 +17,7 @@ from typing import Any
 
 import numba
 from numba import config, njit
-from numba.extending import overload
+from numba.extending import intrinsic, overload
 
 _KEPT_CACHES = 6
 _COMPILED_PARTS = ("compile.py", "tensors.py", "points", "kernels", "state", "schemes", "fixes")
@@ -87,10 +87,9 @@ _INLINED = {"forceinline": True}
 def kernel(function: Callable | None = None, **options: Any) -> Callable:
     """Compile a loop over points or nodes; cached on disk, free of the interpreter lock.
 
-    No fast mathematics: products and sums that contract to one rounding save a seventh of a sweep,
-    but where they do depends on what a loop is inlined into, so that results would differ between
-    one thread and two, or a run in pieces and a whole. Kernels allocate nothing, so Numba's
-    reference counting is left out.
+    No fast mathematics: where products and sums contract would depend on what a loop is inlined
+    into, so that results would differ between one thread and two, or a run in pieces and a whole.
+    `fma` says where. Kernels allocate nothing, so Numba's reference counting is left out.
     """
     if function is None:
         return lambda f: kernel(f, **options)
@@ -169,6 +168,26 @@ def _real(value, like):
     if like is numba.types.float32:
         return lambda value, like: numba.float32(value)
     return lambda value, like: numba.float64(value)
+
+
+def fma(a: float, b: float, c: float) -> float:
+    """a b + c with one rounding, where compiled: always so, whatever surrounds it."""
+    return a * b + c
+
+
+@intrinsic
+def _fused(typing_context, a, b, c):
+    def codegen(context, builder, signature, arguments):
+        return builder.fma(*arguments)
+
+    return a(a, b, c), codegen
+
+
+@overload(fma, inline="always")
+def _fma(a, b, c):
+    if a == b == c and isinstance(a, numba.types.Float):
+        return lambda a, b, c: _fused(a, b, c)
+    return lambda a, b, c: a * b + c
 
 
 def index(i: int) -> int:

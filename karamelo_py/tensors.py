@@ -11,13 +11,13 @@ from collections.abc import Callable
 from numba import types
 from numba.extending import overload
 
-from karamelo_py.compile import define
+from karamelo_py.compile import define, fma
 
 
 def spell(parameters: str, term: str, length: int) -> Callable:
     """The function ``(term with k = 0, ..., term with k = length - 1)`` of `parameters`."""
     items = "".join(term.replace("[k]", f"[{k}]") + ", " for k in range(length))
-    return define(parameters, f"return ({items})")
+    return define(parameters, f"return ({items})", fma=fma)
 
 
 def add(a, b):
@@ -52,24 +52,12 @@ def _scale(factor, a):
 
 def add_scaled(a, factor, b):
     """a + factor * b."""
-    return tuple(x + factor * y for x, y in zip(a, b, strict=True))
+    return tuple(fma(factor, y, x) for x, y in zip(a, b, strict=True))
 
 
 @overload(add_scaled)
 def _add_scaled(a, factor, b):
-    return spell("a, factor, b", "a[k] + factor * b[k]", len(a))
-
-
-def add_at(array, i, first, values):
-    """array[i, first + k] += values[k]."""
-    for k, value in enumerate(values):
-        array[i, first + k] += value
-
-
-@overload(add_at)
-def _add_at(array, i, first, values):
-    lines = [f"array[i, first + {k}] += values[{k}]" for k in range(len(values))]
-    return define("array, i, first, values", *lines)
+    return spell("a, factor, b", "fma(factor, b[k], a[k])", len(a))
 
 
 def put_at(array, i, first, values):

@@ -13,7 +13,7 @@ from karamelo_py.points.basis import affine_weight, reach, support
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.transfers import (
     add_moment,
-    carried_momentum,
+    add_momentum,
     updated_velocity,
     zero_moment,
 )
@@ -43,7 +43,9 @@ def scattered(transfer, kin, x, mass, v, moment):
     domain, basis = made(Linear, kin)
     stencil, nodes, weights, _ = stencil_of(basis, kin, x)
     momentum = [
-        carried_momentum(transfer, kin, basis, stencil, k, weights[k], mass, v, moment)
+        add_momentum(
+            transfer, kin, basis, stencil, k, weights[k] * mass, mass, v, moment, (0.0,) * len(v)
+        )
         for k in range(support(basis, kin))
     ]
     return domain.node_positions()[nodes][:, : kin.dimension], np.array(momentum), basis, stencil

@@ -15,10 +15,10 @@ from typing import NamedTuple
 from karamelo_py.compile import index, point_function, real, shared
 from karamelo_py.points.basis import entry, inside, locate
 from karamelo_py.points.kinematics import (
+    add_outer,
+    add_symmetric_dot,
     dimension,
     largest_component,
-    outer,
-    symmetric_dot,
     vector_at,
     zero_tensor,
 )
@@ -32,13 +32,12 @@ from karamelo_py.points.materials import (
 )
 from karamelo_py.points.transfers import (
     add_moment,
-    carried_momentum,
+    add_momentum,
     updated_velocity,
     zero_moment,
 )
 from karamelo_py.tensors import (
     add,
-    add_at,
     add_scaled,
     moment_at,
     put_at,
@@ -162,7 +161,7 @@ def _(gather, transfer, kin, basis, stencil, k, nodes, total):
 def _(gather, transfer, kin, basis, stencil, k, nodes, total):
     i, _, gradient = entry(basis, kin, stencil, k)
     v = vector_at(kin, nodes.velocity, i)
-    return add(total, outer(kin, v, gradient))
+    return add_outer(kin, total, v, gradient)
 
 
 @gathered.on(VelocityAndGradient)
@@ -174,7 +173,7 @@ def _(gather, transfer, kin, basis, stencil, k, nodes, total):
         add_scaled(total[0], weight, v),
         add_scaled(total[1], weight, dv),
         add_moment(transfer, kin, basis, stencil, k, weight, v, total[2]),
-        add(total[3], outer(kin, v, gradient)),
+        add_outer(kin, total[3], v, gradient),
     )
 
 
@@ -316,31 +315,39 @@ def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
 def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
     i, weight, _ = entry(basis, kin, stencil, k)
     mass, v, moment = burden
-    p = carried_momentum(transfer, kin, basis, stencil, k, weight, mass, v, moment)
-    add_at(nodes.velocity, i, 0, p)
+    old = vector_at(kin, nodes.velocity, i)
+    new = add_momentum(transfer, kin, basis, stencil, k, weight * mass, mass, v, moment, old)
+    put_at(nodes.velocity, i, 0, new)
 
 
 @scattered.on(Force)
 def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
     i, _, gradient = entry(basis, kin, stencil, k)
-    add_at(nodes.sums, i, 1 + len(gradient), symmetric_dot(kin, burden, gradient))
+    first = 1 + len(gradient)
+    old = row(nodes.sums, i, first, gradient)
+    put_at(nodes.sums, i, first, add_symmetric_dot(kin, old, burden, gradient))
 
 
 @scattered.on(MassMomentum)
 def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
     i, weight, _ = entry(basis, kin, stencil, k)
     mass, v, moment = burden
-    p = carried_momentum(transfer, kin, basis, stencil, k, weight, mass, v, moment)
-    add_at(nodes.sums, i, 0, (weight * mass,) + p)
+    part = weight * mass
+    old = row(nodes.sums, i, 1, v)
+    p = add_momentum(transfer, kin, basis, stencil, k, part, mass, v, moment, old)
+    put_at(nodes.sums, i, 0, (nodes.sums[i, 0] + part,) + p)
 
 
 @scattered.on(Everything)
 def _(scatter, transfer, kin, basis, stencil, k, nodes, burden):
     i, weight, gradient = entry(basis, kin, stencil, k)
     mass, v, moment, force = burden
-    p = carried_momentum(transfer, kin, basis, stencil, k, weight, mass, v, moment)
-    f = symmetric_dot(kin, force, gradient)
-    add_at(nodes.sums, i, 0, (weight * mass,) + p + f)
+    part = weight * mass
+    old_p = row(nodes.sums, i, 1, v)
+    old_f = row(nodes.sums, i, 1 + len(v), v)
+    p = add_momentum(transfer, kin, basis, stencil, k, part, mass, v, moment, old_p)
+    f = add_symmetric_dot(kin, old_f, force, gradient)
+    put_at(nodes.sums, i, 0, (nodes.sums[i, 0] + part,) + p + f)
 
 
 # --- nodes ------------------------------------------------------------------------------------

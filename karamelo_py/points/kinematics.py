@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import point_function, real, shared
+from karamelo_py.compile import fma, point_function, real, shared
 from karamelo_py.tensors import scale
 
 
@@ -69,27 +69,38 @@ def _(kin, array, i):
 
 
 @point_function()
-def outer(kin, a, b):
-    """a_i b_j of two vectors, as a tensor."""
+def add_outer(kin, total, a, b):
+    """total_ij + a_i b_j, of a tensor and two vectors."""
 
 
-@outer.on(Line)
-def _(kin, a, b):
-    return (a[0] * b[0],)
+@add_outer.on(Line)
+def _(kin, total, a, b):
+    return (fma(a[0], b[0], total[0]),)
 
 
-@outer.on(PlaneStrain)
-def _(kin, a, b):
-    return (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])
-
-
-@outer.on(Space)
-def _(kin, a, b):
+@add_outer.on(PlaneStrain)
+def _(kin, total, a, b):
     return (
-        a[0] * b[0], a[0] * b[1], a[0] * b[2],
-        a[1] * b[0], a[1] * b[1], a[1] * b[2],
-        a[2] * b[0], a[2] * b[1], a[2] * b[2],
-    )  # fmt: skip
+        fma(a[0], b[0], total[0]),
+        fma(a[0], b[1], total[1]),
+        fma(a[1], b[0], total[2]),
+        fma(a[1], b[1], total[3]),
+    )
+
+
+@add_outer.on(Space)
+def _(kin, total, a, b):
+    return (
+        fma(a[0], b[0], total[0]),
+        fma(a[0], b[1], total[1]),
+        fma(a[0], b[2], total[2]),
+        fma(a[1], b[0], total[3]),
+        fma(a[1], b[1], total[4]),
+        fma(a[1], b[2], total[5]),
+        fma(a[2], b[0], total[6]),
+        fma(a[2], b[1], total[7]),
+        fma(a[2], b[2], total[8]),
+    )
 
 
 @point_function()
@@ -117,26 +128,29 @@ def _(kin, t, a):
 
 
 @point_function()
-def symmetric_dot(kin, s, a):
-    """s_ij a_j of a symmetric tensor and a vector: the traction of a stress."""
+def add_symmetric_dot(kin, total, s, a):
+    """total_i + s_ij a_j of a symmetric tensor and a vector: the traction of a stress."""
 
 
-@symmetric_dot.on(Line)
-def _(kin, s, a):
-    return (s[0] * a[0],)
+@add_symmetric_dot.on(Line)
+def _(kin, total, s, a):
+    return (fma(s[0], a[0], total[0]),)
 
 
-@symmetric_dot.on(PlaneStrain)
-def _(kin, s, a):
-    return (s[0] * a[0] + s[3] * a[1], s[3] * a[0] + s[1] * a[1])
-
-
-@symmetric_dot.on(Space)
-def _(kin, s, a):
+@add_symmetric_dot.on(PlaneStrain)
+def _(kin, total, s, a):
     return (
-        s[0] * a[0] + s[3] * a[1] + s[4] * a[2],
-        s[3] * a[0] + s[1] * a[1] + s[5] * a[2],
-        s[4] * a[0] + s[5] * a[1] + s[2] * a[2],
+        fma(s[0], a[0], fma(s[3], a[1], total[0])),
+        fma(s[3], a[0], fma(s[1], a[1], total[1])),
+    )
+
+
+@add_symmetric_dot.on(Space)
+def _(kin, total, s, a):
+    return (
+        fma(s[0], a[0], fma(s[3], a[1], fma(s[4], a[2], total[0]))),
+        fma(s[3], a[0], fma(s[1], a[1], fma(s[5], a[2], total[1]))),
+        fma(s[4], a[0], fma(s[5], a[1], fma(s[2], a[2], total[2]))),
     )
 
 
@@ -366,21 +380,21 @@ def _(kin, dl, s):
 @spin.on(PlaneStrain)
 def _(kin, dl, s):
     one = real(1, dl[0])
-    two = real(2, dl[0])
     t = real(0.25, dl[0]) * (dl[2] - dl[1])
-    t = t + t * t * t * real(1 / 3, dl[0])
-    scale = one / (one + t * t)
-    cosine = (one - t * t) * scale
-    sine = two * t * scale
-    cc = cosine * cosine
-    ss = sine * sine
-    cs = cosine * sine
-    return (
-        cc * s[0] + ss * s[1] - two * cs * s[3],
-        ss * s[0] + cc * s[1] + two * cs * s[3],
-        s[2],
-        cs * (s[0] - s[1]) + (cc - ss) * s[3],
-    )
+    tt = t * t
+    t = fma(t * tt, real(1 / 3, dl[0]), t)
+    tt = t * t
+    scale = one / (one + tt)
+    cosine = (one - tt) * scale
+    sine = (t + t) * scale
+    # The deviator in the plane turns by twice the angle; written as a change, which is exactly
+    # nothing where nothing turns.
+    double_sine = real(2, dl[0]) * sine * cosine
+    double_versine = real(-2, dl[0]) * sine * sine
+    apart = real(0.5, dl[0]) * (s[0] - s[1])
+    change = fma(double_versine, apart, -(double_sine * s[3]))
+    shear = fma(double_sine, apart, double_versine * s[3])
+    return (s[0] + change, s[1] - change, s[2], s[3] + shear)
 
 
 @spin.on(Space)

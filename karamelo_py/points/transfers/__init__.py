@@ -18,8 +18,11 @@ def updated_velocity(transfer, v, v_pic, dv):
 
 
 @point_function()
-def carried_momentum(transfer, kin, basis, stencil, k, weight, mass, v, moment):
-    """The momentum that a point gives to the k-th node of its stencil."""
+def add_momentum(transfer, kin, basis, stencil, k, weighted_mass, mass, v, moment, total):
+    """total + the momentum that a point gives to the k-th node of its stencil.
+
+    `weighted_mass` is N_I m_p, the mass that it gives.
+    """
 
 
 @point_function()

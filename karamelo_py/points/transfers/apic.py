@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from karamelo_py.points.basis import affine_weight, reach
-from karamelo_py.points.kinematics import outer, tensor_dot, zero_tensor
+from karamelo_py.points.kinematics import add_outer, tensor_dot, zero_tensor
 from karamelo_py.points.transfers import (
     add_moment,
-    carried_momentum,
+    add_momentum,
     updated_velocity,
     zero_moment,
 )
-from karamelo_py.tensors import add, add_scaled, scale
+from karamelo_py.tensors import add_scaled, scale
 
 
 class APIC(NamedTuple):
@@ -36,10 +36,11 @@ def _(transfer, v, v_pic, dv):
     return v_pic
 
 
-@carried_momentum.on(APIC)
-def _(transfer, kin, basis, stencil, k, weight, mass, v, moment):
+@add_momentum.on(APIC)
+def _(transfer, kin, basis, stencil, k, weighted_mass, mass, v, moment, total):
     affine = affine_weight(basis, kin, stencil, k)
-    return add_scaled(scale(weight * mass, v), mass, tensor_dot(kin, moment, affine))
+    mean = add_scaled(total, weighted_mass, v)
+    return add_scaled(mean, mass, tensor_dot(kin, moment, affine))
 
 
 @zero_moment.on(APIC)
@@ -50,4 +51,4 @@ def _(transfer, kin, like):
 @add_moment.on(APIC)
 def _(transfer, kin, basis, stencil, k, weight, velocity, moment):
     arm = reach(basis, kin, stencil, k)
-    return add(moment, outer(kin, scale(weight, velocity), arm))
+    return add_outer(kin, moment, scale(weight, velocity), arm)

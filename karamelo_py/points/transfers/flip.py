@@ -7,7 +7,7 @@ from typing import NamedTuple
 from karamelo_py.compile import real
 from karamelo_py.points.transfers import (
     add_moment,
-    carried_momentum,
+    add_momentum,
     updated_velocity,
     zero_moment,
 )
@@ -41,9 +41,9 @@ def _(transfer, v, v_pic, dv):
     return add_scaled(scale(real(1, flip) - flip, v_pic), flip, add(v, dv))
 
 
-@carried_momentum.on(FLIP)
-def _(transfer, kin, basis, stencil, k, weight, mass, v, moment):
-    return scale(weight * mass, v)
+@add_momentum.on(FLIP)
+def _(transfer, kin, basis, stencil, k, weighted_mass, mass, v, moment, total):
+    return add_scaled(total, weighted_mass, v)
 
 
 @zero_moment.on(FLIP)

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 from karamelo_py.points.transfers import (
     add_moment,
-    carried_momentum,
+    add_momentum,
     updated_velocity,
     zero_moment,
 )
-from karamelo_py.tensors import scale
+from karamelo_py.tensors import add_scaled
 
 
 class PIC(NamedTuple):
@@ -32,9 +32,9 @@ def _(transfer, v, v_pic, dv):
     return v_pic
 
 
-@carried_momentum.on(PIC)
-def _(transfer, kin, basis, stencil, k, weight, mass, v, moment):
-    return scale(weight * mass, v)
+@add_momentum.on(PIC)
+def _(transfer, kin, basis, stencil, k, weighted_mass, mass, v, moment, total):
+    return add_scaled(total, weighted_mass, v)
 
 
 @zero_moment.on(PIC)
