@@ -144,6 +144,14 @@ def _interpreter() -> Iterator[subprocess.Popen]:
     process.wait(timeout=30)
 
 
+def _ask(process: subprocess.Popen, request: dict) -> dict:
+    process.stdin.write(json.dumps(request) + "\n")
+    process.stdin.flush()
+    answer = process.stdout.readline()
+    assert answer, "the process that interprets scripts has died; its message is above"
+    return json.loads(answer)
+
+
 @pytest.fixture
 def run_interpreted(tmp_path, _interpreter) -> Callable[..., Result]:
     """As `run_script`, but interpreted: for many kinds of tiny scenes, which need no compiling."""
@@ -152,10 +160,23 @@ def run_interpreted(tmp_path, _interpreter) -> Callable[..., Result]:
         place = tmp_path / folder
         place.mkdir(exist_ok=True)
         arguments = [str(_prepared(place, script)), *options]
-        request = {"folder": str(place), "arguments": arguments}
-        _interpreter.stdin.write(json.dumps(request) + "\n")
-        _interpreter.stdin.flush()
-        answer = json.loads(_interpreter.stdout.readline())
+        answer = _ask(_interpreter, {"folder": str(place), "arguments": arguments})
         return _checked(Result(answer["status"], answer["out"], answer["err"], place), status)
+
+    return run
+
+
+@pytest.fixture
+def state_interpreted(tmp_path, _interpreter) -> Callable[[str], dict[str, np.ndarray]]:
+    """The exact state at the end of a script, interpreted."""
+
+    def run(script: str) -> dict[str, np.ndarray]:
+        path = _prepared(tmp_path, script)
+        file = str(tmp_path / "state.npz")
+        request = {"folder": str(tmp_path), "arguments": [str(path)], "state": file}
+        answer = _ask(_interpreter, request)
+        assert answer["status"] == 0, answer["err"]
+        with np.load(file) as arrays:
+            return dict(arrays)
 
     return run

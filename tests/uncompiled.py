@@ -11,7 +11,21 @@ import io
 import json
 import os
 import sys
+import traceback
 import warnings
+
+
+def save_state(request: dict) -> int:
+    """Run a script and save its final state; a failure is told, not raised."""
+    import numpy as np
+    from states import final_state
+
+    try:
+        np.savez(request["state"], **final_state(request["arguments"][0]))
+    except Exception:
+        traceback.print_exc()
+        return 1
+    return 0
 
 
 def main() -> None:
@@ -26,7 +40,8 @@ def main() -> None:
         os.chdir(request["folder"])
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            status = command(request["arguments"])
+            arguments = request["arguments"]
+            status = save_state(request) if "state" in request else command(arguments)
         answer = {"status": status, "out": out.getvalue(), "err": err.getvalue()}
         answers.write(json.dumps(answer) + "\n")
         answers.flush()

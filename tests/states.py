@@ -1,0 +1,42 @@
+"""The exact state at the end of a script: every bit of what the points carry."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from karamelo_py.console import Console
+from karamelo_py.hub import Hub
+from karamelo_py.script.interpreter import Interpreter
+
+
+def final_hub(script: Path, threads: int | None = None) -> Hub:
+    """The hub after a script has run."""
+    hub = Hub(Console(quiet=True))
+    hub.settings.threads = threads
+    hub.interpreter = Interpreter(hub)
+    hub.interpreter.run_file(str(script))
+    return hub
+
+
+def final_state(script: Path, threads: int | None = None) -> dict[str, np.ndarray]:
+    """Arrays of all points by id, and the clock."""
+    hub = final_hub(script, threads)
+    state = hub.simulation.state()
+    arrays = {"x": state.x, "v": state.v, "time": np.array([hub.update.time, hub.update.step])}
+    arrays |= {law.__name__: rows for law, rows in state.laws.items()}
+    if state.moment is not None:
+        arrays["moment"] = state.moment
+    return arrays
+
+
+def same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> bool:
+    """Whether two states agree in every bit; an assertion names the field that does not."""
+    assert a.keys() == b.keys()
+    for name in a:
+        assert np.isfinite(a[name]).all(), name
+        assert a[name].dtype == b[name].dtype
+        difference = np.abs(a[name] - b[name]).max()
+        assert a[name].tobytes() == b[name].tobytes(), f"{name} differs by up to {difference}"
+    return True

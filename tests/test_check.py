@@ -1,0 +1,49 @@
+"""karamelo-py check: what a scene needs, without running it."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from conftest import INPUTS
+
+from karamelo_py.cli import main
+
+
+@pytest.fixture
+def check(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    def run(path, *options):
+        status = main(["check", str(path), *options])
+        captured = capsys.readouterr()
+        assert status == 0, captured.err
+        assert list(tmp_path.iterdir()) == []  # nothing is run or written
+        return captured.out
+
+    return run
+
+
+def test_what_the_two_disks_need(check):
+    """416 points as in Karamelo; two doubles for a place in the plane; h / (c + v) by hand."""
+    out = check(INPUTS / "in.two_disks")
+    assert re.search(r"points\s+416 in 2 solid", out)
+    assert re.search(r"nodes\s+441 \(21 x 21 x 1\)", out)
+    assert re.search(r"tiles\s+\d+ of 9 hold points", out)
+    # c = sqrt((lambda + 2 G) / rho) = sqrt(1000 * 0.7 / (1.3 * 0.4) / 1000), v = 0.1, h = 0.05
+    assert re.search(r"first dt\s+0\.001 \(stable limit 0\.0396\d*\)", out)
+    for field, numbers, size in [("x", 2, 16), ("v", 2, 16), ("mass", 1, 8), ("state", 5, 40)]:
+        assert re.search(rf"^  {field} \(FixedFrame\)\s+{numbers}\s+{size}$", out, re.MULTILINE)
+    for word in ("PlaneStrain", "Linear", "FLIP", "MUSL", "FixedFrame", "stages of a step", "v1"):
+        assert word in out
+
+
+def test_what_is_not_used_does_not_exist(check, tmp_path):
+    """The moment of velocity is there for APIC only; single precision halves the numbers."""
+    text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
+    assert "moment (" not in check(INPUTS / "in.two_disks")
+    script = tmp_path.parent / f"{tmp_path.name}.in"
+    script.write_text(text.replace("FLIP, linear, 1", "APIC, linear"), encoding="utf-8")
+    assert re.search(r"moment \(FixedFrame\)\s+4\s+32", check(script))
+    script.write_text("precision(single)\n" + text, encoding="utf-8")
+    assert re.search(r"state \(FixedFrame\)\s+5\s+20", check(script))
