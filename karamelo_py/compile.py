@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba import config, njit
+from llvmlite import ir
+from numba import cfunc, config, njit
 from numba.extending import intrinsic, overload
 
 _KEPT_CACHES = 6
@@ -224,6 +225,52 @@ def over_blocks(per_block: Callable) -> Callable:
 
     overload(loop, strict=False)(written_out)
     return loop
+
+
+_uncompiled: list[Callable] = []
+_addresses: dict[Callable, int] = {}
+_keep_alive: list = []
+
+
+def address_of(function: Callable, signature: numba.types.Type) -> int:
+    """Compile `function` (cached on disk) and return the address that kernels call it by.
+
+    Whoever calls by address does not contain the function: it need not be compiled anew for
+    another one, and the function is compiled once for all its callers.
+    """
+    if function not in _addresses:
+        if config.DISABLE_JIT:
+            _uncompiled.append(function)
+            _addresses[function] = len(_uncompiled) - 1
+        else:
+            compiled = cfunc(signature, cache=True, error_model="numpy")(function)
+            _keep_alive.append(compiled)
+            _addresses[function] = compiled.address
+    return _addresses[function]
+
+
+def caller_of(signature: numba.types.Type) -> Callable:
+    """Make ``call(address, ...)``, which calls a function of this signature by its address."""
+    result, parameters = signature.return_type, signature.args
+
+    if config.DISABLE_JIT:
+        return lambda address, *arguments: _uncompiled[address](*arguments)
+
+    def codegen(context, builder, _, arguments):
+        kind = ir.FunctionType(
+            context.get_value_type(result), [context.get_value_type(p) for p in parameters]
+        )
+        pointer = builder.inttoptr(arguments[0], kind.as_pointer())
+        return builder.call(pointer, arguments[1:])
+
+    names = ", ".join(f"a{k}" for k in range(len(parameters)))
+    call = define(
+        f"typing_context, address, {names}",
+        "return typed, codegen",
+        typed=result(numba.types.int64, *parameters),
+        codegen=codegen,
+    )
+    return intrinsic(call)
 
 
 def define(parameters: str, *lines: str, **names: Any) -> Callable:

@@ -53,6 +53,7 @@ class NoHooks(NamedTuple):
 class Hooks(NamedTuple):
     """Compiled hooks of the fixes, called by address at their stage (see kernels.hooks)."""
 
+    evaluate: int  # address of the evaluator of formulas
     table: np.ndarray  # (k, HOOK_COLUMNS) int64
     members: np.ndarray  # int64: node numbers, or a 1 for each point that is a member
     code: np.ndarray  # (c, 2) int64: the programs of the formulas, one after another
@@ -67,7 +68,7 @@ class Hooks(NamedTuple):
 # then, for each component, a range of code and one of constants (-1: NULL).
 ADDRESS, STAGE, FROM, TO, SLOT, USES_BEFORE, USES_SHARE, CODE = range(8)
 HOOK_COLUMNS = CODE + 12
-VALUE, BEFORE, STACK = 6, 7, 8  # rows of Hooks.scratch
+VALUE, BEFORE = 6, 7  # rows of Hooks.scratch
 
 # Stages of a step at which fixes act, in Karamelo's names.
 INITIAL_INTEGRATE = 0

@@ -12,9 +12,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import config
+from numba import config, types
 
-from karamelo_py.compile import kernel
+from karamelo_py.compile import caller_of, kernel
 
 BLOCK = 128
 MAX_DEPTH = 32
@@ -370,6 +370,27 @@ def _evaluate_numpy(program, globals_, points, count, out, stack):
 
 
 evaluate = _evaluate_numpy if config.DISABLE_JIT else _evaluate_compiled
+
+
+# How kernels of hooks call the evaluator: by address, so that none of them has to contain it, and
+# with whole tables, since every slice in a kernel is dear to compile.
+_TABLE = types.float64[:, ::1]
+_ROW = types.float64[::1]
+EVALUATE = types.void(
+    types.int64[:, ::1], _ROW, _ROW, _TABLE, *[types.int64] * 6
+)  # fmt: skip
+call_evaluate = caller_of(EVALUATE)
+STACK = 8  # rows of the scratch table: x y z x0 y0 z0, two results, stack
+
+
+def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, last, count, result):
+    """`evaluate` the program code[begin:end] with constants[first:last].
+
+    The points are the first rows of `scratch`, the stack its last ones; row `result` takes the
+    results.
+    """
+    program = Program(code[begin:end], constants[first:last])
+    evaluate(program, globals_, scratch[:6], count, scratch[result], scratch[STACK:])
 
 
 @kernel

@@ -16,11 +16,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import cfunc, config, types
-from numba.extending import intrinsic
+from numba import types
 
-from karamelo_py.compile import kernel
+from karamelo_py.compile import caller_of, kernel
 from karamelo_py.kernels.arrays import (
     ADDRESS,
     BEFORE,
@@ -34,7 +32,6 @@ from karamelo_py.kernels.arrays import (
     POST_UPDATE_GRID_STATE,
     POST_VELOCITIES_TO_GRID,
     SLOT,
-    STACK,
     STAGE,
     TIME,
     TO,
@@ -42,7 +39,7 @@ from karamelo_py.kernels.arrays import (
     USES_SHARE,
     VALUE,
 )
-from karamelo_py.kernels.formula import BLOCK, Program, evaluate
+from karamelo_py.kernels.formula import BLOCK, call_evaluate
 from karamelo_py.points.kinematics import dimension
 
 _F8 = types.float64
@@ -52,55 +49,8 @@ POINT_FUNCTION = types.UniTuple(_F8, 3)(*[_F8] * 7)
 # Where in the node arrays a stage acts.
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 
-_uncompiled: list[Callable] = []
-_addresses: dict[Callable, int] = {}
-_keep_alive: list = []
-
-
-def address_of(function: Callable, signature: types.Type) -> int:
-    """Compile `function` (cached on disk) and return the address kernels call it by."""
-    if function not in _addresses:
-        if config.DISABLE_JIT:
-            _uncompiled.append(function)
-            _addresses[function] = len(_uncompiled) - 1
-        else:
-            compiled = cfunc(signature, cache=True, error_model="numpy")(function)
-            _keep_alive.append(compiled)
-            _addresses[function] = compiled.address
-    return _addresses[function]
-
-
-def _caller(signature: types.Type) -> Callable:
-    """An intrinsic that calls a function of this signature by its address."""
-    result, parameters = signature.return_type, signature.args
-
-    if config.DISABLE_JIT:
-        return lambda address, *arguments: _uncompiled[address](*arguments)
-
-    def codegen(context, builder, _, arguments):
-        kind = ir.FunctionType(
-            context.get_value_type(result), [context.get_value_type(p) for p in parameters]
-        )
-        pointer = builder.inttoptr(arguments[0], kind.as_pointer())
-        return builder.call(pointer, arguments[1:])
-
-    if len(parameters) == 8:
-
-        @intrinsic
-        def call(typing_context, address, a, b, c, d, e, f, g, h):
-            return result(types.int64, *parameters), codegen
-
-    else:
-
-        @intrinsic
-        def call(typing_context, address, a, b, c, d, e, f, g):
-            return result(types.int64, *parameters), codegen
-
-    return call
-
-
-_call_node_function = _caller(NODE_FUNCTION)
-_call_point_function = _caller(POINT_FUNCTION)
+_call_node_function = caller_of(NODE_FUNCTION)
+_call_point_function = caller_of(POINT_FUNCTION)
 
 
 NODE_STAGES = {
@@ -142,14 +92,27 @@ def point_hook(
 
 
 @kernel
-def _evaluate(hooks, h, component, count, control, out, shift):
-    """Formula of one component over the chosen members, at the present time plus `shift`."""
-    where, stack = hooks.scratch[:VALUE], hooks.scratch[STACK:]
-    row = hooks.table[h, CODE + 4 * component : CODE + 4 * component + 4]
-    program = Program(hooks.code[row[0] : row[1]], hooks.constants[row[2] : row[3]])
+def _evaluate(hooks, h, component, count, control, result, shift):
+    """Formula of one component over the chosen members, at the present time plus `shift`.
+
+    The results go to the row `result` of the scratch.
+    """
     time = control.values[TIME]
     control.values[TIME] = time + shift
-    evaluate(program, control.values, where, count, out, stack)
+    first = CODE + 4 * component
+    call_evaluate(
+        hooks.evaluate,
+        hooks.code,
+        hooks.constants,
+        control.values,
+        hooks.scratch,
+        hooks.table[h, first],
+        hooks.table[h, first + 1],
+        hooks.table[h, first + 2],
+        hooks.table[h, first + 3],
+        count,
+        result,
+    )
     control.values[TIME] = time
 
 
@@ -179,9 +142,9 @@ def _apply_at_nodes(target, kin, basis, nodes, shape, hooks, control, dt, h, cou
     for c in range(d):
         if hooks.table[h, CODE + 4 * c] < 0:
             continue
-        _evaluate(hooks, h, c, count, control, hooks.scratch[VALUE], 0.0)
+        _evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
         if hooks.table[h, USES_BEFORE]:
-            _evaluate(hooks, h, c, count, control, hooks.scratch[BEFORE], -dt)
+            _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -dt)
         total = 0.0
         for q in range(count):
             n = hooks.chosen[q]
@@ -228,7 +191,8 @@ def node_hooks(stage, target, kin, basis, nodes, shape, spans, hooks, control, d
             continue
         slot = hooks.table[h, SLOT]
         if slot >= 0:
-            control.values[slot : slot + 3] = 0.0
+            for c in range(3):
+                control.values[slot + c] = 0.0
         share = 1.0
         # The first pass only counts the members with mass, for those that share a total.
         for counting in (True, False):
@@ -277,9 +241,9 @@ def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y):
     for c in range(d):
         if hooks.table[h, CODE + 4 * c] < 0:
             continue
-        _evaluate(hooks, h, c, count, control, hooks.scratch[VALUE], 0.0)
+        _evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
         if hooks.table[h, USES_BEFORE]:
-            _evaluate(hooks, h, c, count, control, hooks.scratch[BEFORE], -dt)
+            _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -dt)
         total = 0.0
         for q in range(count):
             p = hooks.chosen[q]
@@ -307,14 +271,17 @@ def clear_point_totals(stage, hooks, control):
     for h in range(len(hooks.table)):
         slot = hooks.table[h, SLOT]
         if hooks.table[h, STAGE] == stage and slot >= 0:
-            control.values[slot : slot + 3] = 0.0
+            for c in range(3):
+                control.values[slot + c] = 0.0
 
 
 @kernel
 def point_hooks(stage, kin, v, mass, ids, hooks, control, dt, x, y):
     """Call the point functions of `stage` on the members in a block."""
     dt = float(dt)
-    hooks.scratch[:VALUE] = 0.0
+    for axis in range(6):
+        for q in range(BLOCK):
+            hooks.scratch[axis, q] = 0.0
     for h in range(len(hooks.table)):
         if hooks.table[h, STAGE] != stage:
             continue

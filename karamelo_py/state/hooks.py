@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import HOOK_COLUMNS, STACK, Hooks, NoHooks
-from karamelo_py.kernels.formula import BLOCK, MAX_DEPTH
+from karamelo_py.compile import address_of
+from karamelo_py.kernels.arrays import HOOK_COLUMNS, Hooks, NoHooks
+from karamelo_py.kernels.formula import BLOCK, EVALUATE, MAX_DEPTH, STACK, evaluate_in_table
 from karamelo_py.kernels.hooks import (
     NODE_FUNCTION,
     POINT_FUNCTION,
     STAGES,
     CompiledHook,
-    address_of,
 )
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def lower_hooks(hub: Hub) -> Hooks | NoHooks:
         return NoHooks()
     x0 = np.concatenate([s.x0 for s in hub.solids.values()]) if builder.on_points else None
     return Hooks(
+        evaluate=address_of(evaluate_in_table, EVALUATE),
         table=np.array(builder.rows, np.int64).reshape(-1, HOOK_COLUMNS),
         members=np.concatenate([np.empty(0, np.int64), *builder.members]),
         code=np.concatenate([np.empty((0, 2), np.int64), *builder.code]),
