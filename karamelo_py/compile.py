@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable
@@ -50,7 +51,7 @@ def _sources_hash() -> str:
     digest = hashlib.sha256(f"{sys.version}|{numba.__version__}".encode())
     for folder in _source_folders():
         for source in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder]:
-            digest.update(str(source).encode())
+            digest.update(source.relative_to(folder.parent).as_posix().encode())
             digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -59,12 +60,14 @@ def _use_cache_folder() -> Path:
     """Point Numba's cache at the folder of these sources and forget the oldest of the others."""
     import platformdirs
 
-    root = Path(os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py"))
+    home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
+    root = Path(home) / "kernels"
     folder = root / _sources_hash()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         folder.touch()
-        others = sorted(root.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+        ours = [path for path in root.iterdir() if re.fullmatch("[0-9a-f]{16}", path.name)]
+        others = sorted(ours, key=lambda path: path.stat().st_mtime, reverse=True)
         for old in others[_KEPT_CACHES:]:
             shutil.rmtree(old, ignore_errors=True)
     except OSError:

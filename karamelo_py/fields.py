@@ -162,6 +162,7 @@ class Fields:
 
     def node(self, name: str) -> np.ndarray:
         """A field of all nodes, (n,); nodes without mass are at rest."""
+        self._simulation.show_on_nodes()
         nodes = self._simulation.setup.nodes
         d = self.hub.domain.dimension
         mass = nodes.sums[:, 0].astype(float)

@@ -14,6 +14,7 @@ import numpy as np
 from karamelo_py.kernels.arrays import (
     DRIFT,
     DRIFT_LIMIT,
+    POINT_MASS,
     SPACING,
     Block,
     Control,
@@ -81,7 +82,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     transfer = hub.update.transfer_tag(real)
     shape = tuple(int(n) for n in domain.shape)
     tiles = Tiles(shape, domain.dimension, type(basis).width)
-    control = Control(hub.values.array, np.zeros(9), np.zeros(4, np.int64))
+    control = Control(hub.values.array, np.zeros(10), np.zeros(4, np.int64))
     control.real[SPACING] = domain.h
     control.real[DRIFT_LIMIT] = tiles.drift_limit
     control.real[DRIFT] = np.inf  # the points are not sorted yet
@@ -95,6 +96,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         shape=shape,
         control=control,
     )
+    control.real[POINT_MASS] = max(float(b.points.mass.max()) for b in setup.blocks)
     return setup, tiles
 
 

@@ -106,6 +106,7 @@ class Runner:
         hub, output = self.hub, self.hub.output
         last_step = first_step + self.steps if self.steps is not None else inf
         chunk = 1
+        snapshot, kept = simulation.snapshot(), simulation.step
         while simulation.step < last_step and simulation.time < self.end_time:
             if self.condition is not None and not self._goes_on():
                 break
@@ -115,13 +116,20 @@ class Runner:
             target = min(output.next_step(step), last_step, step + chunk)
             if self.condition is not None:
                 target = step + 1
-            snapshot = simulation.snapshot()
+            if step - kept >= CHUNK or kept == first_step < step:
+                snapshot, kept = simulation.snapshot(), step
             begun, compiled = time.perf_counter(), self.spent["compilation"]
             status = simulation.advance(int(target) - step)
             elapsed = time.perf_counter() - begun - (self.spent["compilation"] - compiled)
             self.spent["steps"] += elapsed
             if status != 0:
                 diagnosis.stop(hub, simulation, status, snapshot, self.place)
+            if compiled < self.spent["compilation"]:
+                # A rate that counts compilation would promise hours.
+                hub.console.end_run()
+                hub.console.begin_run(
+                    simulation.step, self._fraction(simulation, first_step, first_time) or 0.0
+                )
             taken = max(simulation.step - step, 1)
             chunk = int(min(CHUNK, max(1, PATIENCE * taken / max(elapsed, 1e-9))))
             with self._timed("output"):

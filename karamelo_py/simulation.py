@@ -14,6 +14,7 @@ from karamelo_py.kernels.arrays import (
     DT_FACTOR,
     END_TIME,
     FIXED_DT,
+    INITIAL_INTEGRATE,
     NOW,
     OVER_LIMIT,
     RATE,
@@ -26,6 +27,7 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.export import impose_stress
 from karamelo_py.kernels.hooks import ON_VELOCITY, POINT_STAGES, STAGES, CompiledHook
+from karamelo_py.kernels.stages import Everything, SumsToVelocity
 from karamelo_py.kernels.step import (
     DONE,
     SORT,
@@ -35,10 +37,12 @@ from karamelo_py.kernels.step import (
     at_nodes,
     at_points,
     choose_dt,
+    map_to_nodes,
     measure,
     run_steps,
+    step_size,
 )
-from karamelo_py.kernels.sweep import Serial, Threaded
+from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
 from karamelo_py.lowering import State, lower, thread_count
 from karamelo_py.points.materials import with_stress
 from karamelo_py.state.hooks import lower_hooks
@@ -52,21 +56,30 @@ def scene_key(hub: Hub) -> tuple:
     """What the arrays of a simulation depend on: while it stays the same, so do they."""
     update = hub.update
     return (
-        id(hub.domain),
+        hub.domain,
         hub.domain.h if hub.domain else None,
-        tuple(id(solid) for solid in hub.solids.values()),
-        id(update.method),
+        tuple(hub.solids.values()),
+        update.method,
         update.transfer,
         hub.settings.precision,
         hub.settings.threads,
     )
 
 
+def _sets_initial_state(fix: Any) -> bool:
+    """Whether all a fix does is a hook in Python before the first step."""
+    hooks = fix.hooks()
+    return set(hooks) == {"initial_integrate"} and not isinstance(
+        hooks["initial_integrate"], CompiledHook
+    )
+
+
 class PythonHooks:
-    """Hooks of a step when some fixes act from Python: these, and the compiled ones."""
+    """Hooks of a step when some fixes act from Python: theirs, and the compiled ones."""
 
     def __init__(self, simulation: Simulation, fixes: list):
         self.simulation = simulation
+        self.compiled = lower_hooks(simulation.hub, fixes)
         self.by_stage: dict[int, list[tuple[Any, Callable]]] = {}
         for fix in fixes:
             for name, hook in fix.hooks().items():
@@ -76,18 +89,20 @@ class PythonHooks:
 
 @at_nodes.on(PythonHooks)
 def _(hooks, stage, target, s):
-    at_nodes(hooks.simulation.hooks, stage, target, s)
+    at_nodes(hooks.compiled, stage, target, s)
     for fix, hook in hooks.by_stage.get(stage, ()):
         hook(NodesView(s, fix.group, stage, before_update=target == ON_VELOCITY))
 
 
 @at_points.on(PythonHooks)
 def _(hooks, stage, then, s):
-    at_points(hooks.simulation.hooks, stage, then, s)
+    at_points(hooks.compiled, stage, then, s)
     for fix, hook in hooks.by_stage.get(stage, ()):
         view = PointsView(hooks.simulation, fix.group, bool(then))
         hook(view)
-        if view.moved:
+        if view.moved and stage == INITIAL_INTEGRATE:
+            hooks.simulation.sort()
+        elif view.moved:
             s.control.real[DRIFT] = np.inf
 
 
@@ -106,13 +121,15 @@ class Simulation:
         )
         self.threads = thread_count(hub, self.count)
         self.mode = Threaded() if self.threads > 1 else Serial()
-        self.steps_taken = 0
         self.version = 0  # grows when fields change without a step
         self._measured = -1  # the version whose fastest point is known
         # Fixes of the first step that have acted: not again when the scene is lowered anew.
         self._begun: set[Any] = set(previous._begun) if previous else set()
         self.staged = False
         self.hooks: Hooks | NoHooks = NoHooks()
+        self._first: PythonHooks | None = None
+        self._first_fixes: list = []
+        self._mapped = False  # whether the nodes show a state of this simulation
 
     # --- fields by id -------------------------------------------------------------------------
 
@@ -189,21 +206,32 @@ class Simulation:
             numba.set_num_threads(self.threads)
         update = self.hub.update
         control = self.setup.control
-        self.hooks = lower_hooks(self.hub)
         control.real[FIXED_DT] = update.fixed_dt or 0.0
         control.real[DT_FACTOR] = update.dt_factor
         control.real[END_TIME] = end_time
         control.whole[OVER_LIMIT] = 0
+        # Twice: initial values may be formulas of dt, and dt follows the fastest point.
+        self._choose_dt()
         self._prepare_hooks()
+        self._choose_dt()
+        control.whole[WATCH_LIMIT] = int(not self.above_limit())
+        control.whole[OVER_LIMIT] = 0
+
+    def _choose_dt(self) -> None:
         if self._measured != self.version:
             # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
             measure(self.setup)
             self._measured = self.version
         choose_dt(self.setup.control)
-        control.whole[WATCH_LIMIT] = int(not self.above_limit())
-        control.whole[OVER_LIMIT] = 0
-        if control.real[DRIFT] > control.real[DRIFT_LIMIT]:
-            self.tiles.sort(self.setup, self.mode)
+
+    def sort(self) -> None:
+        """Sort the points by tile."""
+        self.tiles.sort(self.setup, self.mode)
+
+    def _sort_if_due(self) -> None:
+        control = self.setup.control.real
+        if control[DRIFT] > control[DRIFT_LIMIT]:
+            self.sort()
 
     @property
     def limit(self) -> float:
@@ -231,58 +259,82 @@ class Simulation:
         return int(self.setup.control.values[TIMESTEP])
 
     def advance(self, count: int) -> int:
-        """Take up to `count` steps (to the end time at most); DONE, STOPPED or ABOVE_LIMIT."""
+        """Take up to `count` steps (to the end time at most); DONE, STOPPED or ABOVE_LIMIT.
+
+        Points that are due to be sorted are sorted before the next step, so that the nodes keep
+        showing the last one.
+        """
         target = self.step + count
-        status = SORT
-        while status == SORT:
+        control = self.setup.control
+        while True:
+            self._sort_if_due()
             status = self._advance(target - self.step)
-            if status == SORT:
-                self.tiles.sort(self.setup, self.mode)
-                if self.step == target or self.time >= self.setup.control.real[END_TIME]:
-                    status = DONE
-        return status
+            self._mapped = True
+            ended = self.step >= target or control.values[TIME] >= control.real[END_TIME]
+            if status != SORT:
+                return status
+            if ended:
+                return DONE
 
     def _advance(self, count: int) -> int:
         scheme = self.hub.update.scheme
-        if self._first.by_stage:
+        if self._first is not None:
             status = run_steps(scheme, Staged(), self.mode, self.setup, self._first, 1)
-            self._first.by_stage.clear()
-            return SORT if status == DONE else status
+            if status in (DONE, SORT):
+                self._begun |= set(self._first_fixes)
+                self._first = None
+                return SORT  # there is more to do, unless that was all
+            return status
         if self._python.by_stage:
             return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
         visits = Staged() if self.staged else Fused()
         return advance(scheme, visits, self.mode, self.setup, self.hooks, count)
 
     def _prepare_hooks(self) -> None:
-        """Sort the fixes by how they act: once before the first step, from Python, compiled."""
+        """Sort the fixes by how they act: once before the first step, in it, in every step."""
         fixes = list(self.hub.fixes.values())
         lasting = [fix for fix in fixes if not fix.first_step_only]
         new = [fix for fix in fixes if fix.first_step_only and fix not in self._begun]
         self._python = PythonHooks(self, lasting)
+        self.hooks = self._python.compiled
         self.staged = bool(self._python.by_stage) or any(
             name in POINT_STAGES for fix in lasting for name in fix.hooks()
         )
-        self._first = PythonHooks(self, [])
-        for fix in new:
-            if set(fix.hooks()) == {"initial_integrate"}:
-                # Nothing happens in a step before this hook: no step of its own is needed.
-                fix.initial_integrate(PointsView(self, fix.group, then=False))
-                self.version += 1
-            else:
-                both = PythonHooks(self, [*lasting, *new])
-                both.by_stage.pop(STAGES["initial_integrate"], None)
-                self._first = both
-        self._begun |= set(new)
+        at_once = [fix for fix in new if _sets_initial_state(fix)]
+        for fix in at_once:
+            # Nothing happens in a step before this hook: the state shows it from the start.
+            view = PointsView(self, fix.group, then=False)
+            fix.hooks()["initial_integrate"](view)
+            if view.moved:
+                self.setup.control.real[DRIFT] = np.inf
+            self.version += 1
+        self._begun |= set(at_once)
+        self._first_fixes = [fix for fix in new if fix not in at_once]
+        self._first = None
+        if self._first_fixes:
+            together = [fix for fix in fixes if fix in lasting or fix in self._first_fixes]
+            self._first = PythonHooks(self, together)
+
+    def show_on_nodes(self) -> None:
+        """See that the nodes show the present state when no step has been taken yet."""
+        if not self._mapped:
+            s = self.setup
+            self._sort_if_due()
+            dt = step_size(s)
+            map_to_nodes(s, self.mode, Everything())
+            sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
+            self._mapped = True
 
     # --- state that can be returned to --------------------------------------------------------
 
     def snapshot(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Every array that a step changes, with a copy."""
         s = self.setup
-        arrays = [s.control.values, s.control.real, s.control.whole, s.spans]
+        arrays = [s.control.values, s.control.real, s.control.whole, s.spans[: 1 + s.spans[0, 0]]]
         for block in s.blocks:
             points = [field for field in block.points if field is not None]
-            arrays += [block.x, *points, *block.tiling, block.id]
+            tiling = block.tiling
+            arrays += [block.x, *points, block.id, tiling.colour, tiling.range[: tiling.colour[-1]]]
         return [(array, array.copy()) for array in arrays]
 
     def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:

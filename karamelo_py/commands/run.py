@@ -29,6 +29,7 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     dt_factor
     """
     hub.update.fixed_dt = dt
+    hub.values.set("dt", dt)
 
 
 def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:

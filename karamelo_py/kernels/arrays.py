@@ -84,13 +84,14 @@ class Control(NamedTuple):
     """What the compiled loop reads and writes beside the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
-    real: np.ndarray  # (9,) float64, see the names below
+    real: np.ndarray  # (10,) float64, see the names below
     whole: np.ndarray  # (4,) int64, see the names below
 
 
 TIME, TIMESTEP, DT = 0, 1, 2
 # Control.real
 FIXED_DT, DT_FACTOR, END_TIME, RATE, NEW_RATE, MOVE, DRIFT, DRIFT_LIMIT, SPACING = range(9)
+POINT_MASS = 9  # mass of the heaviest point
 # Control.whole
 NOW, WRONG, OVER_LIMIT, WATCH_LIMIT = range(4)
 

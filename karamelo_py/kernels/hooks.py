@@ -137,6 +137,7 @@ def _locate_nodes(kin, basis, shape, hooks, count):
 @kernel
 def _apply_at_nodes(target, kin, basis, nodes, shape, hooks, control, dt, h, count, share):
     """Act on the chosen nodes; add to the published totals."""
+    step_back = min(dt, control.values[TIME])  # nothing was before time 0
     _locate_nodes(kin, basis, shape, hooks, count)
     d = dimension(kin)
     for c in range(d):
@@ -144,7 +145,7 @@ def _apply_at_nodes(target, kin, basis, nodes, shape, hooks, control, dt, h, cou
             continue
         _evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
         if hooks.table[h, USES_BEFORE]:
-            _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -dt)
+            _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -step_back)
         total = 0.0
         for q in range(count):
             n = hooks.chosen[q]
@@ -231,6 +232,7 @@ def node_hooks(stage, target, kin, basis, nodes, shape, spans, hooks, control, d
 @kernel
 def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y):
     """Act on the chosen points; add to the published totals."""
+    step_back = min(dt, control.values[TIME])
     where = hooks.scratch
     d = dimension(kin)
     for q in range(count):
@@ -243,7 +245,7 @@ def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y):
             continue
         _evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
         if hooks.table[h, USES_BEFORE]:
-            _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -dt)
+            _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -step_back)
         total = 0.0
         for q in range(count):
             p = hooks.chosen[q]

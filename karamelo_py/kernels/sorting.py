@@ -19,7 +19,8 @@ def order_points(kin, basis, size, shape, x, start, tile, order):
         number = 0
         for k in range(dimension(kin)):
             last = pick(k, basis.nx, basis.ny, basis.nz) - 1
-            cell = min(int(in_cells(basis, k, x[p, k])), last)
+            # Clamped, since a hook may have put a point anywhere: the next sweep finds it.
+            cell = min(max(int(in_cells(basis, k, x[p, k])), 0), last)
             number = number * shape[k] + cell // size
         tile[p] = number
         start[number + 1] += 1

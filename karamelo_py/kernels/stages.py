@@ -13,7 +13,7 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compile import index, point_function, real, shared
-from karamelo_py.points.basis import entry, inside, locate
+from karamelo_py.points.basis import entry, inside, locate, mapped_again
 from karamelo_py.points.kinematics import (
     add_outer,
     add_symmetric_dot,
@@ -71,7 +71,7 @@ class Gradient(NamedTuple):
 
 
 class VelocityAndGradient(NamedTuple):
-    """Gather both from v*, in one visit."""
+    """Gather both in one visit."""
 
     reads = ("x", "v", "state", "material")
     writes = ("x moved", "v", "moment", "state")
@@ -173,7 +173,7 @@ def _(gather, transfer, kin, basis, stencil, k, nodes, total):
         add_scaled(total[0], weight, v),
         add_scaled(total[1], weight, dv),
         add_moment(transfer, kin, basis, stencil, k, weight, v, total[2]),
-        add_outer(kin, total[3], v, gradient),
+        add_outer(kin, total[3], vector_at(kin, nodes.velocity, i), gradient),
     )
 
 
@@ -238,7 +238,7 @@ def _strain(kin, points, laws, p, dt, gradient, fastest):
     squared = wave_speed_squared(law, kin, state)
     speed = largest_component(kin, vector_at(kin, points.v, p))
     slack = fastest - speed
-    if slack < 0 or squared > slack * slack:
+    if slack < 0 or not squared <= slack * slack:  # so written, NaN is noticed too
         return sqrt(squared) + speed
     return fastest
 
@@ -265,29 +265,34 @@ def _(scatter, kin, basis, stencil, y):
 
 
 @point_function()
-def load(scatter, transfer, kin, points, laws, p, like):
+def load(scatter, transfer, kin, basis, points, laws, p, like):
     """What a point brings to the nodes."""
 
 
 @load.on(Nothing)
-def _(scatter, transfer, kin, points, laws, p, like):
+def _(scatter, transfer, kin, basis, points, laws, p, like):
     return ()
 
 
 @load.on(Momentum)
+def _(scatter, transfer, kin, basis, points, laws, p, like):
+    moment = moment_at(points.moment, p, zero_moment(transfer, kin, like))
+    return points.mass[p], vector_at(kin, points.v, p), mapped_again(basis, moment)
+
+
 @load.on(MassMomentum)
-def _(scatter, transfer, kin, points, laws, p, like):
+def _(scatter, transfer, kin, basis, points, laws, p, like):
     moment = moment_at(points.moment, p, zero_moment(transfer, kin, like))
     return points.mass[p], vector_at(kin, points.v, p), moment
 
 
 @load.on(Force)
-def _(scatter, transfer, kin, points, laws, p, like):
+def _(scatter, transfer, kin, basis, points, laws, p, like):
     return _force(kin, points, laws, p, like)
 
 
 @load.on(Everything)
-def _(scatter, transfer, kin, points, laws, p, like):
+def _(scatter, transfer, kin, basis, points, laws, p, like):
     moment = moment_at(points.moment, p, zero_moment(transfer, kin, like))
     return points.mass[p], vector_at(kin, points.v, p), moment, _force(kin, points, laws, p, like)
 
@@ -374,7 +379,14 @@ class SumsToVelocity(NamedTuple):
 
 
 class UpdateToVelocity(NamedTuple):
-    """The velocity whose gradient deforms the points is v* (USL)."""
+    """The velocity whose gradient deforms the points is v*, limited at light nodes (USL).
+
+    A point of mass m that gives a node the share N of it gets back the strain of f dt / (N m) from
+    there: an oscillation that grows when (c dt / h)^2 > N. Nodes lighter than (c dt / h)^2 m are
+    `light`; the limit vanishes with the step.
+    """
+
+    light: float
 
 
 @point_function()
@@ -423,5 +435,11 @@ def _(task, kin, nodes, n, dt):
 
 @at_node.on(UpdateToVelocity)
 def _(task, kin, nodes, n, dt):
-    for k in range(dimension(kin)):
-        nodes.velocity[n, k] = nodes.update[n, k]
+    # See UpdateToVelocity.light: the change of a light node's velocity enters the gradient by the
+    # share of its mass. Points take the whole change: momentum is kept.
+    d = dimension(kin)
+    one = real(1, dt)
+    mass = nodes.sums[n, 0]
+    share = mass / task.light if mass < task.light else one
+    for k in range(d):
+        nodes.velocity[n, k] = nodes.update[n, k] - (one - share) * nodes.update[n, d + k]

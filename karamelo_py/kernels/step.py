@@ -22,6 +22,7 @@ from karamelo_py.kernels.arrays import (
     NEW_RATE,
     NOW,
     OVER_LIMIT,
+    POINT_MASS,
     POST_ADVANCE_PARTICLES,
     POST_GRID_TO_POINT,
     POST_PARTICLES_TO_GRID,
@@ -239,6 +240,13 @@ def _(hooks, stage, then, s):
     hook_points(s, hooks, stage, now, 1 - now if then else now)
 
 
+@shared
+def light_node(s):
+    """Nodal mass below which USL limits the velocity in the gradient: (c dt / h)^2 point masses."""
+    courant = s.control.real[RATE] * s.control.values[DT] / s.control.real[SPACING]
+    return real(min(courant * courant, 1.0) * s.control.real[POINT_MASS], s.basis.h)
+
+
 # --- stages that schemes share ----------------------------------------------------------------
 
 
@@ -273,7 +281,10 @@ def move_points(s, mode, hooks):
 
 @point_function(tags=2)
 def begin(scheme, visits, mode, s):
-    """Before the first of several steps: fused steps expect the sums on the nodes."""
+    """Before the first of several steps: fused steps expect the sums on the nodes.
+
+    Returns whether all points are on the grid.
+    """
 
 
 DONE, STOPPED, ABOVE_LIMIT, SORT = range(4)
@@ -288,7 +299,8 @@ def run_steps(scheme, visits, mode, s, hooks, count):
     is depends on the points only, never on where a run is interrupted.
     """
     control = s.control
-    begin(scheme, visits, mode, s)
+    if not begin(scheme, visits, mode, s):
+        return STOPPED
     for n in range(count):
         time = control.values[TIME] + control.values[DT]
         last = n + 1 == count or time >= control.real[END_TIME]

@@ -57,7 +57,7 @@ def sweep_tile(
         furthest = max(furthest, moved)
         fastest = rate
         stencil = restencil(scatter, kin, basis, stencil, vector_at(kin, y_all, p))
-        burden = load(scatter, transfer, kin, points, laws, p, dt)
+        burden = load(scatter, transfer, kin, basis, points, laws, p, dt)
         for k in range(support(basis, kin)):
             scattered(scatter, transfer, kin, basis, stencil, k, nodes, burden)
     tiling.report[t, 0] = furthest

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from karamelo_py.domain import RELATIVE_TOLERANCE
+
 if TYPE_CHECKING:
     from karamelo_py.domain import Domain
     from karamelo_py.hub import Hub
@@ -31,6 +35,7 @@ class ULMPM:
     def make_basis(self, domain: Domain, real: type) -> Any:
         """The basis on the grid of `domain`, its numbers in the precision `real`."""
         size = (domain.hi - domain.lo) / domain.h
+        reach = float(np.abs([domain.lo, domain.hi]).max()) / domain.h
         _, ny, nz = domain.shape
         return self.basis(
             *(real(x) for x in domain.lo),
@@ -42,6 +47,7 @@ class ULMPM:
             lx=real(size[0]),
             ly=real(size[1]),
             lz=real(size[2]),
+            slack=real(max(RELATIVE_TOLERANCE, 8 * np.finfo(real).eps * reach)),
             step_x=int(ny * nz),
             step_y=int(nz),
         )

@@ -61,7 +61,7 @@ class MUSL(NamedTuple):
 
 @begin.on(MUSL, Fused)
 def _(scheme, visits, mode, s):
-    map_to_nodes(s, mode, Everything())
+    return map_to_nodes(s, mode, Everything())
 
 
 @step.on(MUSL, Fused)
@@ -81,7 +81,7 @@ def _(scheme, visits, mode, s, hooks, more):
 
 @begin.on(MUSL, Staged)
 def _(scheme, visits, mode, s):
-    return None
+    return True
 
 
 @step.on(MUSL, Staged)

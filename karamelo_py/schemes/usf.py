@@ -59,7 +59,7 @@ class USF(NamedTuple):
 
 @begin.on(USF, Fused)
 def _(scheme, visits, mode, s):
-    map_to_nodes(s, mode, MassMomentum())
+    return map_to_nodes(s, mode, MassMomentum())
 
 
 @shared
@@ -87,7 +87,7 @@ def _(scheme, visits, mode, s, hooks, more):
 
 @begin.on(USF, Staged)
 def _(scheme, visits, mode, s):
-    return None
+    return True
 
 
 @step.on(USF, Staged)

@@ -21,6 +21,7 @@ from karamelo_py.kernels.step import (
     Staged,
     at_points,
     begin,
+    light_node,
     map_to_nodes,
     move_points,
     step,
@@ -34,8 +35,10 @@ from karamelo_py.kernels.sweep import sweep_nodes
 class USL(NamedTuple):
     """The stress follows from the gradient of the updated nodal velocity.
 
-    One visit of the points a step: the fastest scheme. It dissipates a little, and a node with
-    next to no mass has a large velocity, which its gradient shows.
+    One visit of the points a step: the fastest scheme. It dissipates a little. A node with next to
+    no mass gets a large velocity, which would show in the gradient: there, and there only, the
+    gradient takes the change of velocity by the share of the mass, below (c dt / h)^2 times the
+    mass of a point. Momentum is kept.
 
     Example
     -------
@@ -50,13 +53,14 @@ class USL(NamedTuple):
 
 @begin.on(USL, Fused)
 def _(scheme, visits, mode, s):
-    map_to_nodes(s, mode, Everything())
+    return map_to_nodes(s, mode, Everything())
 
 
 @step.on(USL, Fused)
 def _(scheme, visits, mode, s, hooks, more):
     dt = step_size(s)
     update_nodes(s, mode, hooks)
+    sweep_nodes(mode, UpdateToVelocity(light_node(s)), s.kin, s.nodes, s.spans, dt)
     if not more:
         return sweep(s, mode, VelocityAndGradient(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
@@ -65,7 +69,7 @@ def _(scheme, visits, mode, s, hooks, more):
 
 @begin.on(USL, Staged)
 def _(scheme, visits, mode, s):
-    return None
+    return True
 
 
 @step.on(USL, Staged)
@@ -75,7 +79,7 @@ def _(scheme, visits, mode, s, hooks, more):
     if not map_to_nodes(s, mode, Everything()):
         return False
     update_nodes(s, mode, hooks)
-    sweep_nodes(mode, UpdateToVelocity(), s.kin, s.nodes, s.spans, dt)
+    sweep_nodes(mode, UpdateToVelocity(light_node(s)), s.kin, s.nodes, s.spans, dt)
     if not move_points(s, mode, hooks):
         return False
     if not sweep(s, mode, Gradient(), Nothing(), dt):

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
 
-def lower_hooks(hub: Hub) -> Hooks | NoHooks:
-    """Tables of the compiled hooks of all fixes, in the order of the fixes."""
+def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
+    """Tables of the compiled hooks of `fixes`, in their order."""
     dimension = hub.domain.dimension
     count = sum(len(s.x0) for s in hub.solids.values())
     builder = _Builder(hub, count)
-    for fix in hub.fixes.values():
+    for fix in fixes:
         for name, hook in fix.hooks().items():
             if isinstance(hook, CompiledHook):
                 builder.add(fix, STAGES[name], hook)
@@ -65,6 +65,8 @@ class _Builder:
         row = [address, stage, begin, end, slot, int(hook.uses_before), int(hook.uses_share)]
         for formula in fix.formulas:
             row += self._program(formula)
+        if len(row) > HOOK_COLUMNS:
+            raise ValueError(f"fix '{fix.id}' has more formulas than there are directions, three")
         row += [-1] * (HOOK_COLUMNS - len(row))
         self.rows.append(row)
         self.on_points |= not hook.on_nodes

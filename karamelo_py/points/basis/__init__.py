@@ -36,3 +36,8 @@ def reach(basis, kin, stencil, k):
 @point_function(tags=2)
 def affine_weight(basis, kin, stencil, k):
     """N_I D^-1 (X_I - x) of the affine transfers, with D = sum_I N_I (X_I - x)(X_I - x)^T."""
+
+
+@point_function()
+def mapped_again(basis, moment):
+    """The part of a point's moment of velocity that MUSL maps to the nodes the second time."""

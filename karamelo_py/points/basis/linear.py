@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from karamelo_py.compile import real
+from karamelo_py.points.basis import mapped_again
 from karamelo_py.points.basis.product import affine_along, along, in_cells, pick, register
+from karamelo_py.tensors import scale
 
 
 class Linear(NamedTuple):
@@ -30,6 +32,7 @@ class Linear(NamedTuple):
     lx: float  # size of the domain in cells, not always whole
     ly: float
     lz: float
+    slack: float  # how far beyond the domain a point still counts as in it, in cells
     step_x: int  # from a node's number to that of its neighbour
     step_y: int
 
@@ -51,6 +54,13 @@ def _(basis, line, k):
     # (Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-particle-in-cell
     # method", section 5.3).
     return line[3][k]
+
+
+@mapped_again.on(Linear)
+def _(basis, moment):
+    # B D^-1 grows without bound where D vanishes: the velocity that deforms the points leaves it
+    # out, and the points keep B, so that nothing is lost.
+    return scale(real(0, basis.h), moment)
 
 
 register(Linear)

@@ -36,7 +36,8 @@ def in_cells(basis, direction, x):
 @shared
 def _within(basis, direction, x):
     a = in_cells(basis, direction, x)
-    return a >= 0 and a <= pick(direction, basis.lx, basis.ly, basis.lz)
+    end = pick(direction, basis.lx, basis.ly, basis.lz)
+    return a >= -basis.slack and a <= end + basis.slack
 
 
 def register(basis: type) -> None:
