@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from karamelo_py.kernels.step import ABOVE_LIMIT
+from karamelo_py.schemes.musl import MUSL
 from karamelo_py.script.errors import Place, ScriptError
 
 if TYPE_CHECKING:
@@ -15,6 +16,18 @@ if TYPE_CHECKING:
     from karamelo_py.simulation import Simulation
 
 LAST_GOOD = "last_good.*.LAMMPS"
+
+
+def warn_about_scheme(hub: Hub, simulation: Simulation) -> None:
+    """Say so before the first step when transfer, basis and scheme do not go together well."""
+    update, basis = hub.update, simulation.setup.basis
+    if update.transfer.keeps_moment and not basis.steady_moment and update.scheme != MUSL():
+        transfer, scheme = type(update.transfer).__name__, type(update.scheme).__name__.lower()
+        hub.warn(
+            f"{transfer} with {type(basis).__name__.lower()} functions and {scheme} is unstable "
+            "where a point barely reaches a node: stressed bodies that move will blow up",
+            hint="scheme(musl), or FLIP",
+        )
 
 
 def warn_about_step(hub: Hub, simulation: Simulation) -> None:

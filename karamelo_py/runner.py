@@ -82,6 +82,7 @@ class Runner:
         started = time.perf_counter()
         simulation.begin(self.end_time)
         diagnosis.warn_about_step(hub, simulation)
+        diagnosis.warn_about_scheme(hub, simulation)
         first_step = simulation.step
         first_time = simulation.time
         self._banner(simulation)

@@ -382,8 +382,8 @@ class UpdateToVelocity(NamedTuple):
     """The velocity whose gradient deforms the points is v*, limited at light nodes (USL).
 
     A point of mass m that gives a node the share N of it gets back the strain of f dt / (N m) from
-    there: an oscillation that grows when (c dt / h)^2 > N. Nodes lighter than (c dt / h)^2 m are
-    `light`; the limit vanishes with the step.
+    there: an oscillation that grows when (c dt / h)^2 > N, in d directions at once. Nodes lighter
+    than `light` = d (c dt / h)^2 m count as such; the limit vanishes with the step.
     """
 
     light: float

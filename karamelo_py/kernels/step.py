@@ -46,7 +46,7 @@ from karamelo_py.kernels.hooks import (
 from karamelo_py.kernels.stages import ClearSums, Nothing, Update, Velocity
 from karamelo_py.kernels.sweep import sweep_nodes, sweep_tiles
 from karamelo_py.points.basis import inside
-from karamelo_py.points.kinematics import largest_component, vector_at
+from karamelo_py.points.kinematics import dimension, largest_component, vector_at
 from karamelo_py.points.materials import initial_state, wave_speed_squared
 from karamelo_py.tensors import record, row, subtract
 
@@ -242,9 +242,10 @@ def _(hooks, stage, then, s):
 
 @shared
 def light_node(s):
-    """Nodal mass below which USL limits the velocity in the gradient: (c dt / h)^2 point masses."""
+    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 point masses."""
     courant = s.control.real[RATE] * s.control.values[DT] / s.control.real[SPACING]
-    return real(min(courant * courant, 1.0) * s.control.real[POINT_MASS], s.basis.h)
+    masses = dimension(s.kin) * courant * courant
+    return real(masses * s.control.real[POINT_MASS], s.basis.h)
 
 
 # --- stages that schemes share ----------------------------------------------------------------

@@ -37,7 +37,7 @@ class USL(NamedTuple):
 
     One visit of the points a step: the fastest scheme. It dissipates a little. A node with next to
     no mass gets a large velocity, which would show in the gradient: there, and there only, the
-    gradient takes the change of velocity by the share of the mass, below (c dt / h)^2 times the
+    gradient takes the change of velocity by the share of the mass, below d (c dt / h)^2 times the
     mass of a point. Momentum is kept.
 
     Example

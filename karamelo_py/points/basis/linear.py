@@ -37,6 +37,7 @@ class Linear(NamedTuple):
     step_y: int
 
     width = 2
+    steady_moment = False  # D of the affine transfers vanishes at the nodes
 
 
 @along.on(Linear)

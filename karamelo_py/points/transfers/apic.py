@@ -18,10 +18,13 @@ from karamelo_py.tensors import add_scaled, scale
 class APIC(NamedTuple):
     """v_p = v_pic, and B_p = sum N_I v*_I (X_I - x_p)^T travels with the point.
 
-    Conserves linear and angular momentum to round-off and adds no noise. The point gives the node
+    Conserves linear and angular momentum to round-off. The point gives the node
     m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)); keeping B rather than B D^-1 makes that exact for
     linear functions too, whose D changes with the place in the cell
     (Jiang, Schroeder & Teran 2017, eqs. 15 to 18).
+
+    With linear functions D vanishes at the nodes: the velocity that deforms the points leaves the
+    moments out under musl; usl and usf are unstable with it, and a run says so.
 
     Example
     -------
