@@ -41,6 +41,9 @@ NODE_NAMES = (
 
 
 # Columns of Karamelo that are always zero here: nothing keeps them apart, or there is none.
+ABSENT_AT_POINTS = (
+    "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
+)  # fmt: skip
 ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -115,7 +116,7 @@ def _file_name(argument: Argument) -> str:
         raise ScriptError(
             "a file name is missing", place=argument.place, expected="the name of a file"
         )
-    return name
+    return os.path.expanduser(name)
 
 
 # ---- conversion ---------------------------------------------------------------------------------

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from karamelo_py.log import Log
+from karamelo_py.log import FILE, Log
 from karamelo_py.plots import Plots
+from karamelo_py.script.errors import ScriptError
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -40,6 +43,28 @@ class Output:
         # Which dump a file belongs to.
         self.files: dict[Path, str] = {}
 
+    def check_file(self, file: Path) -> None:
+        """Refuse to write to `file` if that is the log or a script, or cannot be done.
+
+        Raises
+        ------
+        ScriptError
+            With the argument ``file``.
+        """
+        path = self.hub.folder / file
+        scripts = getattr(self.hub.interpreter, "files", ())
+        if _may_be(path, self.hub.folder / FILE):
+            what = f"{file} is the log"
+        elif any(_may_be(path, script) for script in scripts):
+            what = f"{file} is the script itself"
+        elif path.exists() and not os.access(path, os.W_OK):
+            what = f"{file} is there and cannot be overwritten"
+        elif not path.exists() and path.parent.is_dir() and not os.access(path.parent, os.W_OK):
+            what = f"nothing can be written to the folder {path.parent}"
+        else:
+            return
+        raise ScriptError(what, argument="file", expected="the name of another file")
+
     def begin(self, run: Any = None) -> None:
         """Write the headers and the first state of a run."""
         if self.hub.rehearsing:
@@ -61,7 +86,13 @@ class Output:
             # Computes and energy fixes only work when somebody looks.
             self.hub.refresh_values()
         for item in due:
-            item.write()
+            try:
+                item.write()
+            except ScriptError as error:
+                raise _located(error, item) from error.__cause__
+            except OSError as error:
+                what = f"cannot write {error.filename or 'a file'}: {error.strerror or error}"
+                raise _located(ScriptError(what), item) from error
             item.last_step = step
 
     def end(self, last: bool = True) -> None:
@@ -70,22 +101,48 @@ class Output:
             return
         if last:
             self.write(last=True)
-        self.plots.save()
+        self._save_plots()
 
     def abort(self) -> None:
         """Draw the plots and close the log of a run that breaks off.
 
-        Writes no
-        further state.
-
-        A caller that holds a sound state calls ``write(last=True)`` before.
+        No further state is written: a caller that holds a sound one calls ``write(last=True)``
+        before. What prevents the plots is told as a warning, as another error is on its way.
         """
         if self.hub.rehearsing:
             return
         try:
-            self.plots.save()
+            self._save_plots()
+        except ScriptError as error:
+            self.hub.console.warn(error.render())
         finally:
             self.log.close()
 
+    def _save_plots(self) -> None:
+        try:
+            self.plots.save()
+        except ScriptError as error:
+            raise _located(error, self.plots) from error.__cause__
+
     def _items(self) -> list[Periodic]:
         return [self.log, *self.hub.dumps.values(), *self.plots]
+
+
+def _located(error: ScriptError, item: Any) -> ScriptError:
+    """The error of an output, with the place of the command that asked for it."""
+    place = getattr(item, "place", None)
+    if error.place is None and place is not None:
+        error.place = place
+        error.complete = True
+    return error
+
+
+def _may_be(path: Path, other: Path) -> bool:
+    """Whether `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
+    if "*" not in str(path):
+        try:
+            return path.resolve() == other.resolve() or path.samefile(other)
+        except OSError:
+            return False
+    pattern = re.escape(str(path.absolute())).replace(r"\*", r"\d+", 1)
+    return re.fullmatch(pattern, str(other.absolute())) is not None

@@ -11,6 +11,7 @@ from karamelo_py.quantity import Quantity
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
+    from karamelo_py.script.errors import Place
 
 __all__ = ["FORMATS", "Curve", "Plots"]
 
@@ -41,6 +42,7 @@ class Plots:
     def __init__(self, hub: Hub):
         self.hub = hub
         self.file: Path | None = None
+        self.place: Place | None = None  # of save_plot
         self._curves: dict[str, Curve] = {}
 
     def __iter__(self) -> Iterator[Curve]:

@@ -14,7 +14,7 @@ from karamelo_py.dumps.grid_gz import GridGz
 from karamelo_py.dumps.particle import Particle
 from karamelo_py.dumps.particle_gz import ParticleGz
 from karamelo_py.dumps.pyplot import PyPlot
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Place, ScriptError
 
 
 @pytest.fixture(params=[1, 2, 3])
@@ -185,6 +185,15 @@ def test_a_folder_that_went_away_is_a_script_error(plane):
         Particle(plane, 1, "gone/p.*.dump").write()
 
 
+def test_an_error_of_a_dump_in_a_run_is_its_own(plane):
+    plane.dumps["d"] = Particle(plane, 2, "gone/p.*.dump")
+    plane.dumps["d"].place = Place("in.test", 7, 1, 4, "dump(...)")
+    with pytest.raises(ScriptError) as caught:
+        plane.run(4)
+    assert caught.value.render().startswith("in.test:7:1: error: cannot write ")
+    assert "p.0.dump" in caught.value.message
+
+
 @pytest.mark.parametrize("field", [None, "seq"])
 @pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
 def test_pyplot_draws(hub, field, ending):
@@ -215,6 +224,31 @@ def test_pyplot_shows_the_points_of_each_state(plane):
     )
     assert first != second
     assert second == fresh
+
+
+@pytest.mark.parametrize("ending", ["png", "pdf"])
+@pytest.mark.filterwarnings("error")
+def test_small_pictures_give_no_warning(hub, ending):
+    PyPlot(hub, 1, f"p.{ending}", 0.2, 60, "seq").write()
+
+
+def test_pictures_of_a_run_do_not_jump(hub):
+    """The frame and the name of the field stay where they are, whatever the numbers."""
+    dump = PyPlot(hub, 1, "p.png", 4, 3, "seq")
+    dump.write()
+    picture = dump._picture
+
+    def places():
+        boxes = [picture.axes.get_position(), picture.scale.label.get_window_extent()]
+        return np.array([box.bounds for box in boxes])
+
+    before = places()
+    for factor in (-1e7, 3.3):
+        hub.fields.points["seq"] *= factor
+        dump.write()
+        labels = [label.get_text() for label in picture.scale.get_ticklabels()]
+        assert {len(label.partition(".")[2]) for label in labels} == {2}
+        np.testing.assert_allclose(places(), before, atol=1e-9)
 
 
 def test_pyplot_survives_fields_without_range(plane):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 
 import pytest
 
@@ -68,7 +69,16 @@ def test_dumps_are_made_as_said(hub):
         ("dump(d, all, pyplot, 1, f.jpg, 3, 3)", "f.jpg", ".png"),
         ("dump(d, all, pyplot, 1, f.png, 0, 3)", "0", "above 0"),
         ("dump(d, all, pyplot, 1, f.png, 3, 3, sqe)", "sqe", "'seq'"),
+        ("dump(d, all, pyplot, 1, f.png, 20001, 3)", "20001", "20000 pixels"),
+        ("dump(d, all, pyplot, 1, f.png, 3, 0.1)", "0.1", "20 to"),
         ("dump(d, all, particle, 1)", "", "file"),
+        ("dump(d, all, particle, 1, log.mpm)", "log.mpm", "log.mpm is the log"),
+        ("dump(d, all, particle, 1, ./log.mpm)", "./log.mpm", "is the log"),
+        ("save_plot(in.plot.png)", "in.plot.png", "the script itself"),
+        ("dump(d, all, pyplot, 1, in.*.png, 3, 3)", "in.*.png", "the script itself"),
+        ("dump(d, all, particle, 1, vx, vy)", "vx", "is a column, not a file"),
+        ("dump(d, all, particle, d.*.dump, 10)", "d.*.dump", "the file comes second"),
+        ("dump(d, all, particle, f, 10)", "f", "argument 1 'every' must be a whole number"),
         ("delete_dump(d)", "d", "no dump"),
         ("set_output(0)", "0", "above 0"),
         ("log(0)", "0", "above 0"),
@@ -86,6 +96,7 @@ def test_dumps_are_made_as_said(hub):
     ],
 )
 def test_mistakes_are_marked(hub, line, word, remedy):
+    hub.interpreter.files += [hub.folder / "in.plot.png", hub.folder / "in.12.png"]
     rendered, marked = refused(hub, line)
     assert marked.startswith(word)
     assert remedy in rendered
@@ -102,6 +113,32 @@ def test_names_are_used_once(hub):
     say(hub, "delete_dump(d)")
     assert "already writes" in refused(hub, "dump(d, all, particle, 1, f)")[0]
     say(hub, "dump(d, all, particle, 1, g.*)\ndelete_dump(d)\ndump(d, all, particle, 1, g.*)")
+
+
+def test_scripts_that_were_read_are_not_overwritten(hub, tmp_path):
+    (tmp_path / "in.part").write_text("a = 1")
+    (tmp_path / "in.main").write_text("include(in.part)\ndump(d, all, particle, 1, in.part)")
+    with pytest.raises(ScriptError, match=r"in\.part is the script itself"):
+        hub.interpreter.run_file("in.main")
+
+
+def test_columns_that_nothing_keeps_are_told(hub):
+    say(hub, "dump(d, all, particle, 1, f, x, ep, damage)\ndump(g, all, grid, 1, g, T)")
+    warnings = hub.console.err.getvalue()
+    assert "in.test:1:1: warning: dump: ep, damage will be 0" in warnings
+    assert "in.test:2:1: warning: dump: T will be 0" in warnings
+
+
+def test_a_list_of_columns_names_each_once(hub):
+    columns = re.search("one of (.*)", refused(hub, "dump(d, all, grid, 1, f, masss)")[0])[1]
+    assert len(columns.split()) == len(set(columns.split()))
+
+
+def test_a_home_folder_is_found(hub, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    say(hub, "dump(d, all, particle, 1, ~/f)")
+    assert hub.dumps["d"].path() == tmp_path / "f"
 
 
 def test_quantities(hub):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from karamelo_py import registry, signature
+from karamelo_py.arguments import NUMBER
 from karamelo_py.dumps.files import picture_format
 from karamelo_py.plots import Curve
 from karamelo_py.quantity import Quantity
@@ -30,6 +32,11 @@ def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argum
         What the style asks for, beginning with the steps between two snapshots and the file name;
         see the page of the style.
 
+    Notes
+    -----
+    Files of that name are overwritten. Snapshots of an earlier, longer run whose steps this run
+    does not reach stay: a viewer would show them after its own.
+
     Example
     -------
     dump(d1, all, particle, 100, dump_p.*.LAMMPS, x, y, z, vx, vy, vz)
@@ -39,6 +46,7 @@ def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argum
     delete_dump
     """
     target = registry.find("dump", style)
+    _check_order(hub, arguments)
     new = signature.call(target, hub, list(arguments), f"dump {style}")
     writer = hub.output.files.get(new.file)
     if writer is not None and ID not in hub.dumps:
@@ -49,6 +57,22 @@ def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argum
         )
     hub.dumps.add(ID, new)
     hub.output.files[new.file] = ID
+
+
+def _check_order(hub: Hub, arguments: tuple[Argument, ...]) -> None:
+    """Tell of a file name in front of the number of steps."""
+    if len(arguments) < 2:
+        return
+    first, second = arguments[:2]
+    known = hub.interpreter.variables.get(first.text, "")
+    word = first.word() if isinstance(known, str) else None
+    if word and (re.search(r"[.*/]", word) or NUMBER.fullmatch(second.text)):
+        raise ScriptError(
+            "argument 1 'every' must be a whole number; the file comes second",
+            place=first.place,
+            expected="the steps between two snapshots, then the file",
+            hint=f"{second.text}, {first.text}" if NUMBER.fullmatch(second.text) else None,
+        )
 
 
 dump.syntax = "ID, all, style, every, file[, ...]"  # the rest is the style's own
@@ -186,9 +210,7 @@ def plot(hub: Hub, ID: str, every: Annotated[int, Positive], x: Quantity, y: Qua
 def save_plot(hub: Hub, file: OutputFile) -> None:
     """Draw the curves of all plot commands to a file at the end of each run.
 
-    A run that breaks off draws them, too.
-
-    After a run, it draws what was collected.
+    A run that breaks off draws them, too. Given after a run, it draws at once what was collected.
 
     Parameters
     ----------
@@ -204,7 +226,8 @@ def save_plot(hub: Hub, file: OutputFile) -> None:
     plot
     """
     picture_format(file)
+    hub.output.check_file(file)
     plots = hub.output.plots
-    plots.file = file
+    plots.file, plots.place = file, hub.place
     if not hub.rehearsing:
         plots.save()

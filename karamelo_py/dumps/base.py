@@ -36,6 +36,7 @@ class Dump:
         self.hub = hub
         self.every = every
         self.file = Path(file)
+        hub.output.check_file(self.file)
         self.columns = columns
         self.last_step: int | None = None
 
@@ -52,12 +53,17 @@ class Dump:
         """Write the present state."""
         raise NotImplementedError
 
+    def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
+        """Warn of columns that are 0 because no point or node (`what`) keeps them."""
+        empty = [name for name in dict.fromkeys(columns) if name in absent]
+        if empty:
+            self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} keep no such thing")
+
     @staticmethod
     def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
         """Refuse names that are not `known`.
 
-        `first` is the place of the first column among the
-        arguments of the style.
+        `first` is the place of the first column among the arguments of the style.
 
         Raises
         ------
@@ -70,6 +76,6 @@ class Dump:
                 raise ScriptError(
                     f"unknown column '{name}'",
                     argument=first + index,
-                    expected="one of " + " ".join(known),
+                    expected="one of " + " ".join(dict.fromkeys(known)),
                     hint=f"did you mean '{close}'?" if close else None,
                 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -40,8 +41,7 @@ def whole(path: Path) -> Iterator[BinaryIO]:
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
     """Open `path` to go on at byte `start` (0: a new file).
 
-    If that breaks off, the file ends
-    there again, with `tail`.
+    If that breaks off, the file ends there again, with `tail`.
 
     Raises
     ------
@@ -86,8 +86,17 @@ def savefig(figure: Figure, path: Path) -> None:
     ending = picture_format(path)
     # Without date and with a fixed salt for ids in the SVG, equal pictures are equal files.
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending)
-    with matplotlib.rc_context({"svg.hashsalt": "karamelo-py"}), whole(path) as file:
+    salt = {"svg.hashsalt": "karamelo-py"}
+    with matplotlib.rc_context(salt), unwarned(), whole(path) as file:
         figure.savefig(file, format=ending, metadata=undated)
+
+
+@contextmanager
+def unwarned() -> Iterator[None]:
+    """Keep Matplotlib's warnings, of signs without a glyph or of little room, from the user."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 @contextmanager

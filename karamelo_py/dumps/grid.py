@@ -30,7 +30,7 @@ class Grid(LammpsDump):
         other in one file.
     columns
         What to write of each node: x y z (position), vx vy vz (velocity), vx_update ... (velocity
-        after the momentum update), fx fy fz (force), mass. ``x, y, z`` by default.
+        after the momentum update), fx fy fz (total force), mass. ``x, y, z`` by default.
     occupied
         true: leave out nodes without mass, which makes the files of a large and sparsely filled
         domain small.
@@ -39,6 +39,9 @@ class Grid(LammpsDump):
     -------
     dump(d2, all, grid, 100, dump_g.*.LAMMPS, x, y, z, vx, vy, mass)
     """
+
+    absent = ABSENT_AT_NODES
+    rows_are = "nodes"
 
     def __init__(
         self,
@@ -49,12 +52,6 @@ class Grid(LammpsDump):
         occupied: bool = False,
     ):
         super().__init__(hub, every, file, *columns)
-        absent = [name for name in columns if name in ABSENT_AT_NODES]
-        if absent:
-            hub.warn(
-                f"dump grid: {', '.join(absent)} will be 0: nodes do not keep it",
-                hint="fx, fy, fz are the total nodal forces",
-            )
         self.occupied = occupied
         self._rows: np.ndarray | slice = slice(None)
 

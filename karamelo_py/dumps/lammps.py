@@ -10,6 +10,7 @@ import numpy as np
 
 from karamelo_py.dumps.base import Dump
 from karamelo_py.dumps.files import continued, whole
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.signature import OutputFile, Positive
 
 if TYPE_CHECKING:
@@ -59,7 +60,17 @@ class LammpsDump(Dump):
     """A dump in LAMMPS text format: ``id type x y z``, then the columns asked for.
 
     A style says which rows there are: `names` and `field`.
+
+    Attributes
+    ----------
+    absent
+        Columns that are always 0.
+    rows_are
+        What a row is about.
     """
+
+    absent: Sequence[str] = ()
+    rows_are = "points"
 
     def __init__(
         self,
@@ -68,12 +79,21 @@ class LammpsDump(Dump):
         file: OutputFile,
         *columns: str,
     ):
-        self.check_columns(columns, [*LEADING, *self.names(hub)], first=2)
+        known = [*LEADING, *self.names(hub)]
+        if str(file) in known:
+            raise ScriptError(
+                f"'{file}' is a column, not a file",
+                argument="file",
+                expected="the file name in front of the columns",
+                hint=f"dump_*.LAMMPS, {file}",
+            )
+        self.check_columns(columns, known, first=2)
         wanted = [name for name in dict.fromkeys(columns) if name not in LEADING]
         # A viewer needs all three positions; where some are not asked for they come first.
         if not set(POSITIONS) <= set(wanted):
             wanted = [*POSITIONS, *(name for name in wanted if name not in POSITIONS)]
         super().__init__(hub, every, file, *wanted)
+        self.warn_of_absent(columns, self.absent, self.rows_are)
         # Of a file with all snapshots: where the next one goes, and the encoder's state there.
         self._end = 0
         self._encoder: Encoder | None = None
@@ -160,8 +180,8 @@ def header(hub: Hub, count: int, names: Sequence[str]) -> bytes:
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
     """The rows of a table as text, block by block.
 
-    Integers are written as integers, the rest with nine
-    significant digits."""
+    Integers are written as integers, the rest with nine significant digits.
+    """
     width = len(columns)
     kinds = ["%d" if np.issubdtype(column.dtype, np.integer) else "%.9g" for column in columns]
     line = " ".join(kinds) + "\n"

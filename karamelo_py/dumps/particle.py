@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from karamelo_py.dumps.lammps import LammpsDump
+from karamelo_py.fields import ABSENT_AT_POINTS
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -36,6 +37,8 @@ class Particle(LammpsDump):
     -------
     dump(d1, all, particle, 100, dump_p.*.LAMMPS, x, y, z, vx, vy, vz, s11, s22, s12)
     """
+
+    absent = ABSENT_AT_POINTS
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import Formatter
 from PIL import Image
 
 # Colour-blind safe (Okabe and Ito 2008); solids take them in turn.
@@ -15,6 +16,31 @@ SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0
 MAP = "viridis"
 # Angles of view in 3D, as in Matplotlib's own 3D axes.
 AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(30.0)
+
+
+class Numbers(Formatter):
+    """Numbers with two decimals (more where they hardly differ); their power of ten stands apart.
+
+    So they keep their width while the limits grow.
+    """
+
+    order, decimals = 0, 2
+
+    def set_locs(self, locs: Any) -> None:
+        """Find the power of ten of the limits."""
+        limits = np.asarray(self.axis.get_view_interval(), float)
+        largest, span = abs(limits).max(), np.ptp(limits)
+        self.order = int(np.floor(np.log10(largest))) if largest > 0 else 0
+        share = span / largest if largest > 0 else 1.0
+        self.decimals = 2 + max(0, int(np.ceil(-np.log10(max(share, 1e-9)))) - 1)
+
+    def __call__(self, value: float, pos: int | None = None) -> str:
+        """The text of one number."""
+        return self.fix_minus(f"{value / 10.0**self.order:.{self.decimals}f}")
+
+    def get_offset(self) -> str:
+        """The power of ten."""
+        return self.fix_minus(f"1e{self.order}") if self.order else ""
 
 
 def make(domain: Any, size: tuple[float, float], dpi: int, label: str) -> Picture:
@@ -37,6 +63,8 @@ class Picture:
         self.axes = self.figure.add_subplot()
         self.label = label
         self.limits: tuple[float, float] | None = None
+        # The axis whose labels change with the limits of the field.
+        self.scale: Any = None
         self._laid_out = False
         self._background: Any = None
         self.axes.tick_params(labelsize=8)
@@ -57,14 +85,14 @@ class Picture:
 
     def show(self, x: np.ndarray, values: np.ndarray, size: float, title: str) -> None:
         """Set positions (n, 3), values (n,), side length of a point, and title to draw."""
+        if not self._laid_out:
+            self._lay_out()
         if self.label != "type":
             limits = grown(self.limits, values)
             if limits != self.limits:
                 self.limits = limits
                 self._apply_limits(*limits)
-                self._laid_out = False
-        if not self._laid_out:
-            self._lay_out()
+                self._background = None
         self.title.set_text(title)
         self._place(x, values, size)
 
@@ -84,12 +112,16 @@ class Picture:
         image.save(file, format="PNG", compress_level=compression)
 
     def _lay_out(self) -> None:
-        """Find room for the labels of the present limits, and keep that layout."""
-        self.figure.set_layout_engine("constrained")
+        """Find room for the widest labels, once: nothing moves between the pictures of a run."""
+        if self.scale is not None:
+            self._apply_limits(-1e-4, 1e-4)
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
+        if self.scale is not None:
+            axes = self.scale.axes
+            at = axes.transAxes.inverted().transform((self.scale.label.get_position()[0], 0))
+            self.scale.set_label_coords(at[0], 0.5)
         self._laid_out = True
-        self._background = None
 
     def _pixels_per_unit(self) -> float:
         """Points (1/72 inch) on paper per unit of x."""
@@ -116,8 +148,12 @@ class Plane(Picture):
             return self.axes.scatter([], [], c=[], cmap=ListedColormap(SOLIDS), norm=norm, lw=0)
         self.norm = Normalize(0.0, 1.0)
         artist = self.axes.scatter([], [], c=[], cmap=MAP, norm=self.norm, lw=0)
-        bar = self.figure.colorbar(artist, ax=self.axes, shrink=0.8, label=self.label)
+        bar = self.figure.colorbar(
+            artist, ax=self.axes, shrink=0.8, label=self.label, format=Numbers()
+        )
         bar.ax.tick_params(labelsize=8)
+        bar.ax.yaxis.get_offset_text().set_size(8)
+        self.scale = bar.ax.yaxis
         return artist
 
     def _apply_limits(self, lo: float, hi: float) -> None:
@@ -188,6 +224,8 @@ class Line(Picture):
         self.axes.set_xlim(self.domain.lo[0], self.domain.hi[0])
         self.axes.set_xlabel("x", fontsize=9)
         self.axes.set_ylabel(self.label, fontsize=9)
+        self.scale = self.axes.yaxis
+        self.scale.set_major_formatter(Numbers())
         self.axes.grid(True, color="0.9", linewidth=0.7)
         (artist,) = self.axes.plot([], [], ".", color=SOLIDS[0], markersize=3)
         return artist

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from karamelo_py.dumps.base import Dump
-from karamelo_py.dumps.files import picture_format, savefig, whole
+from karamelo_py.dumps.files import picture_format, savefig, unwarned, whole
+from karamelo_py.fields import ABSENT_AT_POINTS
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.signature import OutputFile, Positive
 
 if TYPE_CHECKING:
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 DPI = 100
 # Above this, a width or height is meant in pixels.
 MOST_INCHES = 50
-MOST_PIXELS = 20000
+LEAST_PIXELS, MOST_PIXELS = 20, 20000
 # Fast and nearly as small as the best for pictures of few colours.
 PNG_COMPRESSION = 1
 
@@ -36,7 +38,8 @@ class PyPlot(Dump):
         File name ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without
         ``*`` each picture takes the place of the one before.
     width, height
-        Size of the picture: inches, or pixels if above 50.
+        Size of the picture: up to 50 in inches (of 100 pixels), above that in pixels; from 20 to
+        20000 pixels.
     field
         What colours the points: any column of dump particle. Without it the solid does (in 1D: vx
         is drawn).
@@ -59,7 +62,9 @@ class PyPlot(Dump):
             self.check_columns([field], hub.fields.particle_names(), first=4)
         super().__init__(hub, every, file)
         self.format = picture_format(self.file)
-        self.size = tuple(_inches(value) for value in (width, height))
+        self.size = (_inches("width", width), _inches("height", height))
+        if field is not None:
+            self.warn_of_absent([field], ABSENT_AT_POINTS, "points")
         self.field = field
         self._picture: Any = None
 
@@ -68,6 +73,10 @@ class PyPlot(Dump):
         # Matplotlib takes a third of a second to import: only scenes with pictures pay it.
         from karamelo_py.dumps import picture
 
+        with unwarned():
+            self._draw(picture)
+
+    def _draw(self, picture: Any) -> None:
         if self._picture is None:
             self._picture = picture.make(self.hub.domain, self.size, DPI, self._label())
         fields, update = self.hub.fields, self.hub.update
@@ -89,5 +98,13 @@ class PyPlot(Dump):
         return "vx" if self.hub.domain.dimension == 1 else "type"
 
 
-def _inches(value: float) -> float:
-    return value if value <= MOST_INCHES else min(value, MOST_PIXELS) / DPI
+def _inches(argument: str, value: float) -> float:
+    inches = value if value <= MOST_INCHES else value / DPI
+    if not LEAST_PIXELS <= inches * DPI <= MOST_PIXELS:
+        raise ScriptError(
+            f"a {argument} of {inches * DPI:g} pixels cannot be drawn",
+            argument=argument,
+            expected=f"up to {MOST_INCHES} in inches (of {DPI} pixels), above that in pixels; "
+            f"from {LEAST_PIXELS} to {MOST_PIXELS} pixels",
+        )
+    return inches

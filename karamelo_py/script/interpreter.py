@@ -59,12 +59,15 @@ class Interpreter:
     ----------
     variables : dict
         Numbers, texts and formulas by name.
+    files : list of Path
+        Scripts that were read.
     """
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
         self.hub = hub
         hub.interpreter = self
         self.variables: dict[str, Value] = {}
+        self.files: list[Path] = []
         self._presets: dict[str, str] = {}
         self._frames: list[_Frame] = []
         for name, text in (presets or {}).items():
@@ -81,6 +84,7 @@ class Interpreter:
             For a file that cannot be read, and for the first mistake in it.
         """
         path = Path(path)
+        self.files.append(path)
         self._run(parse(read_script(path), str(path)), path)
 
     def run_text(self, text: str, name: str = "<text>") -> None:
@@ -103,6 +107,7 @@ class Interpreter:
         except ScriptError as error:
             error.argument = "file"
             raise
+        self.files.append(path)
         self._frames.append(_Frame(parse(text, str(path)), path))
         self._go_on(self._frames[-1])
         self._frames.pop()
@@ -119,6 +124,7 @@ class Interpreter:
         """
         other = Interpreter(hub)
         other.variables = dict(self.variables)
+        other.files = list(self.files)
         other._presets = dict(self._presets)
         other._frames = [_Frame(f.statements, f.path, f.next) for f in self._frames]
         try:
