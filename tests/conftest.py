@@ -20,8 +20,8 @@ from karamelo_py.cli import main
 
 TESTS = Path(__file__).parent
 INPUTS = TESTS.parent / "inputs"
-# Numbers of other programs, beside the repository; tests that need them are skipped without.
-REFERENCE = TESTS.parent.parent / "shared" / "reference" / "data"
+# Numbers of other programs; each file says which one and how.
+REFERENCE = TESTS / "data"
 
 # No test asserts a time, and a failure is the same in every run.
 settings.register_profile("tests", deadline=None, derandomize=True)
