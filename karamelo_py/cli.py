@@ -28,6 +28,8 @@ options of run and check:
   --version          print the version
 """
 
+RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
@@ -142,8 +144,11 @@ def _run(arguments: list[str], *, checking: bool = False) -> int:
     if checking and not hub.rehearsed:
         raise ScriptError(
             f"{script} runs nothing: there is no run command in it",
-            hint="add run(n), run_time(T), run_until(...) or run_while(...)",
+            hint=RUN_COMMANDS,
         )
+    if not hub.rehearsed and (hub.domain is not None or not interpreter.variables):
+        hub.place = None
+        hub.warn(f"{script} runs nothing: there is no run command in it", hint=RUN_COMMANDS)
     return 0
 
 

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from karamelo_py.group import ParticleGroup
 from karamelo_py.kernels.hooks import STAGES, node_hook, point_hook
+from karamelo_py.script.values import SUFFIXES
 from karamelo_py.views import NodesView, PointsView
 
 if TYPE_CHECKING:
@@ -41,28 +42,37 @@ class Fix:
         The node or particle group it acts on.
     formulas
         One formula (or None) for each component, for compiled hooks.
+    published
+        Suffixes of the values it sets: "x" for ``ID_x`` (also "y", "z" and "s"), "" for ``ID``. All
+        when a style does not say.
     first_step_only
         Whether it acts in the first step after its definition and is idle thereafter.
     id
-        Its ID in the script; values published as ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` and ``ID``.
+        Its ID in the script.
     """
 
     group: Any = None
     formulas: tuple = ()
+    published: tuple[str, ...] = SUFFIXES
     first_step_only = False
     id: str = ""
 
-    def __init__(self, hub: Hub):
+    def __init__(self, hub: Hub, group: Any = None):
         self.hub = hub
+        if group is not None:
+            self.group = group
 
     def publish(self, name: str, value: float) -> None:
         """Publish `value` as ID_`name` (x, y, z or s), or as the plain ID when `name` is empty."""
+        if name not in self.published:
+            raise ValueError(f"'{name}' is not in {type(self).__name__}.published")
         self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
 
     def publish_components(self, vector: np.ndarray) -> None:
-        """Publish up to three components as ID_x, ID_y, ID_z."""
+        """Publish up to three components as ID_x, ID_y, ID_z, as far as `published` has them."""
         for name, value in zip("xyz", vector, strict=False):
-            self.publish(name, value)
+            if name in self.published:
+                self.publish(name, value)
 
     def refresh(self) -> None:
         """Bring published values up to date; called before the log or a dump is written."""
@@ -76,6 +86,7 @@ class Compute:
     """Base of all computes: measures its `group` of points when the log is written."""
 
     id: str = ""
+    published: tuple[str, ...] = SUFFIXES
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         self.hub = hub

@@ -148,14 +148,14 @@ def test_values_are_published_in_one_array_that_stays():
     values = Values()
     array = values.array
     assert values.names() == ["time", "timestep", "dt"]
-    slots = values.publish_vector("F")
-    assert slots[:4] == (3, 4, 5, 6)
+    values.publish_vector("F")
+    assert [values.slot(f"F_{s}") for s in "xyzs"] == [3, 4, 5, 6]
     assert values.names()[3:] == ["F_x", "F_y", "F_z", "F_s", "F"]
     assert values.publish("F_s", 2.0) == 6
     assert array[6] == values.get("F_s") == 2.0
-    assert values.publish_vector("F") == slots
-    values.publish("G_x")
-    assert values.publish_vector("G")[:4] == (9, 10, 11, 12)
+    values.publish_vector("F", ("x", "s"))
+    assert values.names()[3:] == ["F_x", "F_s"]
+    assert (values.slot("F_x"), values.slot("F_s")) == (3, 6)
     with pytest.raises(ScriptError, match=str(CAPACITY)):
         for k in range(CAPACITY):
             values.publish(f"v{k}")

@@ -120,10 +120,10 @@ def test_check_solution(run_interpreted):
 def test_initial_fixes_act_once(run_interpreted):
     """Not again in a second run, nor when a new solid makes the scene anew; a new fix does act."""
     script = block(
-        1, "fix(v, initial_velocity_particles, all, 0.5)", "compute(v, average_velocity, all)",
+        1, "fix(v0, initial_velocity_particles, all, 0.5)", "compute(v, average_velocity, all)",
         "log_modify(custom, step, v_x)", "set_dt(0.001)", "fix(g, body_force, all, 10)", "run(3)",
         "region(far, block, 0.9, 1)", "solid(far, region, far, 2, rubber, 0.1, 0)", "run(2)",
-        "fix(v, initial_velocity_particles, all, 0.25)", "run(1)",
+        "fix(v0, initial_velocity_particles, all, 0.25)", "run(1)",
     )  # fmt: skip
     log = run_interpreted(script).log
     assert log.v_x[log.Step == 3][0] == pytest.approx(0.53, rel=1e-9)

@@ -138,6 +138,13 @@ COMMANDS = [
     ("print()", 1, "got 0 arguments"),
     ('run_while("abc")', 11, "not the text 'abc'"),
     ("scheme(mus)", 8, "did you mean 'musl'?"),
+    ("compute(v, average_velocity, all)\nlog_modify(custom, v)", 20, "v_x, v_y, v_z, not v"),
+    ("compute(Es, strain_energy, all)\nE = Es_y", 5, "publishes Es, Es_s, not Es_y"),
+    ("fix(k, initial_velocity_nodes, all, 1, 0)\nE = k_x", 5, "publishes nothing, not k_x"),
+    ("fix(E, kinetic_energy, all)\ncompute(E, strain_energy, all)", 9, "'E' is a fix already"),
+    ("method(ulmpm, PIC, linear)", 1, "move it above line 5"),
+    ("run_until(0.01)", 11, "run_until(time >= 0.01)"),
+    ("run_while(1)", 11, "run_while(time < 1)"),
 ]
 
 

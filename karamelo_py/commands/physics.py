@@ -9,7 +9,7 @@ from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.signature import Argument
 
 if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
+    from karamelo_py.hub import Catalogue, Hub
 
 OPTIONS = ("mechanical", "thermo-mechanical", "gradient-enhanced")
 NOT_YET = {
@@ -69,6 +69,12 @@ def method(hub: Hub, kind: str, transfer: str, basis: str, *options: Argument) -
                 expected="nothing more, or the word mechanical",
                 hint=f"did you mean '{close}'?" if close else None,
             )
+    if hub.solids:
+        raise ScriptError(
+            "the method cannot change once there are solids",
+            expected="method(...) before the first solid",
+            hint=f"move it above line {next(iter(hub.solids.values())).place.line}",
+        )
     hub.update.method = method_class(hub, basis_class)
     hub.update.transfer = transfer_class(*parameters)
 
@@ -171,10 +177,12 @@ def fix(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     --------
     delete_fix, group, compute
     """
+    _refuse_shared_id(ID, "compute", hub.computes)
     target = registry.find("fix", style)
     new = signature.call(target, hub, list(arguments), f"fix {style}")
+    new.style = style
     hub.fixes.add(ID, new, replace=True)
-    hub.values.publish_vector(ID)
+    hub.values.publish_vector(ID, new.published)
     _warn_if_empty(hub, "fix", ID, new)
 
 
@@ -217,10 +225,12 @@ def compute(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     --------
     delete_compute, log_modify, fix
     """
+    _refuse_shared_id(ID, "fix", hub.fixes)
     target = registry.find("compute", style)
     new = signature.call(target, hub, list(arguments), f"compute {style}")
+    new.style = style
     hub.computes.add(ID, new)
-    hub.values.publish_vector(ID)
+    hub.values.publish_vector(ID, new.published)
     _warn_if_empty(hub, "compute", ID, new)
 
 
@@ -241,6 +251,16 @@ def delete_compute(hub: Hub, ID: str) -> None:
     compute
     """
     hub.computes.remove(ID)
+
+
+def _refuse_shared_id(ID: str, other: str, catalogue: Catalogue) -> None:
+    """A fix and a compute of one ID would publish values of the same names."""
+    if ID in catalogue:
+        raise ScriptError(
+            f"'{ID}' is a {other} already (line {catalogue[ID].place.line})",
+            argument="ID",
+            expected=f"another ID: {ID}_x and the like would mean two things",
+        )
 
 
 def _warn_if_empty(hub: Hub, kind: str, ID: str, item: object) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from math import isnan
 from typing import TYPE_CHECKING, Annotated
 
 from karamelo_py.runner import Runner
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.signature import NonNegative, Positive
 
@@ -107,6 +109,7 @@ def run_until(hub: Hub, condition: Expression) -> None:
     --------
     run, run_time, run_while
     """
+    _refuse_constant("run_until", condition)
     Runner(hub, condition=condition, until=True).run()
 
 
@@ -126,4 +129,18 @@ def run_while(hub: Hub, condition: Expression) -> None:
     --------
     run, run_time, run_until
     """
+    _refuse_constant("run_while", condition)
     Runner(hub, condition=condition, until=False).run()
+
+
+def _refuse_constant(command: str, condition: Expression) -> None:
+    """A condition that is one number for ever ends the run at once or never."""
+    if condition.is_constant:
+        compare = ">=" if command == "run_until" else "<"
+        number = 1.0 if isnan(condition.constant) else condition.constant
+        raise ScriptError(
+            "the condition never changes",
+            argument="condition",
+            expected="a formula of time, timestep, dt or values of fixes and computes",
+            hint=f"{command}(time {compare} {number:g}), or run_time({number:g})",
+        )

@@ -34,6 +34,8 @@ class AngularMomentum(Compute):
     it is part of the sum, which the transfer then conserves.
     """
 
+    published = ("x", "y", "z")
+
     def __init__(
         self, hub: Hub, group: ParticleGroup, cx: float = 0.0, cy: float = 0.0, cz: float = 0.0
     ):

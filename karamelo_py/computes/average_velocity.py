@@ -19,6 +19,8 @@ class AverageVelocity(Compute):
     log_modify(custom, time, v_x)
     """
 
+    published = ("x", "y", "z")
+
     def refresh(self) -> None:
         """Measure and publish."""
         velocity = self.hub.fields.velocity[self.hub.fields.members(self.group)]

@@ -23,6 +23,8 @@ class KineticEnergy(Compute):
     strain_energy
     """
 
+    published = ("", "s")
+
     def refresh(self) -> None:
         """Measure and publish."""
         energy = self.hub.fields.kinetic_energy(self.group)

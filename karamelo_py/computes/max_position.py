@@ -19,6 +19,8 @@ class MaxPosition(Compute):
     log_modify(custom, time, front_x)
     """
 
+    published = ("x", "y", "z")
+
     def refresh(self) -> None:
         """Measure and publish."""
         position = self.hub.fields.position[self.hub.fields.members(self.group)]

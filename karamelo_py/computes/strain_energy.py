@@ -23,6 +23,8 @@ class StrainEnergy(Compute):
     kinetic_energy
     """
 
+    published = ("", "s")
+
     def refresh(self) -> None:
         """Measure and publish."""
         energy = self.hub.fields.strain_energy(self.group)

@@ -44,10 +44,10 @@ class BodyForce(Fix):
     """
 
     syntax = "group, bx[, by[, bz]]"
+    published = ("x", "y", "z")
 
     post_particles_to_grid = node_hook(accelerate)
 
     def __init__(self, hub: Hub, group: NodeGroup, *acceleration: Expression | None):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.formulas = per_direction(hub, "b", acceleration)

@@ -37,10 +37,10 @@ class CheckSolution(Fix):
     """
 
     syntax = "group, ux[, uy[, uz]]"
+    published = ("x", "y", "z", "s")
 
     def __init__(self, hub: Hub, group: ParticleGroup, *displacement: Expression | None):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.formulas = per_direction(hub, "u", displacement)
         self._step: int | None = None
 

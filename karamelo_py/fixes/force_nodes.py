@@ -43,10 +43,10 @@ class ForceNodes(Fix):
     """
 
     syntax = "group, fx[, fy[, fz]]"
+    published = ("x", "y", "z")
 
     post_particles_to_grid = node_hook(push, shares=True)
 
     def __init__(self, hub: Hub, group: NodeGroup, *force: Expression | None):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.formulas = per_direction(hub, "f", force)

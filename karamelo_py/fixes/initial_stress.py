@@ -40,6 +40,7 @@ class InitialStress(Fix):
     set.
     """
 
+    published = ()
     first_step_only = True
 
     def __init__(
@@ -53,8 +54,7 @@ class InitialStress(Fix):
         sxz: Expression | None,
         sxy: Expression | None,
     ):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.formulas = (sxx, syy, szz, syz, sxz, sxy)
         for solid in hub.solids.values():
             law = type(solid.material.law)

@@ -34,12 +34,12 @@ class InitialVelocityNodes(Fix):
     """
 
     syntax = "group, vx[, vy[, vz]]"
+    published = ()
 
     first_step_only = True
 
     def __init__(self, hub: Hub, group: NodeGroup, *velocity: Expression | None):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.formulas = per_direction(hub, "v", velocity)
 
     def _impose(self, field):

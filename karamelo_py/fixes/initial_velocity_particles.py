@@ -35,12 +35,12 @@ class InitialVelocityParticles(Fix):
     """
 
     syntax = "group, vx[, vy[, vz]]"
+    published = ()
 
     first_step_only = True
 
     def __init__(self, hub: Hub, group: ParticleGroup, *velocity: Expression | None):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.formulas = per_direction(hub, "v", velocity)
 
     def initial_integrate(self, points: PointsView) -> None:

@@ -50,11 +50,11 @@ class VelocityNodes(Fix):
     """
 
     syntax = "group, vx[, vy[, vz]]"
+    published = ("x", "y", "z")
 
     post_update_grid_state = node_hook(prescribe, uses_before=True)
     post_velocities_to_grid = node_hook(hold, publishes=False)
 
     def __init__(self, hub: Hub, group: NodeGroup, *velocity: Expression | None):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.formulas = per_direction(hub, "v", velocity)

@@ -48,11 +48,11 @@ class VelocityParticles(Fix):
     """
 
     syntax = "group, vx[, vy[, vz]]"
+    published = ("x", "y", "z")
 
     initial_integrate = point_hook(start, uses_before=True)
     post_advance_particles = point_hook(carry, publishes=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, *velocity: Expression | None):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.formulas = per_direction(hub, "v", velocity)

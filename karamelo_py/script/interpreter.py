@@ -392,6 +392,9 @@ class Interpreter:
                 place=place,
                 expected=expressions.usage(name),
             )
+        other = self._not_published(name, place)
+        if other:
+            return other
         later = self._later(name)
         if later:
             return later(place)
@@ -408,6 +411,22 @@ class Interpreter:
             "compute, or x, y, z, x0, y0, z0, time, timestep, dt, PI",
             hint=hint,
         )
+
+    def _not_published(self, name: str, place: Any) -> ScriptError | None:
+        """The error for a value that the fix or compute of this ID does not set."""
+        for kind, items in (("fix", "fixes"), ("compute", "computes")):
+            for ID, item in getattr(self.hub, items, {}).items():
+                if name not in (ID, f"{ID}_{name[-1]}"):
+                    continue
+                names = [f"{ID}_{s}" if s else ID for s in item.published]
+                what = ", ".join(names) or "nothing"
+                close = nearest(name, names) or (names[0] if names else None)
+                return ScriptError(
+                    f"{kind} {item.style} publishes {what}, not {name}",
+                    place=place,
+                    hint=f"did you mean '{close}'?" if close else None,
+                )
+        return None
 
     def _later(self, name: str) -> Any:
         """How to say that `name` is defined further down, if it is."""

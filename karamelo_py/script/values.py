@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from karamelo_py.script.errors import ScriptError
 
 CAPACITY = 1024
 TIME, TIMESTEP, DT = 0, 1, 2
+SUFFIXES = ("x", "y", "z", "s", "")
 
 
 class Values:
@@ -20,6 +23,7 @@ class Values:
     def __init__(self) -> None:
         self.array = np.zeros(CAPACITY)
         self._slots: dict[str, int] = {}
+        self._first: dict[str, int] = {}
         self._used = 0
         for name in ("time", "timestep", "dt"):
             self.publish(name)
@@ -32,22 +36,21 @@ class Values:
         self.array[slot] = value
         return slot
 
-    def publish_vector(self, ID: str) -> tuple[int, int, int, int, int]:
-        """Publish ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` in consecutive slots, and ``ID`` itself.
+    def publish_vector(self, ID: str, suffixes: Sequence[str] = SUFFIXES) -> None:
+        """Publish the values of a fix or compute: ``ID_x`` for "x" and so on, ``ID`` for "".
 
-        Returns the slots in this order; only the first four are sure to be consecutive.
+        ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` lie in consecutive slots, whether or not all of them
+        have a name. Names that the ID had before and `suffixes` leaves out are forgotten.
         """
-        names = [f"{ID}_{suffix}" for suffix in "xyzs"]
-        slots = [self._slots.get(name, -1) for name in names]
-        if slots[0] < 0 or slots != list(range(slots[0], slots[0] + 4)):
-            first = self._reserve(4)
-            for k, name in enumerate(names):
-                self._slots[name] = first + k
-        for name in names:
-            self.publish(name)
-        plain = self.publish(ID)
-        first = self._slots[names[0]]
-        return first, first + 1, first + 2, first + 3, plain
+        if ID not in self._first:
+            self._first[ID] = self._reserve(len(SUFFIXES))
+        for k, suffix in enumerate(SUFFIXES):
+            name = f"{ID}_{suffix}" if suffix else ID
+            if suffix in suffixes:
+                self._slots[name] = self._first[ID] + k
+                self.publish(name)
+            elif self._slots.get(name) == self._first[ID] + k:
+                del self._slots[name]
 
     def slot(self, name: str) -> int:
         """Where in the array `name` is kept.

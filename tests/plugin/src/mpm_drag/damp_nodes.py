@@ -33,10 +33,10 @@ class DampNodes(Fix):
     """
 
     syntax = "group, cx[, cy[, cz]]"  # says it better than the signature: group[, rate, ...]
+    published = ("x", "y", "z")
 
     post_particles_to_grid = node_hook(damp)
 
     def __init__(self, hub, group: NodeGroup, *rate: Expression | None):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.formulas = per_direction(hub, "c", rate)

@@ -27,9 +27,10 @@ class Drag(Fix):
     Publishes the momentum that the points of the group lost in the last step as ID_x, ID_y, ID_z.
     """
 
+    published = ("x", "y", "z")
+
     def __init__(self, hub, group: ParticleGroup, rate: Annotated[float, NonNegative]):
-        super().__init__(hub)
-        self.group = group
+        super().__init__(hub, group)
         self.rate = rate
 
     def initial_integrate(self, points: PointsView) -> None:

@@ -17,6 +17,8 @@ class Momentum(Compute):
     log_modify(custom, time, p_x)
     """
 
+    published = ("x", "y", "z")
+
     def refresh(self) -> None:
         """Measure and publish."""
         fields = self.hub.fields
