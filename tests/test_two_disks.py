@@ -73,16 +73,16 @@ def test_momentum_is_conserved(run_script):
     """
     text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
     extra = """
-compute(v1, average_velocity, disk1)
-compute(v2, average_velocity, disk2)
-sum_x = v1_x + v2_x
-sum_y = v1_y + v2_y
-log_modify(custom, step, v1_x, v2_x, sum_x, sum_y)
+compute(u1, average_velocity, disk1)
+compute(u2, average_velocity, disk2)
+sum_x = u1_x + u2_x
+sum_y = u1_y + u2_y
+log_modify(custom, step, u1_x, u2_x, sum_x, sum_y)
 run_time(3.5)
 """
     log = run_script(text.replace("run_time(3.5)", extra)).log
-    assert log.v1_x[0] == pytest.approx(0.1)
-    assert log.v1_x[-1] < -0.08  # they have bounced
+    assert log.u1_x[0] == pytest.approx(0.1)
+    assert log.u1_x[-1] < -0.08  # they have bounced
     assert np.abs(log.sum_x).max() < 1e-13
     assert np.abs(log.sum_y).max() < 1e-13
 

@@ -55,6 +55,12 @@ def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argum
             place=arguments[1].place,
             expected="a file name of its own for each dump",
         )
+    if new.file == hub.output.plots.file:
+        raise ScriptError(
+            f"save_plot already writes to {new.file}",
+            place=arguments[1].place,
+            expected="a file name of its own for each dump",
+        )
     hub.dumps.add(ID, new)
     hub.output.files[new.file] = ID
 
@@ -154,6 +160,11 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Quantity) -
     keys
         ``step``, ``dt``, ``time``, a variable, a value of a fix or compute, or a formula of these.
 
+    Notes
+    -----
+    Between two runs it changes the columns from there on: a line that begins with ``#`` in log.mpm
+    names them, and the rows below have as many numbers as it has names.
+
     Example
     -------
     log_modify(custom, step, dt, time, Ek_s, Es_s)
@@ -215,7 +226,7 @@ def save_plot(hub: Hub, file: OutputFile) -> None:
     Parameters
     ----------
     file
-        File name ending in .png, .pdf or .svg.
+        File name ending in .png, .pdf or .svg. A file of that name is overwritten.
 
     Example
     -------
@@ -227,6 +238,12 @@ def save_plot(hub: Hub, file: OutputFile) -> None:
     """
     picture_format(file)
     hub.output.check_file(file)
+    if file in hub.output.files:
+        raise ScriptError(
+            f"dump '{hub.output.files[file]}' already writes to {file}",
+            argument="file",
+            expected="a file name of its own",
+        )
     plots = hub.output.plots
     plots.file, plots.place = file, hub.place
     if not hub.rehearsing:
