@@ -57,7 +57,7 @@ class Dump:
         """Warn of columns that are 0 because no point or node (`what`) keeps them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]
         if empty:
-            self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} keep no such thing")
+            self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} have no such field")
 
     @staticmethod
     def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
