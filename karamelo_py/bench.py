@@ -301,3 +301,5 @@ def _print(name: str, workload: Workload, threads: int, seconds: float, triad: f
     for stage, per in parts.items():
         print(f"    {stage:<32} {1e9 * per / simulation.count:8.2f} ns")
     print(f"    {'together, in one compiled loop':<32} {total:8.2f} ns")
+    if simulation.count < 10_000:
+        print("    (one by one, each stage costs some microseconds to call from Python)")

@@ -21,12 +21,26 @@ LAST_GOOD = "last_good.*.LAMMPS"
 def warn_about_scheme(hub: Hub, simulation: Simulation) -> None:
     """Say so before the first step when transfer, basis and scheme do not go together well."""
     update, basis = hub.update, simulation.setup.basis
-    if update.transfer.keeps_moment and not basis.steady_moment and update.scheme != MUSL():
+    if update.transfer.keeps_moment and not basis.steady_moment and not isinstance(update.scheme, MUSL):
         transfer, scheme = type(update.transfer).__name__, type(update.scheme).__name__.lower()
         hub.warn(
             f"{transfer} with {type(basis).__name__.lower()} functions and {scheme} is unstable "
             "where a point barely reaches a node: stressed bodies that move will blow up",
             hint="scheme(musl), or FLIP",
+        )
+
+
+def warn_about_precision(hub: Hub, simulation: Simulation) -> None:
+    """Say so when single precision cannot hold what a step adds to a position."""
+    if hub.settings.precision != "single":
+        return
+    x, v = np.abs(simulation.x).max(), np.abs(simulation.v).max()
+    step, spacing = float(v) * simulation.dt, float(np.spacing(np.float32(x)))
+    if 0 < step < 16 * spacing:
+        hub.warn(
+            f"a step moves points by {step:.2g} at most, and in single precision positions have "
+            f"a spacing of {spacing:.2g}: motion will be lost to rounding",
+            hint="precision(double), or a domain around the origin",
         )
 
 

@@ -83,6 +83,7 @@ class Runner:
         simulation.begin(self.end_time)
         diagnosis.warn_about_step(hub, simulation)
         diagnosis.warn_about_scheme(hub, simulation)
+        diagnosis.warn_about_precision(hub, simulation)
         first_step = simulation.step
         first_time = simulation.time
         self._banner(simulation)
