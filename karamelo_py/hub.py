@@ -10,6 +10,7 @@ from karamelo_py.console import Console
 from karamelo_py.fields import Fields
 from karamelo_py.output import Output
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
+from karamelo_py.script.faults import told
 from karamelo_py.script.values import Values
 from karamelo_py.update import Update
 
@@ -115,8 +116,10 @@ class Hub:
 
     def refresh_values(self) -> None:
         """Let computes and fixes measure the present state."""
-        for item in (*self.computes.values(), *self.fixes.values()):
-            item.refresh()
+        for catalogue in (self.computes, self.fixes):
+            for item in catalogue.values():
+                with told(f"{catalogue.kind} {item.style}", "refresh", type(item), item.place):
+                    item.refresh()
 
     def warn(
         self,

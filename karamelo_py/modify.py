@@ -18,10 +18,14 @@ step), or the result of :func:`node_hook` or :func:`point_hook`, which is compil
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 from karamelo_py.group import ParticleGroup
-from karamelo_py.kernels.hooks import STAGES, node_hook, point_hook
+from karamelo_py.kernels.hooks import STAGES, CompiledHook, node_hook, point_hook
+from karamelo_py.script.errors import Place
+from karamelo_py.script.faults import told
 from karamelo_py.script.values import SUFFIXES
 from karamelo_py.views import NodesView, PointsView
 
@@ -56,6 +60,8 @@ class Fix:
     published: tuple[str, ...] = SUFFIXES
     first_step_only = False
     id: str = ""
+    style: str = ""
+    place: Place | None = None
 
     def __init__(self, hub: Hub, group: Any = None):
         self.hub = hub
@@ -79,13 +85,29 @@ class Fix:
 
     def hooks(self) -> dict[str, Any]:
         """The hooks this fix overrides: name to method or compiled hook."""
-        return {name: getattr(self, name) for name in STAGES if hasattr(self, name)}
+        found = {name: getattr(self, name) for name in STAGES if hasattr(self, name)}
+        return {
+            name: hook if isinstance(hook, CompiledHook) else self._told(name, hook)
+            for name, hook in found.items()
+        }
+
+    def _told(self, name: str, hook: Callable) -> Callable:
+        """`hook`, whose exceptions say where they come from."""
+
+        @wraps(hook)
+        def call(view: Any) -> None:
+            with told(f"fix {self.style}", name, type(self), self.place):
+                hook(view)
+
+        return call
 
 
 class Compute:
     """Base of all computes: measures its `group` of points when the log is written."""
 
     id: str = ""
+    style: str = ""
+    place: Place | None = None
     published: tuple[str, ...] = SUFFIXES
 
     def __init__(self, hub: Hub, group: ParticleGroup):

@@ -38,6 +38,7 @@ from karamelo_py.kinds import (
     kind_of,
 )
 from karamelo_py.script.errors import Place, ScriptError, nearest
+from karamelo_py.script.faults import told
 
 __all__ = [
     "Argument",
@@ -160,7 +161,10 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         for parameter, argument in keywords:
             named[parameter.name] = _convert(hub, parameter, argument, None)
         try:
-            return target(hub, *values, **named)
+            if not inspect.isclass(target):
+                return target(hub, *values, **named)
+            with told(name, "__init__", target, getattr(hub, "place", None)):
+                return target(hub, *values, **named)
         except OSError as error:
             what = f"{error.filename}: " if error.filename else ""
             raise ScriptError(f"{what}{error.strerror or error}") from error

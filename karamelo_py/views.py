@@ -14,9 +14,36 @@ from karamelo_py.kernels.arrays import (
     POST_VELOCITIES_TO_GRID,
     TIME,
 )
+from karamelo_py.script.errors import nearest
 
 
-class NodesView:
+class _View:
+    """A view whose fields are the only attributes, and take only what fits."""
+
+    _fields: tuple[str, ...] = ()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in self._fields and not name.startswith("_"):
+            if not isinstance(getattr(type(self), name, None), property):
+                raise self._unknown(name)
+            now, value = getattr(self, name).shape, np.asarray(value)
+            if value.ndim and value.shape != now:
+                raise ValueError(f"{name} has the shape {now}, not {value.shape}")
+        object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        raise self._unknown(name)
+
+    def _unknown(self, name: str) -> AttributeError:
+        names = [*self._fields, *(n for n in dir(type(self)) if not n.startswith("_"))]
+        close = nearest(name, names)
+        return AttributeError(
+            f"{type(self).__name__} has no {name}; "
+            + (f"did you mean {close}?" if close else f"it has {', '.join(sorted(names))}")
+        )
+
+
+class NodesView(_View):
     """The nodes of a group that carry mass, at one stage of a step.
 
     Reading a field gives an array with a row for each node; assigning it writes it back::
@@ -28,6 +55,8 @@ class NodesView:
     index : (n,) int
         Node numbers.
     """
+
+    _fields = ("dt", "time", "index")
 
     def __init__(self, s: Any, group: Any, stage: int, before_update: bool):
         self._nodes = s.nodes
@@ -107,11 +136,13 @@ class NodesView:
         self._nodes.update[self.index, self._d :] = self._nodes.update[self.index, : self._d] - old
 
 
-class PointsView:
+class PointsView(_View):
     """The points of a group, at one stage of a step, in the order of their ids.
 
     Reading a field gives an array with a row for each point; assigning it writes it back.
     """
+
+    _fields = ("dt", "time", "ids", "moved")
 
     def __init__(self, simulation: Any, group: Any, then: bool):
         self._simulation = simulation

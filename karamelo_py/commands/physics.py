@@ -10,6 +10,7 @@ from karamelo_py.signature import Argument
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Catalogue, Hub
+    from karamelo_py.modify import Fix
 
 OPTIONS = ("mechanical", "thermo-mechanical", "gradient-enhanced")
 NOT_YET = {
@@ -184,6 +185,7 @@ def fix(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     hub.fixes.add(ID, new, replace=True)
     hub.values.publish_vector(ID, new.published)
     _warn_if_empty(hub, "fix", ID, new)
+    _warn_if_idle(hub, style, new)
 
 
 def delete_fix(hub: Hub, ID: str) -> None:
@@ -261,6 +263,21 @@ def _refuse_shared_id(ID: str, other: str, catalogue: Catalogue) -> None:
             argument="ID",
             expected=f"another ID: {ID}_x and the like would mean two things",
         )
+
+
+def _warn_if_idle(hub: Hub, style: str, item: Fix) -> None:
+    """A fix that overrides nothing does nothing: perhaps a hook is misspelled."""
+    from karamelo_py.kernels.hooks import STAGES
+    from karamelo_py.modify import Fix
+
+    if item.hooks() or type(item).refresh is not Fix.refresh:
+        return
+    own = [name for name in dir(item) if not hasattr(Fix, name) and callable(getattr(item, name))]
+    found = next(((name, hook) for name in own if (hook := nearest(name, STAGES))), None)
+    hub.warn(
+        f"fix {style} has no hook and no refresh: it does nothing",
+        hint=f"its author wrote {found[0]}; the hook is {found[1]}" if found else None,
+    )
 
 
 def _warn_if_empty(hub: Hub, kind: str, ID: str, item: object) -> None:

@@ -1,0 +1,106 @@
+"""Styles that are wrong: the user is told which, where in the script, and where in the style."""
+
+import sys
+from importlib.metadata import EntryPoint
+
+import numpy as np
+import pytest
+
+from karamelo_py import registry
+from karamelo_py.hub import Hub
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.interpreter import Interpreter
+from karamelo_py.views import PointsView
+
+STYLES = """
+from karamelo_py.group import ParticleGroup
+from karamelo_py.modify import Compute, Fix
+
+class Spring(Fix):
+    def __init__(self, hub, group: ParticleGroup, k: float = 1.0):
+        super().__init__(hub, group)
+        1 / k
+
+    def initial_integrate(self, points):
+        return missing
+
+class Idle(Fix):
+    def initial_integrat(self, points): ...
+
+class Gauge(Compute):
+    published = ("x",)
+
+    def refresh(self):
+        self.publish("s", 1)
+"""
+
+
+@pytest.fixture
+def hub(tmp_path, monkeypatch):
+    """A hub that knows the styles above and has a script with a fix and a compute of them."""
+    (tmp_path / "styles_under_test.py").write_text(STYLES)
+    monkeypatch.syspath_prepend(tmp_path)
+    for family, name in (("fix", "Spring"), ("fix", "Idle"), ("compute", "Gauge")):
+        entry = EntryPoint(name.lower(), f"styles_under_test:{name}", f"karamelo_py.{family}")
+        monkeypatch.setitem(registry._families()[family], name.lower(), [entry])
+    yield Hub()
+    for key in [key for key in registry._loaded if key[1] in ("spring", "idle", "gauge")]:
+        del registry._loaded[key]
+    sys.modules.pop("styles_under_test", None)
+
+
+def run(hub, text):
+    Interpreter(hub).run_text(text, "in.wrong")
+
+
+def test_hook(hub):
+    run(hub, "fix(s, spring, all)")
+    with pytest.raises(ScriptError) as caught:
+        hub.fixes["s"].hooks()["initial_integrate"](None)
+    text = caught.value.render()
+    assert text.startswith("in.wrong:1:1: error: fix spring (of ")
+    assert "initial_integrate: NameError: name 'missing' is not defined" in text
+    assert "(styles_under_test.py:11)" in text
+
+
+def test_init(hub):
+    with pytest.raises(ScriptError, match=r"fix spring .*__init__: ZeroDivisionError.*_test.py:8"):
+        run(hub, "fix(s, spring, all, 0)")
+
+
+def test_refresh(hub):
+    run(hub, "compute(g, gauge, all)")
+    with pytest.raises(ScriptError, match=r"compute gauge .*refresh: .*Gauge.published"):
+        hub.refresh_values()
+
+
+def test_a_fix_without_hooks(hub, capsys):
+    run(hub, "fix(i, idle)")
+    assert "wrote initial_integrat; the hook is initial_integrate" in capsys.readouterr().err
+
+
+class View(PointsView):
+    """Three points in 2D."""
+
+    def __init__(self):
+        self.ids = np.arange(3)
+        self._v = np.zeros((3, 2))
+
+    def _gather(self, field):
+        return self._v
+
+    def _scatter(self, field, value):
+        self._v[...] = value
+
+
+def test_views_refuse_what_does_not_fit():
+    view = View()
+    view.velocity = 1.0
+    view.velocity += np.ones((3, 2))
+    assert (view._v == 2).all()
+    with pytest.raises(AttributeError, match="did you mean velocity"):
+        view.velocty = 1.0
+    with pytest.raises(AttributeError, match="did you mean velocity"):
+        view.velocty  # noqa: B018
+    with pytest.raises(ValueError, match=r"velocity has the shape \(3, 2\), not \(2,\)"):
+        view.velocity = np.ones(2)
