@@ -251,6 +251,14 @@ def test_pictures_of_a_run_do_not_jump(hub):
         np.testing.assert_allclose(places(), before, atol=1e-9)
 
 
+def test_numbers_that_hardly_differ_are_told_apart(plane):
+    plane.fields.points["seq"] = 1000 + np.linspace(0, 1, plane.fields.count)
+    dump = PyPlot(plane, 1, "p.png", 4, 3, "seq")
+    dump.write()
+    labels = [label.get_text() for label in dump._picture.scale.get_ticklabels()]
+    assert len(set(labels)) == len(labels) > 2
+
+
 def test_pyplot_survives_fields_without_range(plane):
     for values in (0.0, -3.0, np.nan, 1e300):
         plane.fields.points["seq"][:] = values

@@ -34,7 +34,8 @@ def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argum
 
     Notes
     -----
-    Files of that name are overwritten. Snapshots of an earlier, longer run whose steps this run
+    A file name is relative to the folder where the program was started; ``~`` is the home folder,
+    and a folder in the name must exist. Files of that name are overwritten. Snapshots of an earlier, longer run whose steps this run
     does not reach stay: a viewer would show them after its own.
 
     Example

@@ -152,8 +152,8 @@ class Plane(Picture):
             artist, ax=self.axes, shrink=0.8, label=self.label, format=Numbers()
         )
         bar.ax.tick_params(labelsize=8)
-        bar.ax.yaxis.get_offset_text().set_size(8)
         self.scale = bar.ax.yaxis
+        self.scale.get_offset_text().set_size(8)
         return artist
 
     def _apply_limits(self, lo: float, hi: float) -> None:
@@ -226,6 +226,7 @@ class Line(Picture):
         self.axes.set_ylabel(self.label, fontsize=9)
         self.scale = self.axes.yaxis
         self.scale.set_major_formatter(Numbers())
+        self.scale.get_offset_text().set_size(8)
         self.axes.grid(True, color="0.9", linewidth=0.7)
         (artist,) = self.axes.plot([], [], ".", color=SOLIDS[0], markersize=3)
         return artist
