@@ -6,9 +6,10 @@ import argparse
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from karamelo_py import __version__
-from karamelo_py.script.errors import ScriptError, render_message
+from karamelo_py.script.errors import ScriptError, nearest, render_message
 
 ERROR = 1
 INTERRUPTED = 130  # as a shell reports a program that SIGINT ended
@@ -86,7 +87,16 @@ def _dispatch(arguments: list[str]) -> int:
         "bench": _bench,
     }
     if arguments[0] in commands:
+        if any(word in ("-h", "--help") for word in arguments[1:]):
+            return _dispatch(["--help"])
         return commands[arguments[0]](arguments[1:])
+    close = nearest(arguments[0], commands)
+    if close and len(arguments) > 1 and not Path(arguments[0]).exists():
+        raise ScriptError(
+            f"there is no file {arguments[0]} and no such subcommand",
+            expected="a script, or one of " + ", ".join(commands),
+            hint=f"did you mean 'karamelo-py {close}'?",
+        )
     return _run(arguments)
 
 

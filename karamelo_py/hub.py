@@ -39,11 +39,12 @@ class Catalogue(dict):
         return item
 
     def __missing__(self, ID: str) -> Any:
-        known = ", ".join(self) or f"none: no {self.kind} is defined yet"
-        close = nearest(ID, self)
+        always = ["all"] if self.kind == "group" else []
+        known = ", ".join([*always, *self]) or f"none: no {self.kind} is defined yet"
+        close = nearest(ID, [*always, *self])
         raise ScriptError(
             f"unknown {self.kind} '{ID}'",
-            expected=f"one of {known}" if self else known,
+            expected=f"one of {known}" if self or always else known,
             hint=f"did you mean '{close}'?" if close else None,
         )
 

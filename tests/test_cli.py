@@ -2,6 +2,8 @@
 
 import pytest
 
+from karamelo_py.cli import main
+
 
 @pytest.mark.parametrize("script", ["", "# nothing\n", "dimension(1, 0, 1, 0.1)\n"])
 def test_a_script_without_a_run_says_so(run_script, script):
@@ -12,3 +14,14 @@ def test_a_script_without_a_run_says_so(run_script, script):
 
 def test_calculations_need_no_run(run_script):
     assert run_script("a = 3\nprint(a)\n").err == ""
+
+
+def test_an_unknown_subcommand(capsys):
+    assert main(["chek", "x.in"]) == 1
+    assert "did you mean 'karamelo-py check'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("subcommand", ["bench", "help", "styles", "check"])
+def test_help_of_subcommands(subcommand, capsys):
+    assert main([subcommand, "-h"]) == 0
+    assert "karamelo-py bench" in capsys.readouterr().out

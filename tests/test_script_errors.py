@@ -143,6 +143,8 @@ COMMANDS = [
     ("fix(k, initial_velocity_nodes, all, 1, 0)\nE = k_x", 5, "publishes nothing, not k_x"),
     ("fix(E, kinetic_energy, all)\ncompute(E, strain_energy, all)", 9, "'E' is a fix already"),
     ("method(ulmpm, PIC, linear)", 1, "move it above line 5"),
+    ("fix(body_force, all, 0, -9.81)", 5, "fix(ID, body_force, all, ...)"),
+    ("compute(C, kinetic_energy, al)", 28, "one of all, n, p"),
     ("run_until(0.01)", 11, "run_until(time >= 0.01)"),
     ("run_while(1)", 11, "run_while(time < 1)"),
 ]

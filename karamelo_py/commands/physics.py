@@ -179,6 +179,7 @@ def fix(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     delete_fix, group, compute
     """
     _refuse_shared_id(ID, "compute", hub.computes)
+    _refuse_forgotten_id("fix", ID, style)
     target = registry.find("fix", style)
     new = signature.call(target, hub, list(arguments), f"fix {style}")
     new.style = style
@@ -228,6 +229,7 @@ def compute(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     delete_compute, log_modify, fix
     """
     _refuse_shared_id(ID, "fix", hub.fixes)
+    _refuse_forgotten_id("compute", ID, style)
     target = registry.find("compute", style)
     new = signature.call(target, hub, list(arguments), f"compute {style}")
     new.style = style
@@ -253,6 +255,16 @@ def delete_compute(hub: Hub, ID: str) -> None:
     compute
     """
     hub.computes.remove(ID)
+
+
+def _refuse_forgotten_id(kind: str, ID: str, style: str) -> None:
+    """Where the style stands in the place of the ID, say so."""
+    if registry.knows(kind, ID) and not registry.knows(kind, style):
+        raise ScriptError(
+            f"'{ID}' is a style, and the ID comes first",
+            argument="ID",
+            expected=f"{kind}(ID, {ID}, {style}, ...)",
+        )
 
 
 def _refuse_shared_id(ID: str, other: str, catalogue: Catalogue) -> None:
