@@ -145,6 +145,8 @@ COMMANDS = [
     ("method(ulmpm, PIC, linear)", 1, "move it above line 5"),
     ("fix(body_force, all, 0, -9.81)", 5, "fix(ID, body_force, all, ...)"),
     ("compute(C, kinetic_energy, al)", 28, "one of all, n, p"),
+    ("a == 3", 1, "a = 3"),
+    ("fix(f, body_force, all, 0, null)", 28, "write NULL"),
     ("run_until(0.01)", 11, "run_until(time >= 0.01)"),
     ("run_while(1)", 11, "run_while(time < 1)"),
 ]

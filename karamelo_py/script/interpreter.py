@@ -17,6 +17,7 @@ from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
 from karamelo_py.script.parser import parse, parse_expression, parse_text
 from karamelo_py.script.syntax import (
     Assignment,
+    Binary,
     Call,
     Evaluation,
     Function,
@@ -184,6 +185,13 @@ class Interpreter:
                 raise Quit
             if isinstance(node, Name) and not self._means_something(node.name):
                 raise self._unknown_statement(node.name)
+            if isinstance(node, Binary) and node.operator == "==" and isinstance(node.left, Name):
+                right = statement.raw.code[node.right.start : node.right.end]
+                raise ScriptError(
+                    "this compares and does nothing with the result",
+                    place=statement.place,
+                    hint=f"an assignment has one =: {node.left.name} = {right}",
+                )
             self.evaluate(node, statement.raw)
 
     def _means_something(self, name: str) -> bool:
@@ -401,6 +409,8 @@ class Interpreter:
         known = [*self.variables, *self.hub.values.names(), *SEEDS, *CONSTANTS]
         close = nearest(name, known)
         hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
+        if name.upper() in WORDS:
+            hint = f"write {name.upper()}"
         if name.lower() in ("true", "false"):
             hint = f"write {int(name.lower() == 'true')}"
         defined = ", ".join(self.variables) or "none so far"
