@@ -21,7 +21,8 @@ LAST_GOOD = "last_good.*.LAMMPS"
 def warn_about_scheme(hub: Hub, simulation: Simulation) -> None:
     """Say so before the first step when transfer, basis and scheme do not go together well."""
     update, basis = hub.update, simulation.setup.basis
-    if update.transfer.keeps_moment and not basis.steady_moment and not isinstance(update.scheme, MUSL):
+    unsteady = update.transfer.keeps_moment and not basis.steady_moment
+    if unsteady and not isinstance(update.scheme, MUSL):
         transfer, scheme = type(update.transfer).__name__, type(update.scheme).__name__.lower()
         hub.warn(
             f"{transfer} with {type(basis).__name__.lower()} functions and {scheme} is unstable "

@@ -35,8 +35,9 @@ def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argum
     Notes
     -----
     A file name is relative to the folder where the program was started; ``~`` is the home folder,
-    and a folder in the name must exist. Files of that name are overwritten. Snapshots of an earlier, longer run whose steps this run
-    does not reach stay: a viewer would show them after its own.
+    and a folder in the name must exist. Files of that name are overwritten.
+    Snapshots of an earlier, longer run whose steps this run does not reach stay: a viewer would
+    show them after its own.
 
     Example
     -------

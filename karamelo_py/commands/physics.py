@@ -178,9 +178,9 @@ def fix(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     --------
     delete_fix, group, compute
     """
-    _refuse_shared_id(ID, "compute", hub.computes)
     _refuse_forgotten_id("fix", ID, style)
     target = registry.find("fix", style)
+    _refuse_shared_id(ID, target, "compute", hub.computes)
     new = signature.call(target, hub, list(arguments), f"fix {style}")
     new.style = style
     hub.fixes.add(ID, new, replace=True)
@@ -228,9 +228,9 @@ def compute(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     --------
     delete_compute, log_modify, fix
     """
-    _refuse_shared_id(ID, "fix", hub.fixes)
     _refuse_forgotten_id("compute", ID, style)
     target = registry.find("compute", style)
+    _refuse_shared_id(ID, target, "fix", hub.fixes)
     new = signature.call(target, hub, list(arguments), f"compute {style}")
     new.style = style
     hub.computes.add(ID, new)
@@ -267,9 +267,9 @@ def _refuse_forgotten_id(kind: str, ID: str, style: str) -> None:
         )
 
 
-def _refuse_shared_id(ID: str, other: str, catalogue: Catalogue) -> None:
-    """A fix and a compute of one ID would publish values of the same names."""
-    if ID in catalogue:
+def _refuse_shared_id(ID: str, style: type, other: str, catalogue: Catalogue) -> None:
+    """A fix and a compute of one ID must not publish values of the same names."""
+    if ID in catalogue and set(catalogue[ID].published) & set(style.published):
         raise ScriptError(
             f"'{ID}' is a {other} already (line {catalogue[ID].place.line})",
             argument="ID",

@@ -59,7 +59,9 @@ class _Builder:
     def add(self, fix: Any, stage: int, hook: CompiledHook) -> None:
         """Add one compiled hook of a fix."""
         begin, end = self._members(fix.group, hook)
-        slot = self.hub.values.slot(f"{fix.id}_x") if hook.publishes else -1
+        slot = (
+            self.hub.values.slot(f"{fix.id}_x") if hook.publishes and "x" in fix.published else -1
+        )
         signature = NODE_FUNCTION if hook.on_nodes else POINT_FUNCTION
         address = address_of(hook.function, signature)
         row = [address, stage, begin, end, slot, int(hook.uses_before), int(hook.uses_share)]
