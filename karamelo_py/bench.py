@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import prange
 
-from karamelo_py.cli import CommandLine
+from karamelo_py.cli import CommandLine, threads_option
 from karamelo_py.compile import kernel
 from karamelo_py.console import Console
 from karamelo_py.hub import Hub
@@ -252,7 +252,7 @@ def main(arguments: list[str]) -> int:
     """The subcommand."""
     parser = CommandLine(prog="karamelo-py bench", add_help=False, allow_abbrev=False)
     parser.add_argument("workloads", nargs="*")
-    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--threads", type=threads_option, default=1)
     parser.add_argument("--seconds", type=_positive, default=2.0)
     parser.add_argument("--debug", action="store_true")
     options = parser.parse_args(arguments)
@@ -266,7 +266,8 @@ def main(arguments: list[str]) -> int:
             )
     import numba
 
-    threads = max(1, min(options.threads, numba.config.NUMBA_NUM_THREADS))
+    available = numba.config.NUMBA_NUM_THREADS
+    threads = min(options.threads or available, available)
     numba.set_num_threads(threads)
     triad = bandwidth(threads)
     print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")

@@ -112,7 +112,7 @@ def _script_parser() -> CommandLine:
     parser.add_argument("script", nargs="?")
     parser.add_argument("-i", "-in", dest="input")
     parser.add_argument("-var", "--var", nargs=2, action="append", default=[])
-    parser.add_argument("--threads", type=_threads)
+    parser.add_argument("--threads", type=threads_option)
     parser.add_argument("--quiet", action="store_true")
     parser.add_argument("--debug", action="store_true")
     parser.add_argument("--version", action="store_true")
@@ -120,7 +120,8 @@ def _script_parser() -> CommandLine:
     return parser
 
 
-def _threads(text: str) -> int | None:
+def threads_option(text: str) -> int | None:
+    """The value of --threads: a number, or None for auto."""
     if text == "auto":
         return None
     if not text.isdigit() or int(text) < 1:

@@ -100,7 +100,7 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
         return styles[name]
     close = nearest(name, styles)
     raise ScriptError(
-        f"unknown {family} '{name}'",
+        f"unknown {family if family == 'command' else family + ' style'} '{name}'",
         expected="one of " + ", ".join(names(family)) if styles else f"no {family} is installed",
         hint=f"did you mean '{close}'?" if close else None,
     )
