@@ -67,6 +67,8 @@ def thread_count(hub: Hub, points: int) -> int:
 
     available = int(config.NUMBA_NUM_THREADS)
     if hub.settings.threads is not None:
+        if hub.settings.threads > available:
+            hub.warn(f"only {available} of {hub.settings.threads} threads can be had here")
         return max(1, min(hub.settings.threads, available))
     usable = min(available, os.cpu_count() or 1)
     return usable if points > SERIAL_UP_TO else 1

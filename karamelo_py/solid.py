@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
 MAX_POINTS = 2**31 - 1
+_SAMPLE = 5000
 # Beyond this many candidates the points outside the domain are no longer counted, only mentioned.
 _MAX_COUNTED = 20_000_000
 
@@ -123,6 +124,26 @@ class Solid:
     def from_script(cls, hub: Hub, argument: Argument) -> Solid:
         """The solid that `argument` names."""
         return look_up(hub.solids, argument)
+
+
+def coinciding(a: Solid, b: Solid) -> bool:
+    """Whether points of `a` lie where points of `b` are; of many points, a sample is looked at."""
+    if not len(a.x0) or not len(b.x0):
+        return False
+    lo = np.maximum(a.x0.min(axis=0), b.x0.min(axis=0))
+    hi = np.minimum(a.x0.max(axis=0), b.x0.max(axis=0))
+    if (lo > hi).any():
+        return False
+    inside = [x[((x >= lo) & (x <= hi)).all(axis=1)] for x in (a.x0, b.x0)]
+    sample = inside[0][:: max(1, len(inside[0]) // _SAMPLE)]
+    return bool(np.isin(_keys(sample, a.h), _keys(inside[1], a.h)).any())
+
+
+def _keys(x: np.ndarray, h: float) -> np.ndarray:
+    """A number (n,) for each position, equal for positions that differ by rounding only."""
+    places = np.rint(x * (1e4 / h)).astype(np.int64)
+    # Primes keep places apart; the product may overflow, which only mixes the bits.
+    return places @ np.array([1, 1_000_003, 998_244_353_001], np.int64)[: x.shape[1]]
 
 
 def _counted(outside: float) -> str:

@@ -181,3 +181,11 @@ def test_old_caches_are_forgotten_and_nothing_else(tmp_path):
     assert {"mine", "0123"} <= left
     assert sum(len(name) == 16 for name in left) == 6
     assert (tmp_path / "data").is_dir()
+
+
+def test_a_solid_in_the_place_of_another_is_warned_of(run_interpreted):
+    """A line copied with its region would double the mass."""
+    twice = run_interpreted(block(2, "solid(twin, region, box, 2, rubber, 0.1, 0)", "run(0)"))
+    assert "points of solid 'twin'" in twice.err
+    beside = "region(side, block, 0.6, 0.9, 0.3, 0.5)\nsolid(side, region, side, 2, rubber, 0.1)"
+    assert "twice the mass" not in run_interpreted(block(2, beside, "run(0)")).err

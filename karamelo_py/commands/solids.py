@@ -11,7 +11,7 @@ from karamelo_py.group import ALL, KINDS
 from karamelo_py.regions.base import Region
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.signature import Argument
-from karamelo_py.solid import Solid
+from karamelo_py.solid import Solid, coinciding
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -68,7 +68,15 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
             expected=f"solid({solid.syntax})",
             hint=f"did you mean '{close}'?" if close else None,
         )
-    hub.solids.add(ID, signature.call(Solid, hub, list(arguments), "solid region"))
+    new = signature.call(Solid, hub, list(arguments), "solid region")
+    for other in hub.solids.values():
+        if coinciding(new, other):
+            hub.warn(
+                f"points of solid '{ID}' lie where points of solid '{other.id}' are: "
+                "there is twice the mass",
+                hint="another region for one of them, or region(ID, difference, ...)",
+            )
+    hub.solids.add(ID, new)
 
 
 solid.syntax = "ID, region, regionID, ppc, material, h[, T0]"
