@@ -10,7 +10,7 @@ import contextlib
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TextIO
 
 # Seconds between two redraws of the bar, and between two plain progress lines in a pipe.
@@ -138,14 +138,6 @@ class Console:
             share = f"{100 * seconds / total:.0f} %" if total > 0 else ""
             rows.append((f"  {name}", (f"{seconds:.3g} s", share)))
         self._table(title, rows)
-
-    @contextlib.contextmanager
-    def compiling(self, what: str = "kernels") -> Iterator[None]:
-        """Say that compilation goes on, and for how long it went."""
-        self.say(f"Compiling {what} (only the first time; kept for later runs) ...")
-        start = time.perf_counter()
-        yield
-        self.say(f"Compiled in {time.perf_counter() - start:.1f} s")
 
     # Progress
 
