@@ -11,6 +11,7 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
 from karamelo_py import diagnosis
+from karamelo_py.kernels.step import DONE
 from karamelo_py.lowering import check_scene
 from karamelo_py.script.errors import Quit, ScriptError
 
@@ -62,6 +63,7 @@ class Runner:
             from karamelo_py.report import report
 
             simulation.begin(self.end_time)
+            simulation.sort_if_due()
             report(hub, simulation)
             raise Quit
         with self._telling_of_compilation():
@@ -124,7 +126,7 @@ class Runner:
             status = simulation.advance(int(target) - step)
             elapsed = time.perf_counter() - begun - (self.spent["compilation"] - compiled)
             self.spent["steps"] += elapsed
-            if status != 0:
+            if status != DONE:
                 diagnosis.stop(hub, simulation, status, snapshot, self.place)
             if compiled < self.spent["compilation"]:
                 # A rate that counts compilation would promise hours.

@@ -228,7 +228,8 @@ class Simulation:
         """Sort the points by tile."""
         self.tiles.sort(self.setup, self.mode)
 
-    def _sort_if_due(self) -> None:
+    def sort_if_due(self) -> None:
+        """Sort the points when one may have left its tile's surroundings, or none is sorted yet."""
         control = self.setup.control.real
         if control[DRIFT] > control[DRIFT_LIMIT]:
             self.sort()
@@ -267,7 +268,7 @@ class Simulation:
         target = self.step + count
         control = self.setup.control
         while True:
-            self._sort_if_due()
+            self.sort_if_due()
             status = self._advance(target - self.step)
             self._mapped = True
             ended = self.step >= target or control.values[TIME] >= control.real[END_TIME]
@@ -319,7 +320,7 @@ class Simulation:
         """See that the nodes show the present state when no step has been taken yet."""
         if not self._mapped:
             s = self.setup
-            self._sort_if_due()
+            self.sort_if_due()
             dt = step_size(s)
             map_to_nodes(s, self.mode, Everything())
             sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
