@@ -94,11 +94,9 @@ def _name(*tags: Any) -> str:
 
 
 @sweep_tiles.on(Timed)
-def _(mode, gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt):
+def _(mode, gather, scatter, s, block, places, dt):
     begun = time.perf_counter()
-    sweep_tiles(
-        mode.mode, gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt
-    )
+    sweep_tiles(mode.mode, gather, scatter, s, block, places, dt)
     _note(mode, _name(gather, scatter), begun)
 
 
@@ -178,7 +176,7 @@ class _Recorder(NamedTuple):
 
 
 @sweep_tiles.on(_Recorder)
-def _(mode, gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt):
+def _(mode, gather, scatter, s, block, places, dt):
     mode.traffic.append(("points", set(gather.reads) | set(scatter.reads), set(gather.writes)))
 
 
@@ -195,6 +193,10 @@ NODE_TRAFFIC = {
     "MomentumToVelocity": (("velocity", 2),),
     "SumsToVelocity": (("sums", 1), ("velocity", 1)),
     "UpdateToVelocity": (("update", 1), ("velocity", 1)),
+    "ClearGrowth": (("growth", 1),),
+    "AverageGrowth": (("growth", 2),),
+    "StartSeries": (("sums", 1), ("series", 1), ("update", 2)),
+    "ExtendSeries": (("sums", 1), ("series", 2), ("update", 2)),
 }
 
 

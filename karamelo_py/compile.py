@@ -117,11 +117,15 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
     The decorated function gives name, parameters and docstring. Implementations are added with
     ``name.on(Class, ...)`` and serve both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and
     inside kernels, where the types are known at compile time and no branch is left. A plug-in adds
-    its own in the same way.
+    its own in the same way. ``name.otherwise`` marks what classes without their own get.
     """
 
     def declare(stub: Callable) -> Callable:
         table: dict[tuple[type, ...], Callable] = {}
+        fallback: list[Callable] = []
+
+        def find(classes: tuple) -> Callable | None:
+            return table.get(classes) or (fallback[0] if fallback else None)
 
         def missing(classes: tuple) -> str:
             names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
@@ -129,9 +133,10 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
 
         def dispatch(*arguments: Any) -> Any:
             classes = tuple(type(a) for a in arguments[:tags])
-            if classes not in table:
+            chosen = find(classes)
+            if chosen is None:
                 raise TypeError(missing(classes))
-            return table[classes](*arguments)
+            return chosen(*arguments)
 
         dispatch.__name__ = stub.__name__
         dispatch.__qualname__ = stub.__qualname__
@@ -139,8 +144,7 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
         dispatch.__doc__ = stub.__doc__
 
         def choose(*arguments: Any) -> Callable | None:
-            classes = tuple(tag_class(a) for a in arguments[:tags])
-            return table.get(classes)
+            return find(tuple(tag_class(a) for a in arguments[:tags]))
 
         overload(dispatch, _INLINED, strict=False)(choose)
 
@@ -151,7 +155,12 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
 
             return register
 
+        def otherwise(implementation: Callable) -> Callable:
+            fallback[:] = [implementation]
+            return implementation
+
         dispatch.on = on
+        dispatch.otherwise = otherwise
         dispatch.defined = lambda *classes: classes in table
         return dispatch
 

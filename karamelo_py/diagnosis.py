@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from karamelo_py.kernels.step import ABOVE_LIMIT
-from karamelo_py.schemes.musl import MUSL
 from karamelo_py.script.errors import Place, ScriptError
 
 if TYPE_CHECKING:
@@ -16,19 +15,6 @@ if TYPE_CHECKING:
     from karamelo_py.simulation import Simulation
 
 LAST_GOOD = "last_good.*.LAMMPS"
-
-
-def warn_about_scheme(hub: Hub, simulation: Simulation) -> None:
-    """Say so before the first step when transfer, basis and scheme do not go together well."""
-    update, basis = hub.update, simulation.setup.basis
-    unsteady = update.transfer.keeps_moment and not basis.steady_moment
-    if unsteady and not isinstance(update.scheme, MUSL):
-        transfer, scheme = type(update.transfer).__name__, type(update.scheme).__name__.lower()
-        hub.warn(
-            f"{transfer} with {type(basis).__name__.lower()} functions and {scheme} is unstable "
-            "where a point barely reaches a node: stressed bodies that move will blow up",
-            hint="scheme(musl), or FLIP",
-        )
 
 
 def warn_about_precision(hub: Hub, simulation: Simulation) -> None:
@@ -100,10 +86,10 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return "a point went wrong", "use a smaller step"
     number, block, p = min(wrong, key=lambda item: item[0])
     now = simulation.now
-    old, new = block.x[now][p].astype(float), block.x[1 - now][p].astype(float)
+    d = hub.domain.dimension
+    old, new = (block.x[k][p, :d].astype(float) for k in (now, 1 - now))
     name = _named(hub, simulation, number)
     smaller = _smaller_step(hub, simulation)
-    d = hub.domain.dimension
     if not np.isfinite(old).all():
         return f"{name} has no position (NaN)", f"look for a formula that gives NaN; {smaller}"
     if not np.isfinite(new).all() or not np.isfinite(block.points.v[p]).all():
@@ -112,7 +98,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
             f"look for a formula that gives NaN, such as a division by zero; else {smaller}",
         )
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
-    if (new < lo).any() or (new > hi).any():
+    if hub.update.method.frame.moves and ((new < lo).any() or (new > hi).any()):
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
         if simulation.above_limit():
             return f"{name} at {_place(old)} is thrown out of the domain", smaller
@@ -122,7 +108,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
             "make the domain larger, hold the point back with fix velocity_nodes at the wall, "
             f"or, if it should not have got there, {smaller}",
         )
-    move = float(np.abs(new - old).max()) / hub.domain.h
+    move = float(np.abs(new - old).max()) / hub.lattices[block.grid[p]].h
     if move > 1:
         return (
             f"{name} at {_place(old)} moves by {move:.3g} cells in one step",

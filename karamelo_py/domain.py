@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from karamelo_py.lattice import CHUNK, RELATIVE_TOLERANCE, Lattice, boxes
 from karamelo_py.script.errors import ScriptError
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
-# A point this far (in cells) beyond a face still counts as lying on it.
-RELATIVE_TOLERANCE = 1e-9
-# Node numbers have to fit into 32 bits wherever a kernel packs them.
-MAX_NODES = 2**31 - 1
-# Points or nodes looked at together: large enough for NumPy, small enough for the cache and memory.
-CHUNK = 1 << 18
+__all__ = ["CHUNK", "Domain", "boxes", "require_domain", "require_grid"]
 
 
 class Domain:
@@ -70,24 +65,9 @@ class Domain:
         ScriptError
             When there would be more nodes than can be counted.
         """
-        lengths = (self.hi - self.lo)[: self.dimension]
-        cells = [max(1, math.ceil(length / h - RELATIVE_TOLERANCE)) for length in lengths]
-        nodes = math.prod(n + 1 for n in cells)
-        if nodes > MAX_NODES:
-            raise ScriptError(
-                f"cell size {h:g} gives a grid of {nodes:.3g} nodes",
-                argument="h",
-                expected=f"at most {MAX_NODES} nodes: a larger h or a smaller domain",
-            )
-        self.h = float(h)
-        unused = (1,) * (3 - self.dimension)
-        self.cells = (*cells, *unused)
-        self.shape = (*(n + 1 for n in cells), *unused)
-
-    @property
-    def node_count(self) -> int:
-        """Number of nodes."""
-        return math.prod(self.shape)
+        lattice = Lattice(self.dimension, self.lo, self.hi, h)
+        self.h = lattice.h
+        self.cells, self.shape = lattice.cells, lattice.shape
 
     @property
     def tolerance(self) -> float:
@@ -103,59 +83,6 @@ class Domain:
             inside &= x[:, axis] >= self.lo[axis] - tolerance
             inside &= x[:, axis] <= self.hi[axis] + tolerance
         return inside
-
-    def node_positions(self) -> np.ndarray:
-        """Positions of all nodes, (n, 3); node (i, j, k) has the number (i ny + j) nz + k."""
-        positions = np.empty((*self.shape, 3))
-        for axis, count in enumerate(self.shape):
-            along = [1, 1, 1]
-            along[axis] = count
-            positions[..., axis] = (self.lo[axis] + np.arange(count) * (self.h or 0.0)).reshape(
-                along
-            )
-        return positions.reshape(-1, 3)
-
-    def nodes_between(
-        self, lo: np.ndarray, hi: np.ndarray
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Nodes in a box, some thousand at a time: their numbers (m,) and positions (m, dimension).
-
-        `lo` and `hi` (3,) may be infinite. Nodes come in the order of their numbers.
-        """
-        first, last = [], []
-        for axis in range(self.dimension):
-            top = self.shape[axis] - 1
-            below = (lo[axis] - self.lo[axis]) / self.h - 1e-6
-            above = (hi[axis] - self.lo[axis]) / self.h + 1e-6
-            first.append(math.ceil(min(max(below, 0), top + 1)))
-            last.append(math.floor(min(max(above, -1), top)))
-        if any(a > b for a, b in zip(first, last, strict=True)):
-            return
-        _, *trailing = self.shape[: self.dimension]
-        for index in boxes(first, last, 1):
-            number = index[:, 0].copy()
-            for axis, count in enumerate(trailing, start=1):
-                number *= count
-                number += index[:, axis]
-            yield number, self.lo[: self.dimension] + index * self.h
-
-
-def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
-    """Integer positions between `first` and `last` (inclusive), the last axis fastest, in chunks.
-
-    Each chunk is an int64 array (m, d) with about CHUNK / `weight` rows, so that `weight` items
-    for every position stay a bounded amount of memory however large the box is.
-    """
-    counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
-    total = math.prod(counts)
-    step = max(1, CHUNK // weight)
-    for start in range(0, total, step):
-        number = np.arange(start, min(start + step, total), dtype=np.int64)
-        index = np.empty((len(number), len(counts)), dtype=np.int64)
-        for axis in range(len(counts) - 1, -1, -1):
-            number, index[:, axis] = np.divmod(number, counts[axis])
-            index[:, axis] += first[axis]
-        yield index
 
 
 def require_domain(hub: Hub) -> Domain:

@@ -79,7 +79,7 @@ class Fields:
     @property
     def node_count(self) -> int:
         """Number of nodes."""
-        return self.hub.domain.node_count
+        return sum(lattice.node_count for lattice in self.hub.lattices)
 
     @property
     def position(self) -> np.ndarray:
@@ -172,9 +172,11 @@ class Fields:
         if name == "id":
             return np.arange(self.node_count)
         if name == "type":
-            return np.ones(self.node_count, np.int64)
+            counts = [lattice.node_count for lattice in self.hub.lattices]
+            return np.repeat(np.arange(1, 1 + len(counts)), counts)
         if name in AXES:
-            return self.hub.domain.node_positions()[:, AXES.index(name)]
+            axis = AXES.index(name)
+            return np.concatenate([lattice.positions()[:, axis] for lattice in self.hub.lattices])
         if name == "mass":
             return mass
         if name in ABSENT_AT_NODES:
@@ -200,7 +202,7 @@ def _exported_state(simulation: Any) -> np.ndarray:
     # A kinematics fills its own components: in the plane the fourth is 12, as in space.
     for block in s.blocks:
         rows = np.zeros((len(block.id), EXPORTED))
-        export_state(s.kin, s.basis.h, block.points, block.laws, rows)
+        export_state(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
         out[block.id] = rows
     return out
 
@@ -210,7 +212,7 @@ def _stored_energy(simulation: Any) -> np.ndarray:
     out = np.zeros(simulation.count)
     for block in s.blocks:
         rows = np.zeros(len(block.id))
-        export_energy(s.kin, s.basis.h, block.points, block.laws, rows)
+        export_energy(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
         out[block.id] = rows
     return out
 

@@ -103,7 +103,7 @@ class ParticleGroup(Group):
 
 
 class NodeGroup(Group):
-    """A set of nodes of the grid, by their positions. The solids share one grid."""
+    """A set of nodes, by their positions. Methods decide whether solids share them."""
 
     kind = "nodes"
 
@@ -113,15 +113,21 @@ class NodeGroup(Group):
         return self.members
 
     def total(self) -> int:
-        """Number of nodes of the grid."""
-        return require_grid(self.hub).node_count
+        """Number of nodes of all grids."""
+        require_grid(self.hub)
+        return sum(lattice.node_count for lattice in self.hub.lattices)
 
     def find(self, region: Region, solids: Sequence[Solid]) -> np.ndarray:
-        """Nodes of the grid in `region`."""
-        grid = require_grid(self.hub)
+        """Nodes in `region`; where solids have nodes of their own, those of `solids`."""
+        require_grid(self.hub)
+        method, lattices = self.hub.update.method, self.hub.lattices
+        if method is not None and len(lattices) > 1:
+            wanted = {method.lattice_of(self.hub, solid) for solid in solids}
+            lattices = [lattices[k] for k in sorted(wanted)]
         found = [np.empty(0, dtype=np.int64)]
-        for number, x in grid.nodes_between(region.box_lo, region.box_hi):
-            found.append(number[region.inside(x)])
+        for lattice in lattices:
+            for number, x in lattice.between(region.box_lo, region.box_hi):
+                found.append(number[region.inside(x)])
         return np.concatenate(found)
 
 

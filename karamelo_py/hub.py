@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from karamelo_py.console import Console
 from karamelo_py.fields import Fields
+from karamelo_py.lattice import Lattice
 from karamelo_py.output import Output
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
 from karamelo_py.script.faults import told
@@ -114,6 +115,14 @@ class Hub:
         if self._simulation is None or self._simulation.key != scene_key(self):
             self._simulation = Simulation(self, self._simulation)
         return self._simulation
+
+    @property
+    def lattices(self) -> list[Lattice]:
+        """The grids of the scene: of the method, or that of the domain before there is one."""
+        if self.update.method is not None:
+            return self.update.method.lattices(self)
+        domain = self.domain
+        return [Lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 
     def refresh_values(self) -> None:
         """Let computes and fixes measure the present state."""

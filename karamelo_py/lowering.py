@@ -13,7 +13,6 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import (
     DRIFT,
-    DRIFT_LIMIT,
     POINT_MASS,
     SPACING,
     Block,
@@ -22,8 +21,12 @@ from karamelo_py.kernels.arrays import (
     Points,
     Setup,
 )
-from karamelo_py.points.kinematics import KINEMATICS
-from karamelo_py.points.materials import initial_state
+from karamelo_py.kernels.step import FBar
+from karamelo_py.lattice import table
+from karamelo_py.methods.base import NoContact
+from karamelo_py.points.kinematics import identity, planar
+from karamelo_py.points.materials import deformation, initial_state
+from karamelo_py.points.transfers import terms
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.state.tiles import Tiles
 
@@ -38,10 +41,11 @@ class State(NamedTuple):
     """Fields of all points in the order of their ids, between two lowerings."""
 
     count: int  # number of points, N
-    x: np.ndarray  # (N, d)
+    x: np.ndarray  # (N, w) places
     v: np.ndarray  # (N, d)
     laws: dict[type, np.ndarray]  # (N, s) state for each class of law
-    moment: np.ndarray | None  # (N, d d)
+    moment: np.ndarray | None  # (N, t) what the transfer keeps
+    deformation: np.ndarray | None  # (N, t) F, where it has an array of its own
 
 
 def check_scene(hub: Hub) -> None:
@@ -59,6 +63,7 @@ def check_scene(hub: Hub) -> None:
             "there is no solid to move",
             hint="put solid(ID, region, regionID, points per cell, material, h, T0) before run",
         )
+    hub.update.method.check(hub)
 
 
 def thread_count(hub: Hub, points: int) -> int:
@@ -77,76 +82,107 @@ def thread_count(hub: Hub, points: int) -> int:
 def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     """Make the arrays of a run from the scene, taking over the state of points that exist."""
     check_scene(hub)
-    domain = hub.domain
+    method = hub.update.method
     real = PRECISIONS[hub.settings.precision]
-    kin = KINEMATICS[domain.dimension]()
-    basis = hub.update.method.make_basis(domain, real)
+    kin = method.kinematics(hub)
+    lattices = method.lattices(hub)
     transfer = hub.update.transfer_tag(real)
-    shape = tuple(int(n) for n in domain.shape)
-    tiles = Tiles(shape, domain.dimension, type(basis).width)
-    control = Control(hub.values.array, np.zeros(10), np.zeros(4, np.int64))
-    control.real[SPACING] = domain.h
-    control.real[DRIFT_LIMIT] = tiles.drift_limit
+    basis = type(method.basis)(*(real(x) for x in method.basis))
+    tiles = Tiles(lattices, basis)
+    control = Control(hub.values.array, np.zeros(11), np.zeros(4, np.int64))
+    control.real[SPACING] = min(lattice.h for lattice in lattices)
     control.real[DRIFT] = np.inf  # the points are not sorted yet
+    needs = Needs(
+        moment=transfer.keeps_moment,
+        force=any(fix.puts_force_on_points for fix in hub.fixes.values()),
+        growth=isinstance(method.averaging(hub), FBar),
+        series=terms(transfer) > 1,
+        normal=not isinstance(method.contact, NoContact),
+    )
     setup = Setup(
+        frame=method.frame,
         kin=kin,
         basis=basis,
         transfer=transfer,
-        nodes=lower_nodes(domain, domain.dimension, real),
-        blocks=lower_blocks(hub, kin, transfer, tiles, real, previous),
+        averaging=method.averaging(hub),
+        contact=method.contact,
+        grids=table(lattices, real),
+        nodes=lower_nodes(sum(lattice.node_count for lattice in lattices), kin, needs, real),
+        blocks=lower_blocks(hub, kin, needs, tiles, real, previous),
         spans=tiles.empty_spans(),
-        shape=shape,
         control=control,
     )
     control.real[POINT_MASS] = max(float(b.points.mass.max()) for b in setup.blocks)
     return setup, tiles
 
 
-def lower_nodes(domain, d: int, real: type) -> Nodes:
+class Needs(NamedTuple):
+    """Which fields that not every scene has this one needs."""
+
+    moment: bool
+    force: bool
+    growth: bool
+    series: bool
+    normal: bool
+
+
+def lower_nodes(count: int, kin, needs: Needs, real: type) -> Nodes:
     """Node fields, zero; the system gives memory to pages only when they are touched."""
-    count = int(np.prod(domain.shape))
+    d = kin.dimension
     return Nodes(
         sums=np.zeros((count, 1 + 2 * d), real),
         update=np.zeros((count, 2 * d), real),
         velocity=np.zeros((count, d), real),
+        normal=np.zeros((count, d), real) if needs.normal else None,
+        growth=np.zeros((count, 2), real) if needs.growth else None,
+        series=np.zeros((count, 2 * d), real) if needs.series else None,
     )
 
 
-def lower_blocks(hub, kin, transfer, tiles: Tiles, real: type, previous: State | None) -> tuple:
+def lower_blocks(hub, kin, needs: Needs, tiles: Tiles, real: type, previous: State | None) -> tuple:
     """One block for each class of law, in the order in which the solids use them."""
     solids: dict[type, list] = {}
     for solid in hub.solids.values():
         solids.setdefault(type(solid.material.law), []).append(solid)
     return tuple(
-        lower_block(members, kin, transfer, tiles, real, previous) for members in solids.values()
+        lower_block(hub, members, kin, needs, tiles, real, previous) for members in solids.values()
     )
 
 
-def lower_block(solids, kin, transfer, tiles: Tiles, real: type, previous: State | None) -> Block:
+def lower_block(
+    hub, solids, kin, needs: Needs, tiles: Tiles, real: type, previous: State | None
+) -> Block:
     """The points of all solids whose law is of one class."""
-    d = kin.dimension
+    method = hub.update.method
     materials = list({id(s.material): s.material for s in solids}.values())
     law = type(materials[0].law)
     laws = law(
         *(np.array(column, real) for column in zip(*(m.law for m in materials), strict=True))
     )
-    x0 = np.concatenate([s.x0 for s in solids])
-    n = len(x0)
+    n = sum(len(s.x0) for s in solids)
+    d = kin.dimension
     ids = np.concatenate([np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids])
     fresh = initial_state(law(*(real(p) for p in materials[0].law)), kin, real(1))
     state = np.tile(np.array(fresh, real), (n, 1))
-    moment = np.zeros((n, kin.tensor_size), real) if transfer.keeps_moment else None
-    x = np.empty((2, n, d), real)
+    moment = np.zeros((n, planar(kin).tensor_size), real) if needs.moment else None
+    stores_f = not method.frame.moves and not deformation.defined(law)
+    unit = np.array(identity(kin, real(1)), real)
+    f = np.tile(unit, (n, 1)) if stores_f else None
+    places = np.concatenate([method.places(kin, s, real) for s in solids])
+    here = places if method.frame.moves else places[:, :d]
+    x = np.stack([here, here])
     v = np.zeros((n, d), real)
-    x[:] = x0
     if previous is not None:
         old = ids < previous.count
-        x[:, old] = previous.x[ids[old]]
+        kept = previous.x.shape[1]
+        x[:, old, :kept] = previous.x[ids[old]][:, : x.shape[2]]
         v[old] = previous.v[ids[old]]
         if law in previous.laws:
             state[old] = previous.laws[law][ids[old]]
         if moment is not None and previous.moment is not None:
             moment[old] = previous.moment[ids[old]]
+        if f is not None and previous.deformation is not None:
+            f[old] = previous.deformation[ids[old]]
     points = Points(
         v=v,
         mass=np.concatenate([s.mass for s in solids]).astype(real),
@@ -155,5 +191,19 @@ def lower_block(solids, kin, transfer, tiles: Tiles, real: type, previous: State
         material=np.concatenate(
             [np.full(len(s.x0), materials.index(s.material), np.int32) for s in solids]
         ),
+        deformation=f,
+        force=np.zeros((n, d), real) if needs.force else None,
+        growth=np.ones(n, real) if needs.growth else None,
+        echo=np.zeros((n, d), real) if needs.series else None,
     )
-    return Block(x, points, laws, tiles.empty_tiling(), ids.astype(np.int64))
+    return Block(
+        x=x,
+        home=None if method.frame.moves else places,
+        points=points,
+        laws=laws,
+        tiling=tiles.empty_tiling(),
+        id=ids.astype(np.int64),
+        grid=np.concatenate(
+            [np.full(len(s.x0), method.lattice_of(hub, s), np.int32) for s in solids]
+        ),
+    )

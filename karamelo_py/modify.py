@@ -51,6 +51,8 @@ class Fix:
         when a style does not say.
     first_step_only
         Whether it acts in the first step after its definition and is idle thereafter.
+    puts_force_on_points
+        Whether it sets forces on points in ``initial_integrate``, so that they have a field for it.
     id
         Its ID in the script.
     """
@@ -59,6 +61,7 @@ class Fix:
     formulas: tuple = ()
     published: tuple[str, ...] = SUFFIXES
     first_step_only = False
+    puts_force_on_points = False
     id: str = ""
     style: str = ""
     place: Place | None = None

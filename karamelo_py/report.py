@@ -20,7 +20,10 @@ def report(hub: Hub, simulation: Simulation) -> None:
     say(f"dimension      {s.kin.dimension}, kinematics {type(s.kin).__name__}")
     say(f"precision      {hub.settings.precision}")
     say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")
-    say(f"nodes          {hub.domain.node_count} ({' x '.join(map(str, hub.domain.shape))})")
+    lattices = hub.lattices
+    shapes = ", ".join(" x ".join(map(str, lattice.shape)) for lattice in lattices[:8])
+    more = ", ..." if len(lattices) > 8 else ""
+    say(f"nodes          {hub.fields.node_count} ({shapes}{more})")
     tiles = simulation.tiles
     used = int(np.count_nonzero(tiles.used == 1))
     near = int(np.count_nonzero(tiles.used))
@@ -40,6 +43,8 @@ def report(hub: Hub, simulation: Simulation) -> None:
     say("fields of a node")
     per_node = 0
     for name, array in zip(s.nodes._fields, s.nodes, strict=True):
+        if array is None:
+            continue
         size = array.itemsize * array.shape[1]
         per_node += size
         say(f"  {name:<30}  {array.shape[1]!s:<10} {size:>6}")
@@ -58,7 +63,9 @@ def point_fields(block: Any) -> list[tuple[str, str, int]]:
     """Name, shape and bytes of each field that a point of this block carries."""
     fields = [("x", block.x[0]), ("x moved", block.x[1])]
     fields += [(name, array) for name, array in block.points._asdict().items() if array is not None]
-    fields.append(("id", block.id))
+    fields += [("id", block.id), ("grid", block.grid)]
+    if block.home is not None:
+        fields.append(("home", block.home))
     out = []
     for name, array in fields:
         shape = str(array.shape[1]) if array.ndim > 1 else "1"

@@ -84,7 +84,6 @@ class Runner:
         started = time.perf_counter()
         simulation.begin(self.end_time)
         diagnosis.warn_about_step(hub, simulation)
-        diagnosis.warn_about_scheme(hub, simulation)
         diagnosis.warn_about_precision(hub, simulation)
         first_step = simulation.step
         first_time = simulation.time
@@ -239,7 +238,7 @@ class Runner:
             {
                 "method": method,
                 "points": simulation.count,
-                "nodes": hub.domain.node_count,
+                "nodes": hub.fields.node_count,
                 "dt": simulation.dt,
                 "stable dt": simulation.limit,
                 "threads": simulation.threads,

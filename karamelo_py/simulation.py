@@ -44,6 +44,7 @@ from karamelo_py.kernels.step import (
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
 from karamelo_py.lowering import State, lower, thread_count
+from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
 from karamelo_py.state.hooks import lower_hooks
 from karamelo_py.views import NodesView, PointsView
@@ -61,6 +62,9 @@ def scene_key(hub: Hub) -> tuple:
         tuple(hub.solids.values()),
         update.method,
         update.transfer,
+        type(update.transfer),
+        update.anti_locking,
+        any(fix.puts_force_on_points for fix in hub.fixes.values()),
         hub.settings.precision,
         hub.settings.threads,
     )
@@ -154,7 +158,8 @@ class Simulation:
     @property
     def x(self) -> np.ndarray:
         """(N, d) present positions by id."""
-        return self.by_id(lambda block: block.x[self.now])
+        d = self.setup.kin.dimension
+        return self.by_id(lambda block: block.x[self.now][:, :d])
 
     @property
     def v(self) -> np.ndarray:
@@ -176,7 +181,20 @@ class Simulation:
             laws[type(block.laws)] = rows
         keeps = self.setup.blocks[0].points.moment is not None
         moment = self.by_id(lambda block: block.points.moment) if keeps else None
-        return State(self.count, self.x, self.v, laws, moment)
+        places = self.by_id(lambda block: block.x[self.now])
+        return State(self.count, places, self.v, laws, moment, self._deformation())
+
+    def _deformation(self) -> np.ndarray | None:
+        """F of all points, where a block has an array for it; others are left undeformed."""
+        blocks = self.setup.blocks
+        if all(block.points.deformation is None for block in blocks):
+            return None
+        kin = self.setup.kin
+        out = np.tile(np.array(identity(kin, 1.0)), (self.count, 1))
+        for block in blocks:
+            if block.points.deformation is not None:
+                out[block.id] = block.points.deformation
+        return out
 
     def set_stress(self, ids: np.ndarray, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress (by name, "11" ...) of the points `ids`."""
@@ -193,7 +211,8 @@ class Simulation:
             if with_stress.defined(type(block.laws)):
                 rows = stress[block.id]
                 part = chosen[block.id]
-                impose_stress(s.kin, s.basis.h, block.points, block.laws, part, flags, rows)
+                like = s.nodes.sums[0, 0]
+                impose_stress(s.kin, like, block.points, block.laws, part, flags, rows)
         self.version += 1
 
     # --- stepping -----------------------------------------------------------------------------
@@ -335,7 +354,11 @@ class Simulation:
         for block in s.blocks:
             points = [field for field in block.points if field is not None]
             tiling = block.tiling
-            arrays += [block.x, *points, block.id, tiling.colour, tiling.range[: tiling.colour[-1]]]
+            used = tiling.colour[-1]
+            arrays += [block.x, *points, block.id, block.grid, tiling.colour]
+            arrays += [tiling.range[:used], tiling.grid[:used]]
+            if block.home is not None:
+                arrays.append(block.home)
         return [(array, array.copy()) for array in arrays]
 
     def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:

@@ -94,26 +94,91 @@ def _record(table, i):
     return define("table, i", f"return make({columns})", make=table.instance_class)
 
 
-def moment_at(array, i, like):
-    """Row `i` of an array that may be absent (None) because the transfer keeps no moment."""
+def optional_row(array, i, like):
+    """Row `i` of an array that may be absent (None): then, and for an empty `like`, empty."""
     return () if array is None else row(array, i, 0, like)
 
 
-@overload(moment_at)
-def _moment_at(array, i, like):
+@overload(optional_row)
+def _optional_row(array, i, like):
     if isinstance(array, types.NoneType):
         return lambda array, i, like: ()
     return lambda array, i, like: row(array, i, 0, like)
 
 
-def put_moment(array, i, values):
+def put_optional(array, i, values):
     """Store into row `i` of an array that may be absent (None)."""
     if array is not None:
         put_at(array, i, 0, values)
 
 
-@overload(put_moment)
-def _put_moment(array, i, values):
+@overload(put_optional)
+def _put_optional(array, i, values):
     if isinstance(array, types.NoneType):
         return lambda array, i, values: None
     return lambda array, i, values: put_at(array, i, 0, values)
+
+
+def add_optional(a, factor, b):
+    """a + factor * b, where an empty `b` counts as zero."""
+    return add_scaled(a, factor, b) if len(b) else a
+
+
+@overload(add_optional)
+def _add_optional(a, factor, b):
+    if len(b) == 0:
+        return lambda a, factor, b: a
+    return lambda a, factor, b: add_scaled(a, factor, b)
+
+
+def add_to_optional(array, i, factor, values):
+    """Add factor * values to row `i` of an array that may be absent (None).
+
+    Values beyond the length of the row are left out.
+    """
+    if array is not None:
+        for k in range(array.shape[1]):
+            array[i, k] += factor * values[k]
+
+
+@overload(add_to_optional)
+def _add_to_optional(array, i, factor, values):
+    if isinstance(array, types.NoneType):
+        return lambda array, i, factor, values: None
+
+    def add(array, i, factor, values):
+        for k in range(array.shape[1]):
+            array[i, k] = fma(factor, values[k], array[i, k])
+
+    return add
+
+
+def put_from(array, i, first, values):
+    """array[i, k] = values[k] for k >= first."""
+    for k in range(first, len(values)):
+        array[i, k] = values[k]
+
+
+@overload(put_from)
+def _put_from(array, i, first, values):
+    def put(array, i, first, values):
+        for k in range(first, len(values)):
+            array[i, k] = values[k]
+
+    return put
+
+
+def add_row(a, first, b):
+    """`a` with b[k] added to a[first + k]."""
+    return tuple(x + (b[k - first] if first <= k < first + len(b) else 0) for k, x in enumerate(a))
+
+
+@overload(add_row)
+def _add_row(a, first, b):
+    items = []
+    for k in range(len(a)):
+        term = f"a[{k}]"
+        for j in range(min(len(b), k + 1)):
+            term = f"(a[{k}] + b[{j}] if first == {k - j} else {term})"
+        items.append(term)
+    return define("a, first, b", f"return ({''.join(item + ', ' for item in items)})")

@@ -20,7 +20,9 @@ class Update:
     method
         The method style, or None as long as there is none.
     transfer
-        The transfer's NamedTuple (PIC, FLIP, APIC).
+        The transfer's NamedTuple (PIC, FLIP, APIC ...).
+    anti_locking
+        Whether changes of volume are averaged against volumetric locking.
     scheme
         The scheme's tag.
     fixed_dt
@@ -34,6 +36,7 @@ class Update:
         self.method: Any = None
         self.transfer: NamedTuple | None = None
         self.scheme: NamedTuple = MUSL()
+        self.anti_locking = False
         self.fixed_dt: float | None = None
         self.dt_factor = DEFAULT_DT_FACTOR
 
@@ -54,4 +57,5 @@ class Update:
 
     def transfer_tag(self, real: type) -> NamedTuple:
         """The transfer with its numbers in the precision of the run."""
-        return type(self.transfer)(*(real(value) for value in self.transfer))
+        numbers = (real(x) if isinstance(x, float) else x for x in self.transfer)
+        return type(self.transfer)(*numbers)

@@ -60,8 +60,7 @@ class NodesView(_View):
 
     def __init__(self, s: Any, group: Any, stage: int, before_update: bool):
         self._nodes = s.nodes
-        self._basis = s.basis
-        self._shape = s.shape
+        self._grids = s.grids
         self._stage = stage
         self._before_update = before_update
         self._d = s.nodes.velocity.shape[1]
@@ -77,13 +76,13 @@ class NodesView(_View):
     @property
     def position(self) -> np.ndarray:
         """(n, 3) positions of the nodes."""
-        places = np.stack(np.unravel_index(self.index, self._shape), axis=1)
-        used = np.arange(3) < self._d
-        return np.where(
-            used,
-            np.array([self._basis.x0, self._basis.y0, self._basis.z0]) + places * self._basis.h,
-            0.0,
-        )
+        grids = self._grids
+        g = np.searchsorted(grids.first, self.index, side="right") - 1
+        local = self.index - grids.first[g]
+        step_x, step_y = grids.step_x[g], grids.step_y[g]
+        places = np.stack([local // step_x, local % step_x // step_y, local % step_y], axis=1)
+        corners = np.stack([grids.x0[g], grids.y0[g], grids.z0[g]], axis=1)
+        return corners + places * grids.spacing[g][:, None]
 
     @property
     def mass(self) -> np.ndarray:
@@ -164,7 +163,7 @@ class PointsView(_View):
 
     def _place(self, block: Any) -> np.ndarray:
         now = self._simulation.now
-        return block.x[1 - now if self._then else now]
+        return block.x[1 - now if self._then else now][:, : self._simulation.setup.kin.dimension]
 
     @property
     def position(self) -> np.ndarray:

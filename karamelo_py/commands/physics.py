@@ -1,4 +1,4 @@
-"""Commands about the physics: method, scheme, material, fix, compute."""
+"""Commands about the physics: scheme, precision, material, fix, compute."""
 
 from __future__ import annotations
 
@@ -12,85 +12,6 @@ if TYPE_CHECKING:
     from karamelo_py.hub import Catalogue, Hub
     from karamelo_py.modify import Fix
 
-OPTIONS = ("mechanical", "thermo-mechanical", "gradient-enhanced")
-NOT_YET = {
-    "thermo-mechanical": "temperature is not there yet",
-    "gradient-enhanced": "the gradient-enhanced projection is not there yet",
-}
-
-
-def method(hub: Hub, kind: str, transfer: str, basis: str, *options: Argument) -> None:
-    """Choose the method, the transfer of velocity, and the basis functions.
-
-    Parameters
-    ----------
-    kind
-        Method style: ``ulmpm``.
-    transfer
-        ``PIC``, ``FLIP`` or ``APIC``.
-    basis
-        ``linear``.
-    options
-        For FLIP the share of FLIP, from 0 (PIC) to 1 (pure FLIP); then ``mechanical`` if you like.
-
-    Example
-    -------
-    method(ulmpm, FLIP, linear, 0.99)
-    method(ulmpm, APIC, linear)
-
-    Notes
-    -----
-    Comes before the first solid.
-
-    See Also
-    --------
-    scheme, solid
-    """
-    method_class = registry.find("method", kind)
-    transfer_class = registry.find("transfer", transfer)
-    basis_class = registry.find("basis", basis)
-    words = list(options)
-    parameters = []
-    for name in transfer_class._fields:
-        if not words or words[0].word() in OPTIONS:
-            raise ScriptError(
-                f"{transfer} needs a number {name} after the basis",
-                expected=f"method({kind}, {transfer}, {basis}, {name}) with {name} from 0 to 1",
-            )
-        parameters.append(_share(hub, name, words.pop(0)))
-    for argument in words:
-        word = argument.word() or argument.text
-        if word in NOT_YET:
-            raise ScriptError(NOT_YET[word], place=argument.place)
-        if word not in OPTIONS:
-            close = nearest(word, OPTIONS)
-            raise ScriptError(
-                f"'{argument.text}' is not an option of method({kind}, {transfer}, {basis})",
-                place=argument.place,
-                expected="nothing more, or the word mechanical",
-                hint=f"did you mean '{close}'?" if close else None,
-            )
-    if hub.solids:
-        raise ScriptError(
-            "the method cannot change once there are solids",
-            expected="method(...) before the first solid",
-            hint=f"move it above line {next(iter(hub.solids.values())).place.line}",
-        )
-    hub.update.method = method_class(hub, basis_class)
-    hub.update.transfer = transfer_class(*parameters)
-
-
-def _share(hub: Hub, name: str, argument: Argument) -> float:
-    """A number from 0 to 1."""
-    value = argument.value(hub)
-    if not isinstance(value, (int, float)) or value < 0 or value > 1:
-        raise ScriptError(
-            f"{name} is {value if isinstance(value, (int, float)) else argument.text}",
-            place=argument.place,
-            expected="a number from 0 (PIC) to 1 (pure FLIP)",
-        )
-    return float(value)
-
 
 def scheme(hub: Hub, style: str) -> None:
     """Choose when in a step the stress is updated.
@@ -98,7 +19,7 @@ def scheme(hub: Hub, style: str) -> None:
     Parameters
     ----------
     style
-        ``musl`` (the default), ``usl`` or ``usf``.
+        ``musl`` (the default), ``usl``, ``usf`` or ``usavg``.
 
     Example
     -------

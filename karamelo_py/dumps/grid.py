@@ -66,7 +66,7 @@ class Grid(LammpsDump):
         if self.occupied:
             self._rows = np.flatnonzero(self.hub.fields.node("mass") > 0)
             ids = ids[self._rows]
-        return ids, np.ones_like(ids)
+        return ids, self.field("type")
 
     def field(self, name: str) -> np.ndarray:
         """Values of a node field, of the nodes that are written."""

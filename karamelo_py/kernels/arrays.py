@@ -11,11 +11,14 @@ import numpy as np
 
 
 class Nodes(NamedTuple):
-    """Fields of the shared grid, dense in node number; untouched pages cost no memory."""
+    """Fields of the nodes of all grids, dense in node number; untouched pages cost no memory."""
 
     sums: np.ndarray  # (N, 1 + 2 d): mass, momentum, force, as the points give them
     update: np.ndarray  # (N, 2 d): v* after the momentum update, and v* - v
     velocity: np.ndarray  # (N, d): the velocity whose gradient deforms the points
+    normal: np.ndarray | None  # (N, d): sum of m grad N, for contact between solids
+    growth: np.ndarray | None  # (N, 2): volume after and before an increment, for F-bar
+    series: np.ndarray | None  # (N, 2 d): term of the series of XPIC, sum for the next
 
 
 class Points(NamedTuple):
@@ -24,8 +27,12 @@ class Points(NamedTuple):
     v: np.ndarray  # (n, d) velocity
     mass: np.ndarray  # (n,)
     state: np.ndarray  # (n, s) state of the law
-    moment: np.ndarray | None  # (n, d d) moment of velocity of affine transfers
+    moment: np.ndarray | None  # (n, t) what the transfer keeps
     material: np.ndarray  # (n,) int32, row in the table of laws
+    deformation: np.ndarray | None  # (n, t) F, where the frame needs it and the law has none
+    force: np.ndarray | None  # (n, d) force that fixes put on the point
+    growth: np.ndarray | None  # (n,) ratio of volumes of the trial increment, for F-bar
+    echo: np.ndarray | None  # (n, d) term of the series of XPIC
 
 
 class Tiling(NamedTuple):
@@ -33,17 +40,32 @@ class Tiling(NamedTuple):
 
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
     colour: np.ndarray  # (c + 1,) int64: occupied tiles of colour c are colour[c]:colour[c + 1]
+    grid: np.ndarray  # (T + 1,) int64: the grid that the k-th occupied tile belongs to
     report: np.ndarray  # (T + 1, 3): largest move, largest rate, offending point + 1 of each tile
 
 
-class Block(NamedTuple):
-    """Points of one law, its parameters per material, and where each tile's points lie."""
+class Places(NamedTuple):
+    """Where the points of a block are during a sweep: arrays (n, w) of places."""
 
-    x: np.ndarray  # (2, n, d): positions now and after the move; Control.whole[NOW] says which
+    where: np.ndarray  # that the weights of the gather belong to
+    x: np.ndarray  # before
+    y: np.ndarray  # after
+
+
+class Block(NamedTuple):
+    """Points of one law, its parameters per material, and where each tile's points lie.
+
+    A place is a position (d numbers), followed by what the basis keeps of the shape of a point's
+    domain where weights follow the motion.
+    """
+
+    x: np.ndarray  # (2, n, w): places now and after the move; Control.whole[NOW] says which
+    home: np.ndarray | None  # (n, w) reference places, where weights belong to them (total frame)
     points: Points
     laws: NamedTuple  # the law's NamedTuple with an array (m,) for each parameter
     tiling: Tiling
     id: np.ndarray  # (n,) int64, 0-based number of each point in the scene
+    grid: np.ndarray  # (n,) int32, the grid of each point
 
 
 class NoHooks(NamedTuple):
@@ -84,7 +106,7 @@ class Control(NamedTuple):
     """What the compiled loop reads and writes beside the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
-    real: np.ndarray  # (10,) float64, see the names below
+    real: np.ndarray  # (11,) float64, see the names below
     whole: np.ndarray  # (4,) int64, see the names below
 
 
@@ -92,6 +114,7 @@ TIME, TIMESTEP, DT = 0, 1, 2
 # Control.real
 FIXED_DT, DT_FACTOR, END_TIME, RATE, NEW_RATE, MOVE, DRIFT, DRIFT_LIMIT, SPACING = range(9)
 POINT_MASS = 9  # mass of the heaviest point
+NEW_MOVE = 10
 # Control.whole
 NOW, WRONG, OVER_LIMIT, WATCH_LIMIT = range(4)
 
@@ -99,11 +122,14 @@ NOW, WRONG, OVER_LIMIT, WATCH_LIMIT = range(4)
 class Setup(NamedTuple):
     """Everything a step needs; its type decides what is compiled."""
 
+    frame: NamedTuple  # whether weights belong to present or reference positions
     kin: NamedTuple  # kinematics tag
     basis: NamedTuple
     transfer: NamedTuple
+    averaging: NamedTuple  # whether changes of volume are averaged (F-bar)
+    contact: NamedTuple  # how solids with fields of their own touch
+    grids: NamedTuple  # points.grid.Grid with an array (g,) for each number
     nodes: Nodes
     blocks: tuple  # of Block, one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
-    shape: tuple  # (3,) nodes per direction
     control: Control

@@ -117,28 +117,30 @@ def _evaluate(hooks, h, component, count, control, result, shift):
 
 
 @kernel
-def _locate_nodes(kin, basis, shape, hooks, count):
+def _locate_nodes(kin, grids, hooks, count):
     """Positions of the chosen nodes."""
     where = hooks.scratch
-    ny = shape[1]
-    nz = shape[2]
     for q in range(count):
         n = hooks.chosen[q]
-        i = n // (ny * nz)
-        j = (n // nz) % ny
-        k = n % nz
-        where[0, q] = basis.x0 + i * basis.h
-        where[1, q] = basis.y0 + j * basis.h if dimension(kin) > 1 else 0.0
-        where[2, q] = basis.z0 + k * basis.h if dimension(kin) > 2 else 0.0
+        g = 0
+        while g + 1 < grids.first.size and n >= grids.first[g + 1]:
+            g += 1
+        local = n - grids.first[g]
+        step_x = grids.step_x[g]
+        step_y = grids.step_y[g]
+        spacing = grids.spacing[g]
+        where[0, q] = grids.x0[g] + (local // step_x) * spacing
+        where[1, q] = grids.y0[g] + (local % step_x // step_y) * spacing
+        where[2, q] = grids.z0[g] + (local % step_y) * spacing
         for axis in range(3):
             where[3 + axis, q] = where[axis, q]
 
 
 @kernel
-def _apply_at_nodes(target, kin, basis, nodes, shape, hooks, control, dt, h, count, share):
+def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, h, count, share):
     """Act on the chosen nodes; add to the published totals."""
     step_back = min(dt, control.values[TIME])  # nothing was before time 0
-    _locate_nodes(kin, basis, shape, hooks, count)
+    _locate_nodes(kin, grids, hooks, count)
     d = dimension(kin)
     for c in range(d):
         if hooks.table[h, CODE + 4 * c] < 0:
@@ -184,7 +186,7 @@ def _apply_at_nodes(target, kin, basis, nodes, shape, hooks, control, dt, h, cou
 
 
 @kernel
-def node_hooks(stage, target, kin, basis, nodes, shape, spans, hooks, control, dt):
+def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt):
     """Call the node functions of `stage` on the members that have mass."""
     dt = float(dt)
     for h in range(len(hooks.table)):
@@ -218,15 +220,13 @@ def node_hooks(stage, target, kin, basis, nodes, shape, spans, hooks, control, d
                     count += 1
                     if count == BLOCK:
                         _apply_at_nodes(
-                            target, kin, basis, nodes, shape, hooks, control, dt, h, count, share
+                            target, kin, grids, nodes, hooks, control, dt, h, count, share
                         )
                         count = np.int64(0)
             if counting:
                 share = 1.0 / max(heavy, 1)
             elif count > 0:
-                _apply_at_nodes(
-                    target, kin, basis, nodes, shape, hooks, control, dt, h, count, share
-                )
+                _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, h, count, share)
 
 
 @kernel

@@ -1,27 +1,35 @@
-"""Sorting the points by tile."""
+"""Sorting the points by tile, and how far their domains reach."""
 
 from __future__ import annotations
 
 from karamelo_py.compile import kernel
-from karamelo_py.points.basis.product import in_cells, pick
+from karamelo_py.kernels.stages import place_at
+from karamelo_py.points.basis import extent
+from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
+from karamelo_py.tensors import record
 
 
 @kernel
-def order_points(kin, basis, size, shape, x, start, tile, order):
-    """Stable counting sort of positions `x` (n, d) by tile.
+def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
+    """Stable counting sort of places `x` (n, w) by tile.
 
-    `tile` (n,) takes the tile of each point, `order` (n,) the points by tile, and ``start[t]``
-    ends as the end of tile t, which is the start of tile t + 1.
+    Tiles have `size` cells a direction; grid g has ``tiles[g]`` of them (g, 3), numbered from
+    ``first[g]``. `of` (n,) is the grid of each point. `tile` (n,) takes the tile of each point,
+    `order` (n,) the points by tile, and ``start[t]`` ends as the end of tile t, which is the start
+    of tile t + 1.
     """
     start[:] = 0
     for p in range(len(x)):
+        g = of[p]
+        grid = record(grids, g)
         number = 0
         for k in range(dimension(kin)):
-            last = pick(k, basis.nx, basis.ny, basis.nz) - 1
+            last = cells_along(grid, k) - 1
             # Clamped, since a hook may have put a point anywhere: the next sweep finds it.
-            cell = min(max(int(in_cells(basis, k, x[p, k])), 0), last)
-            number = number * shape[k] + cell // size
+            cell = min(max(int(in_cells(grid, k, x[p, k])), 0), last)
+            number = number * tiles[g, k] + cell // size
+        number += first[g]
         tile[p] = number
         start[number + 1] += 1
     for t in range(start.size - 1):
@@ -30,3 +38,12 @@ def order_points(kin, basis, size, shape, x, start, tile, order):
         t = tile[p]
         order[start[t]] = p
         start[t] += 1
+
+
+@kernel
+def widest(kin, basis, grids, x, of):
+    """How far from its point a corner of a domain is at most, in cells."""
+    far = 0.0
+    for p in range(len(x)):
+        far = max(far, extent(basis, kin, record(grids, of[p]), place_at(basis, kin, x, p)))
+    return far

@@ -19,6 +19,7 @@ from karamelo_py.kernels.arrays import (
     END_TIME,
     FIXED_DT,
     MOVE,
+    NEW_MOVE,
     NEW_RATE,
     NOW,
     OVER_LIMIT,
@@ -35,6 +36,7 @@ from karamelo_py.kernels.arrays import (
     WRONG,
     Hooks,
     NoHooks,
+    Places,
 )
 from karamelo_py.kernels.hooks import (
     ON_SUMS,
@@ -43,11 +45,33 @@ from karamelo_py.kernels.hooks import (
     node_hooks,
     point_hooks,
 )
-from karamelo_py.kernels.stages import ClearSums, Nothing, Update, Velocity
+from karamelo_py.kernels.stages import (
+    AveragedGradient,
+    AveragedSecondGradient,
+    AveragedVelocityAndGradient,
+    AverageGrowth,
+    ClearGrowth,
+    ClearSums,
+    Echo,
+    ExtendSeries,
+    Gradient,
+    Growth,
+    Nothing,
+    SecondGradient,
+    Series,
+    StartSeries,
+    Trial,
+    Update,
+    Velocity,
+    VelocityAndGradient,
+    deformation_of,
+)
 from karamelo_py.kernels.sweep import sweep_nodes, sweep_tiles
-from karamelo_py.points.basis import inside
+from karamelo_py.points.frames import Total, Updated, follows, thinning
+from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import dimension, largest_component, vector_at
 from karamelo_py.points.materials import initial_state, wave_speed_squared
+from karamelo_py.points.transfers.xpic import XPIC
 from karamelo_py.tensors import record, row, subtract
 
 
@@ -67,22 +91,29 @@ def step(scheme, visits, mode, s, hooks, more):
 # --- parts ------------------------------------------------------------------------------------
 
 
+@point_function()
+def places_of(frame, block, now, then):
+    """Where the weights of a sweep belong, and where the points are before and after it."""
+
+
+@places_of.on(Updated)
+def _(frame, block, now, then):
+    return Places(block.x[now], block.x[now], block.x[then])
+
+
+@places_of.on(Total)
+def _(frame, block, now, then):
+    return Places(block.home, block.x[now], block.x[then])
+
+
 def _sweep(block, s, mode, gather, scatter, dt):
     now = s.control.whole[NOW]
-    x = block.x[now]
-    y = block.x[1 - now]
-    points, laws, tiling = block.points, block.laws, block.tiling
-    sweep_tiles(
-        mode, gather, scatter, s.kin, s.basis, s.transfer, s.nodes, points, laws, tiling, x, y, dt
-    )
+    sweep_tiles(mode, gather, scatter, s, block, places_of(s.frame, block, now, 1 - now), dt)
 
 
 def _sweep_here(block, s, mode, gather, scatter, dt):
-    x = block.x[s.control.whole[NOW]]
-    points, laws, tiling = block.points, block.laws, block.tiling
-    sweep_tiles(
-        mode, gather, scatter, s.kin, s.basis, s.transfer, s.nodes, points, laws, tiling, x, x, dt
-    )
+    now = s.control.whole[NOW]
+    sweep_tiles(mode, gather, scatter, s, block, places_of(s.frame, block, now, now), dt)
 
 
 _sweep_blocks = over_blocks(_sweep)
@@ -92,11 +123,13 @@ _sweep_blocks_here = over_blocks(_sweep_here)
 @kernel
 def _read_reports(tiling, control):
     rate = 0.0
+    moved = 0.0
     for t in range(tiling.colour[-1]):
-        control.real[MOVE] = max(control.real[MOVE], tiling.report[t, 0])
+        moved = max(moved, tiling.report[t, 0])
         rate = max(rate, tiling.report[t, 1])
         if tiling.report[t, 2] > 0:
             control.whole[WRONG] = 1
+    control.real[NEW_MOVE] = max(control.real[NEW_MOVE], moved)
     control.real[NEW_RATE] = max(control.real[NEW_RATE], rate)
 
 
@@ -111,7 +144,10 @@ _survey_blocks = over_blocks(_survey)
 def _survey_all(s):
     """Gather what the tiles reported; whether all points went well."""
     s.control.real[NEW_RATE] = 0.0
+    s.control.real[NEW_MOVE] = 0.0
     _survey_blocks(s)
+    # Points move in one sweep of a step, and their domains may grow in another.
+    s.control.real[MOVE] += s.control.real[NEW_MOVE]
     if s.control.real[NEW_RATE] > 0:
         s.control.real[RATE] = s.control.real[NEW_RATE]
     return s.control.whole[WRONG] == 0
@@ -132,20 +168,21 @@ def sweep_here(s, mode, gather, scatter, dt):
 
 
 @kernel
-def _look_at_moves(kin, basis, x, tiling, control):
+def _look_at_moves(frame, kin, grids, x, of, tiling, control):
     now = control.whole[NOW]
     for p in range(x.shape[1]):
+        grid = record(grids, of[p])
         y = vector_at(kin, x[1 - now], p)
         step = largest_component(kin, subtract(y, vector_at(kin, x[now], p)))
-        cells = step * basis.inv_h
+        cells = step * grid.inv_h
         control.real[MOVE] = max(control.real[MOVE], cells)
-        if not (cells <= 1 and inside(basis, kin, y)):
+        if not (cells <= 1 and (inside(grid, kin, y) or not follows(frame))):
             control.whole[WRONG] = 1
             tiling.report[0, 2] = p + 1
 
 
 def _check_moves(block, s):
-    _look_at_moves(s.kin, s.basis, block.x, block.tiling, s.control)
+    _look_at_moves(s.frame, s.kin, s.grids, block.x, block.grid, block.tiling, s.control)
 
 
 _check_moves_of_blocks = over_blocks(_check_moves)
@@ -161,7 +198,7 @@ def check_moves(s):
 @shared
 def step_size(s):
     """dt of the present step, in the precision of the run."""
-    return real(s.control.values[DT], s.basis.h)
+    return real(s.control.values[DT], s.nodes.sums[0, 0])
 
 
 @kernel
@@ -210,7 +247,7 @@ def _(hooks, stage, target, s):
 @at_nodes.on(Hooks)
 def _(hooks, stage, target, s):
     dt = step_size(s)
-    node_hooks(stage, target, s.kin, s.basis, s.nodes, s.shape, s.spans, hooks, s.control, dt)
+    node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, dt)
 
 
 def _point_hooks(block, s, hooks, stage, now, then):
@@ -245,7 +282,7 @@ def light_node(s):
     """Nodal mass below which USL limits the gradient: d (c dt / h)^2 point masses."""
     courant = s.control.real[RATE] * s.control.values[DT] / s.control.real[SPACING]
     masses = dimension(s.kin) * courant * courant
-    return real(masses * s.control.real[POINT_MASS], s.basis.h)
+    return real(masses * s.control.real[POINT_MASS], s.nodes.sums[0, 0])
 
 
 # --- stages that schemes share ----------------------------------------------------------------
@@ -265,6 +302,93 @@ def update_nodes(s, mode, hooks):
     at_nodes(hooks, POST_PARTICLES_TO_GRID, ON_SUMS, s)
     sweep_nodes(mode, Update(), s.kin, s.nodes, s.spans, step_size(s))
     at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_UPDATE, s)
+    touch(s.contact, s)
+    sum_series(s.transfer, s, mode)
+
+
+@point_function()
+def touch(contact, s):
+    """Let solids with velocity fields of their own act on each other; by default there are none."""
+
+
+@touch.otherwise
+def _(contact, s):
+    return None
+
+
+@point_function()
+def sum_series(transfer, s, mode):
+    """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
+
+
+@sum_series.otherwise
+def _(transfer, s, mode):
+    return None
+
+
+@sum_series.on(XPIC)
+def _(transfer, s, mode):
+    # (I - (I - S S+)^m) v_p = S sum_k (-1)^(k+1) C(m, k) (S+ S)^(k-1) v, the sum from 1 to m
+    dt = step_size(s)
+    order = transfer.order
+    factor = float(order)
+    sweep_nodes(mode, StartSeries(real(factor - 1, dt)), s.kin, s.nodes, s.spans, dt)
+    for k in range(2, order + 1):
+        _sweep_blocks_here(s, mode, Series(), Echo(), dt)
+        factor *= -float(order - k + 1) / k
+        sweep_nodes(mode, ExtendSeries(real(factor, dt)), s.kin, s.nodes, s.spans, dt)
+
+
+class PointByPoint(NamedTuple):
+    """Every point has its own change of volume."""
+
+
+class FBar(NamedTuple):
+    """Changes of volume are averaged over the surroundings, against volumetric locking."""
+
+
+@point_function()
+def averaged(gather):
+    """The gather that takes the averaged change of volume."""
+
+
+@averaged.on(Gradient)
+def _(gather):
+    return AveragedGradient()
+
+
+@averaged.on(SecondGradient)
+def _(gather):
+    return AveragedSecondGradient()
+
+
+@averaged.on(VelocityAndGradient)
+def _(gather):
+    return AveragedVelocityAndGradient()
+
+
+@point_function()
+def strain_by(averaging, s, mode, gather, scatter, dt):
+    """Strain the points; whether all went well."""
+
+
+@strain_by.on(PointByPoint)
+def _(averaging, s, mode, gather, scatter, dt):
+    return sweep(s, mode, gather, scatter, dt)
+
+
+@strain_by.on(FBar)
+def _(averaging, s, mode, gather, scatter, dt):
+    sweep_nodes(mode, ClearGrowth(), s.kin, s.nodes, s.spans, dt)
+    _sweep_blocks_here(s, mode, Trial(), Growth(), dt)
+    sweep_nodes(mode, AverageGrowth(), s.kin, s.nodes, s.spans, dt)
+    return sweep(s, mode, averaged(gather), scatter, dt)
+
+
+@shared
+def strain(s, mode, gather, scatter, dt):
+    """Gather and settle, the gradient among it; whether all went well."""
+    return strain_by(s.averaging, s, mode, gather, scatter, dt)
 
 
 @shared
@@ -321,18 +445,20 @@ advance = kernel(run_steps)
 
 
 @kernel
-def _fastest(kin, basis, points, laws, control):
+def _fastest(frame, kin, points, laws, control):
     rate = 0.0
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
-        state = row(points.state, p, 0, initial_state(law, kin, basis.h))
-        speed = sqrt(wave_speed_squared(law, kin, state))
+        mass = points.mass[p]
+        state = row(points.state, p, 0, initial_state(law, kin, mass))
+        f = deformation_of(frame, kin, law, state, points, p)
+        speed = sqrt(wave_speed_squared(law, kin, state) * thinning(frame, kin, f, mass))
         rate = max(rate, speed + largest_component(kin, vector_at(kin, points.v, p)))
     control.real[RATE] = max(control.real[RATE], rate)
 
 
 def _measure(block, s):
-    _fastest(s.kin, s.basis, block.points, block.laws, s.control)
+    _fastest(s.frame, s.kin, block.points, block.laws, s.control)
 
 
 measure_blocks = over_blocks(_measure)

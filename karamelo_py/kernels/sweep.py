@@ -13,16 +13,19 @@ from numba import prange
 
 from karamelo_py.compile import index, kernel, point_function
 from karamelo_py.kernels.stages import (
+    Work,
     at_node,
     empty,
     gathered,
     load,
+    place_at,
     restencil,
     scattered,
     settled,
 )
 from karamelo_py.points.basis import locate, support
 from karamelo_py.points.kinematics import vector_at
+from karamelo_py.tensors import record
 
 
 class Serial(NamedTuple):
@@ -35,64 +38,78 @@ class Threaded(NamedTuple):
 
 @kernel
 def sweep_tile(
-    gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x_all, y_all, dt, t
+    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling, places, dt, t
 ):
     """Visit the points of the t-th occupied tile of a block."""
+    grid = record(grids, tiling.grid[t])
+    w = Work(frame, kin, basis, grid, transfer, nodes, points, laws, places)
     furthest = dt - dt
     fastest = dt - dt
     wrong = 0
     for q in range(tiling.range[t, 0], tiling.range[t, 1]):
         p = index(q)
-        x = vector_at(kin, x_all, p)
-        stencil = locate(basis, kin, x)
-        total = empty(gather, transfer, kin, x)
+        x = vector_at(kin, places.x, p)
+        stencil = locate(basis, kin, grid, place_at(basis, kin, places.where, p))
+        total = empty(gather, w, x)
         for k in range(support(basis, kin)):
-            total = gathered(gather, transfer, kin, basis, stencil, k, nodes, total)
-        moved, rate = settled(
-            gather, transfer, kin, basis, points, laws, x, y_all, p, dt, total, fastest
-        )
+            total = gathered(gather, w, stencil, k, total)
+        moved, rate = settled(gather, w, stencil, p, dt, total, fastest)
         if not (moved <= 1 and rate < 1e300):  # so written, NaN counts as wrong too
             wrong = q + 1
             continue
         furthest = max(furthest, moved)
         fastest = rate
-        stencil = restencil(scatter, kin, basis, stencil, vector_at(kin, y_all, p))
-        burden = load(scatter, transfer, kin, basis, points, laws, p, dt)
+        stencil = restencil(scatter, w, stencil, p)
+        burden = load(scatter, w, p, dt)
         for k in range(support(basis, kin)):
-            scattered(scatter, transfer, kin, basis, stencil, k, nodes, burden)
+            scattered(scatter, w, stencil, k, burden)
     tiling.report[t, 0] = furthest
     tiling.report[t, 1] = fastest
     tiling.report[t, 2] = wrong
 
 
 @kernel
-def _tiles_serial(gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt):
+def _tiles_serial(
+    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling, places, dt
+):
     for t in range(tiling.colour[-1]):
-        sweep_tile(gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt, t)
+        sweep_tile(
+            gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling,
+            places, dt, t,
+        )  # fmt: skip
 
 
 @kernel(parallel=True)
-def _tiles_threaded(gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt):
+def _tiles_threaded(
+    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling, places, dt
+):
     for c in range(tiling.colour.size - 1):
         for t in prange(tiling.colour[c], tiling.colour[c + 1]):
             sweep_tile(
-                gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt, t
-            )
+                gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling,
+                places, dt, t,
+            )  # fmt: skip
 
 
 @point_function()
-def sweep_tiles(mode, gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt):
-    """Sweep over the points of one block: from the positions `x` to the positions `y`."""
+def sweep_tiles(mode, gather, scatter, s, block, places, dt):
+    """Sweep over the points of one block of the setup `s`."""
 
 
 @sweep_tiles.on(Serial)
-def _(mode, gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt):
-    _tiles_serial(gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt)
+def _(mode, gather, scatter, s, block, places, dt):
+    _tiles_serial(
+        gather, scatter, s.frame, s.kin, s.basis, s.grids, s.transfer, s.nodes, block.points,
+        block.laws, block.tiling, places, dt,
+    )  # fmt: skip
 
 
 @sweep_tiles.on(Threaded)
-def _(mode, gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt):
-    _tiles_threaded(gather, scatter, kin, basis, transfer, nodes, points, laws, tiling, x, y, dt)
+def _(mode, gather, scatter, s, block, places, dt):
+    _tiles_threaded(
+        gather, scatter, s.frame, s.kin, s.basis, s.grids, s.transfer, s.nodes, block.points,
+        block.laws, block.tiling, places, dt,
+    )  # fmt: skip
 
 
 @kernel

@@ -30,6 +30,7 @@ from karamelo_py.kernels.step import (
     move_points,
     step,
     step_size,
+    strain,
     sweep,
     sweep_here,
     update_nodes,
@@ -48,6 +49,7 @@ class MUSL(NamedTuple):
     scheme(musl)
     """
 
+    maps_velocity_again = True
     stages = (
         (
             "p2g and stress in one visit of the points",
@@ -74,9 +76,9 @@ def _(scheme, visits, mode, s, hooks, more):
     sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
     if not more:
-        return sweep(s, mode, Gradient(), Nothing(), dt)
+        return strain(s, mode, Gradient(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    return sweep(s, mode, Gradient(), Everything(), dt)
+    return strain(s, mode, Gradient(), Everything(), dt)
 
 
 @begin.on(MUSL, Staged)
@@ -97,7 +99,7 @@ def _(scheme, visits, mode, s, hooks, more):
     sweep_here(s, mode, Nothing(), Momentum(), dt)
     sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
-    if not sweep(s, mode, Gradient(), Nothing(), dt):
+    if not strain(s, mode, Gradient(), Nothing(), dt):
         return False
     at_points(hooks, FINAL_INTEGRATE, 1, s)
     return True

@@ -30,6 +30,7 @@ from karamelo_py.kernels.step import (
     move_points,
     step,
     step_size,
+    strain,
     sweep,
     update_nodes,
 )
@@ -68,7 +69,7 @@ def _stress_first(s, mode, hooks):
     dt = step_size(s)
     sweep_nodes(mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_VELOCITY, s)
-    if not sweep(s, mode, Gradient(), Force(), dt):
+    if not strain(s, mode, Gradient(), Force(), dt):
         return False
     update_nodes(s, mode, hooks)
     return True

@@ -26,7 +26,7 @@ from karamelo_py.kernels.step import (
     move_points,
     step,
     step_size,
-    sweep,
+    strain,
     update_nodes,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
@@ -62,9 +62,9 @@ def _(scheme, visits, mode, s, hooks, more):
     update_nodes(s, mode, hooks)
     sweep_nodes(mode, UpdateToVelocity(light_node(s)), s.kin, s.nodes, s.spans, dt)
     if not more:
-        return sweep(s, mode, VelocityAndGradient(), Nothing(), dt)
+        return strain(s, mode, VelocityAndGradient(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    return sweep(s, mode, VelocityAndGradient(), Everything(), dt)
+    return strain(s, mode, VelocityAndGradient(), Everything(), dt)
 
 
 @begin.on(USL, Staged)
@@ -82,7 +82,7 @@ def _(scheme, visits, mode, s, hooks, more):
     sweep_nodes(mode, UpdateToVelocity(light_node(s)), s.kin, s.nodes, s.spans, dt)
     if not move_points(s, mode, hooks):
         return False
-    if not sweep(s, mode, Gradient(), Nothing(), dt):
+    if not strain(s, mode, Gradient(), Nothing(), dt):
         return False
     at_points(hooks, FINAL_INTEGRATE, 1, s)
     return True

@@ -1,21 +1,35 @@
 """Bases: which nodes a point sees, with what weights and gradients. One file each.
 
-A basis is a NamedTuple of numbers (its class is the tag) with the point functions declared here.
+A basis is a NamedTuple of its own numbers, often empty (its class is the tag), with the point
+functions declared here. What they work on:
+
+grid
+    the :class:`~karamelo_py.points.grid.Grid` under the point;
+place
+    a flat tuple: the position of the point, then what the basis keeps of the shape of its domain
+    (nothing, half sizes, corners ...);
+stencil
+    whatever `locate` returned.
+
 A basis that is the product of one function a direction gives only `along` and calls
-:func:`karamelo_py.points.basis.product.register`.
+:func:`karamelo_py.points.basis.product.register`. Every class has these attributes:
+
+cells
+    how many nodes beyond the two of its own cell a point may see, both sides together;
+nodes_per_cell
+    1, or 2 where there are nodes between the corners of cells;
+least_nodes
+    the smallest number of nodes a direction of the grid must have;
+steady_moment
+    whether D of the affine transfers stays away from zero everywhere.
 """
 
 from karamelo_py.compile import point_function
 
 
 @point_function(tags=2)
-def locate(basis, kin, x):
-    """The stencil of a point at `x`: whatever the functions below need, computed once a point."""
-
-
-@point_function(tags=2)
-def inside(basis, kin, x):
-    """Whether a point at `x` lies on the grid, so that all nodes of its stencil exist."""
+def locate(basis, kin, grid, place):
+    """The stencil of a point: whatever the functions below need, computed once a point."""
 
 
 @point_function(tags=2)
@@ -24,20 +38,102 @@ def support(basis, kin):
 
 
 @point_function(tags=2)
-def entry(basis, kin, stencil, k):
-    """(node number, weight N, gradient dN/dx as a vector) of the k-th node of a stencil."""
+def entry(basis, kin, grid, stencil, k):
+    """(node number, weight N, gradient of N) of the k-th node of a stencil.
+
+    The gradient has the components of a vector; axisymmetric, N / r comes third. A node may come
+    more than once: its parts add up.
+    """
 
 
 @point_function(tags=2)
-def reach(basis, kin, stencil, k):
+def reach(basis, kin, grid, stencil, k):
     """X_I - x, the vector from the point to the k-th node of its stencil."""
 
 
 @point_function(tags=2)
-def affine_weight(basis, kin, stencil, k):
+def affine_weight(basis, kin, grid, stencil, k):
     """N_I D^-1 (X_I - x) of the affine transfers, with D = sum_I N_I (X_I - x)(X_I - x)^T."""
 
 
 @point_function()
-def mapped_again(basis, moment):
+def mapped_again(basis, grid, moment):
     """The part of a point's moment of velocity that MUSL maps to the nodes the second time."""
+
+
+@mapped_again.otherwise
+def _(basis, moment):
+    return moment
+
+
+# --- the shape of a point's domain ------------------------------------------------------------
+
+
+@point_function(tags=2)
+def blank(basis, kin, x):
+    """A place at position `x` with a shape of zeros."""
+
+
+@blank.otherwise
+def _(basis, kin, x):
+    return x
+
+
+@point_function()
+def deformed(basis, kin, place, dl):
+    """`place` after the increment dl = dt grad v: its shape changes, not its position."""
+
+
+@deformed.otherwise
+def _(basis, kin, place, dl):
+    return place
+
+
+@point_function()
+def extent(basis, kin, grid, place):
+    """How far from the point the corners of its domain reach, in cells; 0 where none are kept."""
+
+
+@extent.otherwise
+def _(basis, kin, grid, place):
+    return grid.h - grid.h
+
+
+@point_function()
+def carried(basis, kin):
+    """How many corners of the domain go with the velocity of the grid; constant at compile time."""
+
+
+@carried.otherwise
+def _(basis, kin):
+    return 0
+
+
+@point_function()
+def carriers(basis, kin):
+    """How many nodes carry one corner."""
+
+
+@carriers.otherwise
+def _(basis, kin):
+    return 0
+
+
+@point_function()
+def carrier(basis, kin, grid, stencil, corner, j):
+    """(node number, weight) of the j-th node that carries a corner."""
+
+
+@carrier.otherwise
+def _(basis, kin, grid, stencil, corner, j):
+    return stencil[0], grid.h
+
+
+@point_function()
+def carry(basis, kin, place, old, corner, displacement):
+    """`place` with the displacement of one corner of the domain; `old` is the place before all."""
+
+
+@carry.otherwise
+def _(basis, kin, place, old, corner, displacement):
+    return place

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from karamelo_py.compile import real
 from karamelo_py.points.basis import mapped_again
-from karamelo_py.points.basis.product import affine_along, along, in_cells, pick, register
+from karamelo_py.points.basis.product import affine_along, along, register
+from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.tensors import scale
 
 
@@ -21,36 +22,23 @@ class Linear(NamedTuple):
     method(ulmpm, FLIP, linear, 1)
     """
 
-    x0: float  # lower corner of the grid
-    y0: float
-    z0: float
-    h: float  # cell size
-    inv_h: float  # 1 / h
-    nx: int  # cells per direction
-    ny: int
-    nz: int
-    lx: float  # size of the domain in cells, not always whole
-    ly: float
-    lz: float
-    slack: float  # how far beyond the domain a point still counts as in it, in cells
-    step_x: int  # from a node's number to that of its neighbour
-    step_y: int
-
-    width = 2
+    cells = 1
+    nodes_per_cell = 1
+    least_nodes = 2
     steady_moment = False  # D of the affine transfers vanishes at the nodes
 
 
 @along.on(Linear)
-def _(basis, direction, x):
-    a = in_cells(basis, direction, x)
-    last = pick(direction, basis.nx, basis.ny, basis.nz) - 1
-    i = min(int(a), last)  # the last face belongs to the last cell
-    r = a - real(i, x)
-    return i, r, (real(1, x) - r, r), (-basis.inv_h, basis.inv_h)
+def _(basis, kin, grid, place, direction):
+    a = in_cells(grid, direction, place[direction])
+    i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
+    r = a - real(i, a)
+    one = real(1, r)
+    return i, r, (one - r, r), (-grid.inv_h, grid.inv_h), one
 
 
 @affine_along.on(Linear)
-def _(basis, line, k):
+def _(basis, grid, line, k):
     # D = r (1 - r) h^2 vanishes at the nodes, but N D^-1 (X - x) is the gradient everywhere
     # (Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-particle-in-cell
     # method", section 5.3).
@@ -58,10 +46,10 @@ def _(basis, line, k):
 
 
 @mapped_again.on(Linear)
-def _(basis, moment):
+def _(basis, grid, moment):
     # B D^-1 grows without bound where D vanishes: the velocity that deforms the points leaves it
     # out, and the points keep B, so that nothing is lost.
-    return scale(real(0, basis.h), moment)
+    return scale(grid.h - grid.h, moment)
 
 
-register(Linear)
+register(Linear, 2)

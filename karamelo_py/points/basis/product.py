@@ -1,4 +1,4 @@
-"""Bases that are a product of one function a direction: splines, hats.
+"""Bases that are a product of one function a direction: hats, splines, uniform GIMP.
 
 The one-dimensional part is the point function `along`; the stencil of a point is the number of its
 first node and, for each direction, what `along` returned.
@@ -7,78 +7,104 @@ first node and, for each direction, what `along` returned.
 from __future__ import annotations
 
 from karamelo_py.compile import index, point_function, real, shared
-from karamelo_py.points.basis import affine_weight, entry, inside, locate, reach, support
-from karamelo_py.points.kinematics import Line, PlaneStrain, Space
+from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 
 
 @point_function()
-def along(basis, direction, x):
-    """First node, distance to it in cells, and the weights and gradients of a direction's nodes."""
+def along(basis, kin, grid, place, direction):
+    """The nodes that a point sees in one direction.
+
+    Returns
+    -------
+    first : int
+        Number of the first node in this direction.
+    r : float
+        Distance of the point from that node, in cells.
+    weights, gradients : tuple
+        N and dN/dx of the nodes.
+    spread : float
+        1 / D in units of the cell size: D is the mean square of X_I - x under the weights.
+    """
 
 
 @point_function()
-def affine_along(basis, line, k):
+def affine_along(basis, grid, line, k):
     """N_I D^-1 (X_I - x) along one direction, of the k-th node in what `along` returned."""
 
 
-@shared
-def pick(direction, a, b, c):
-    """The one of three that belongs to a direction; no branch is left where that is a literal."""
-    return a if direction == 0 else (b if direction == 1 else c)
+@affine_along.otherwise
+def _(basis, grid, line, k):
+    arm = real(k, line[1]) * spacing(basis, line[1]) - line[1]
+    return line[2][k] * arm * line[4] * grid.inv_h
+
+
+@point_function()
+def spacing(basis, like):
+    """Distance of neighbouring nodes, in cells."""
+
+
+@spacing.otherwise
+def _(basis, like):
+    return real(1, like)
 
 
 @shared
-def in_cells(basis, direction, x):
-    """Distance from the lower corner of the grid, in cells."""
-    return (x - pick(direction, basis.x0, basis.y0, basis.z0)) * basis.inv_h
+def _arm(basis, grid, line, k):
+    """X_I - x along one direction."""
+    return (real(k, line[1]) * spacing(basis, line[1]) - line[1]) * grid.h
 
 
 @shared
-def _within(basis, direction, x):
-    a = in_cells(basis, direction, x)
-    end = pick(direction, basis.lx, basis.ly, basis.lz)
-    return a >= -basis.slack and a <= end + basis.slack
+def hoop(weight, gradient, inv_r):
+    """N / r at an axisymmetric point; at r = 0 its limit, dN/dr (`inv_r` is 0 there)."""
+    return weight * inv_r if inv_r > 0 else gradient
 
 
-def register(basis: type) -> None:
-    """Give `basis` (a class with ``width`` nodes a direction and `along`) every point function."""
-    width = basis.width
+@shared
+def inverse_radius(r):
+    """1 / r, or 0 on the axis."""
+    return real(1, r) / r if r > 0 else real(0, r)
 
-    @inside.on(basis, Line)
-    def _(basis, kin, x):
-        return _within(basis, 0, x[0])
 
-    @inside.on(basis, PlaneStrain)
-    def _(basis, kin, x):
-        return _within(basis, 0, x[0]) and _within(basis, 1, x[1])
-
-    @inside.on(basis, Space)
-    def _(basis, kin, x):
-        return _within(basis, 0, x[0]) and _within(basis, 1, x[1]) and _within(basis, 2, x[2])
+def register(basis: type, width: int) -> None:
+    """Give `basis` (a class with `along`, `width` nodes a direction) every point function."""
 
     @locate.on(basis, Line)
-    def _(basis, kin, x):
-        a = along(basis, 0, x[0])
-        return a[0], (a,)
+    def _(basis, kin, grid, place):
+        a = along(basis, kin, grid, place, 0)
+        return grid.first + a[0], (a,)
 
     @locate.on(basis, PlaneStrain)
-    def _(basis, kin, x):
-        a = along(basis, 0, x[0])
-        b = along(basis, 1, x[1])
-        return a[0] * basis.step_x + b[0], (a, b)
+    def _(basis, kin, grid, place):
+        a = along(basis, kin, grid, place, 0)
+        b = along(basis, kin, grid, place, 1)
+        return grid.first + a[0] * grid.step_x + b[0], (a, b)
+
+    @locate.on(basis, Axisymmetric)
+    def _(basis, kin, grid, place):
+        a = along(basis, kin, grid, place, 0)
+        b = along(basis, kin, grid, place, 1)
+        # The radius that the weights reproduce: that of the point, but for domains cut at a wall.
+        r = place[0] - place[0]
+        for k in range(width):
+            node = real(a[0] + k, r) * spacing(basis, r)
+            r += a[2][k] * (grid.x0 + node * grid.h)
+        return grid.first + a[0] * grid.step_x + b[0], (a, b), inverse_radius(r)
 
     @locate.on(basis, Space)
-    def _(basis, kin, x):
-        a = along(basis, 0, x[0])
-        b = along(basis, 1, x[1])
-        c = along(basis, 2, x[2])
-        return a[0] * basis.step_x + b[0] * basis.step_y + c[0], (a, b, c)
+    def _(basis, kin, grid, place):
+        a = along(basis, kin, grid, place, 0)
+        b = along(basis, kin, grid, place, 1)
+        c = along(basis, kin, grid, place, 2)
+        return grid.first + a[0] * grid.step_x + b[0] * grid.step_y + c[0], (a, b, c)
 
     @support.on(basis, Line)
     def _(basis, kin):
         return width
 
     @support.on(basis, PlaneStrain)
+    @support.on(basis, Axisymmetric)
     def _(basis, kin):
         return width * width
 
@@ -87,72 +113,80 @@ def register(basis: type) -> None:
         return width * width * width
 
     @entry.on(basis, Line)
-    def _(basis, kin, stencil, k):
+    def _(basis, kin, grid, stencil, k):
         a = stencil[1][0]
         return index(stencil[0] + k), a[2][k], (a[3][k],)
 
     @entry.on(basis, PlaneStrain)
-    def _(basis, kin, stencil, k):
+    def _(basis, kin, grid, stencil, k):
         a, b = stencil[1]
         i = k // width
         j = k % width
         wa, wb = a[2][i], b[2][j]
-        node = stencil[0] + i * basis.step_x + j
+        node = stencil[0] + i * grid.step_x + j
         return index(node), wa * wb, (a[3][i] * wb, wa * b[3][j])
 
+    @entry.on(basis, Axisymmetric)
+    def _(basis, kin, grid, stencil, k):
+        a, b = stencil[1]
+        i = k // width
+        j = k % width
+        wa, wb = a[2][i], b[2][j]
+        node = stencil[0] + i * grid.step_x + j
+        weight, slope = wa * wb, a[3][i] * wb
+        return index(node), weight, (slope, wa * b[3][j], hoop(weight, slope, stencil[2]))
+
     @entry.on(basis, Space)
-    def _(basis, kin, stencil, k):
+    def _(basis, kin, grid, stencil, k):
         a, b, c = stencil[1]
         i = k // (width * width)
         j = (k // width) % width
         m = k % width
         wa, wb, wc = a[2][i], b[2][j], c[2][m]
-        node = stencil[0] + i * basis.step_x + j * basis.step_y + m
+        node = stencil[0] + i * grid.step_x + j * grid.step_y + m
         wab = wa * wb
         return index(node), wab * wc, (a[3][i] * wb * wc, wa * b[3][j] * wc, wab * c[3][m])
 
     @reach.on(basis, Line)
-    def _(basis, kin, stencil, k):
-        a = stencil[1][0]
-        return ((real(k, a[1]) - a[1]) * basis.h,)
+    def _(basis, kin, grid, stencil, k):
+        return (_arm(basis, grid, stencil[1][0], k),)
 
     @reach.on(basis, PlaneStrain)
-    def _(basis, kin, stencil, k):
+    @reach.on(basis, Axisymmetric)
+    def _(basis, kin, grid, stencil, k):
         a, b = stencil[1]
-        return (
-            (real(k // width, a[1]) - a[1]) * basis.h,
-            (real(k % width, b[1]) - b[1]) * basis.h,
-        )
+        return _arm(basis, grid, a, k // width), _arm(basis, grid, b, k % width)
 
     @reach.on(basis, Space)
-    def _(basis, kin, stencil, k):
+    def _(basis, kin, grid, stencil, k):
         a, b, c = stencil[1]
         return (
-            (real(k // (width * width), a[1]) - a[1]) * basis.h,
-            (real((k // width) % width, b[1]) - b[1]) * basis.h,
-            (real(k % width, c[1]) - c[1]) * basis.h,
+            _arm(basis, grid, a, k // (width * width)),
+            _arm(basis, grid, b, (k // width) % width),
+            _arm(basis, grid, c, k % width),
         )
 
     @affine_weight.on(basis, Line)
-    def _(basis, kin, stencil, k):
-        return (affine_along(basis, stencil[1][0], k),)
+    def _(basis, kin, grid, stencil, k):
+        return (affine_along(basis, grid, stencil[1][0], k),)
 
     @affine_weight.on(basis, PlaneStrain)
-    def _(basis, kin, stencil, k):
+    @affine_weight.on(basis, Axisymmetric)
+    def _(basis, kin, grid, stencil, k):
         a, b = stencil[1]
         i = k // width
         j = k % width
-        return affine_along(basis, a, i) * b[2][j], a[2][i] * affine_along(basis, b, j)
+        return affine_along(basis, grid, a, i) * b[2][j], a[2][i] * affine_along(basis, grid, b, j)
 
     @affine_weight.on(basis, Space)
-    def _(basis, kin, stencil, k):
+    def _(basis, kin, grid, stencil, k):
         a, b, c = stencil[1]
         i = k // (width * width)
         j = (k // width) % width
         m = k % width
         wa, wb, wc = a[2][i], b[2][j], c[2][m]
         return (
-            affine_along(basis, a, i) * wb * wc,
-            wa * affine_along(basis, b, j) * wc,
-            wa * wb * affine_along(basis, c, m),
+            affine_along(basis, grid, a, i) * wb * wc,
+            wa * affine_along(basis, grid, b, j) * wc,
+            wa * wb * affine_along(basis, grid, c, m),
         )

@@ -34,6 +34,11 @@ def jacobian(law, kin, state):
 
 
 @point_function()
+def deformation(law, kin, state):
+    """F, of laws whose state holds it; left out by the others."""
+
+
+@point_function()
 def wave_speed_squared(law, kin, state):
     """Square of the speed of the fastest small disturbance, for the stable step."""
 

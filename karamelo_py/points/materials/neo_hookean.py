@@ -19,6 +19,7 @@ from karamelo_py.points.kinematics import (
 from karamelo_py.points.materials import (
     advance,
     cauchy_stress,
+    deformation,
     elastic_strain,
     energy_density,
     initial_state,
@@ -59,6 +60,11 @@ def _(law, kin, state):
 def _(law, kin, state):
     inverse = real(1, law.G) / determinant(kin, state)
     return scale(inverse, kirchhoff_stress(law, kin, state))
+
+
+@deformation.on(Hyperelastic)
+def _(law, kin, state):
+    return state
 
 
 @jacobian.on(Hyperelastic)

@@ -1,15 +1,26 @@
 """Transfers: how velocity travels from points to nodes and back. One file each.
 
-A transfer is a NamedTuple (its class is the tag). It says what a point keeps beside its velocity
-(`affine`: the moment of velocity B, a tensor) and how the velocity follows from the nodes:
+A transfer is a NamedTuple of its parameters (its class is the tag). It says what a point keeps
+beside its velocity (`keeps`: nothing, or a tensor such as the moment of velocity B) and how the
+velocity follows from the nodes:
 
 v_pic
     sum_I N_I v*_I, the updated nodal velocity at the point
 dv
     sum_I N_I (v*_I - v_I), its change during the step
+
+Every class has these attributes:
+
+keeps_moment
+    whether points keep a tensor beside their velocity;
+inverts_spread
+    whether it divides by D = sum_I N_I (X_I - x)(X_I - x)^T, which some bases let vanish.
+
+What is not defined for a class is that of FLIP and PIC: nothing is kept, v alone is mapped.
 """
 
 from karamelo_py.compile import point_function
+from karamelo_py.tensors import add_scaled
 
 
 @point_function()
@@ -18,18 +29,60 @@ def updated_velocity(transfer, v, v_pic, dv):
 
 
 @point_function()
-def add_momentum(transfer, kin, basis, stencil, k, weighted_mass, mass, v, moment, total):
-    """total + the momentum that a point gives to the k-th node of its stencil.
+def displacing_velocity(transfer, v, v_pic):
+    """The velocity that moves the point; `v` is its own after the step."""
 
-    `weighted_mass` is N_I m_p, the mass that it gives.
-    """
+
+@displacing_velocity.otherwise
+def _(transfer, v, v_pic):
+    return v_pic
+
+
+@point_function()
+def add_momentum(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
+    """total + the momentum that a point gives to the k-th node of its stencil."""
+
+
+@add_momentum.otherwise
+def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
+    return add_scaled(total, weight * mass, v)
 
 
 @point_function()
 def zero_moment(transfer, kin, like):
-    """The moment of velocity at rest, as a tuple: empty for transfers that keep none."""
+    """What a point at rest keeps, as a tuple: empty for transfers that keep nothing."""
+
+
+@zero_moment.otherwise
+def _(transfer, kin, like):
+    return ()
 
 
 @point_function()
-def add_moment(transfer, kin, basis, stencil, k, weight, velocity, moment):
-    """moment + N_I v*_I (X_I - x)^T: the part of the k-th node in the moment of velocity."""
+def add_moment(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
+    """moment + the part of the k-th node in it."""
+
+
+@add_moment.otherwise
+def _(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
+    return moment
+
+
+@point_function()
+def gradient_weight(transfer, basis, kin, grid, stencil, k, gradient):
+    """What stands for the gradient of the k-th node in strains and forces: `gradient` itself."""
+
+
+@gradient_weight.otherwise
+def _(transfer, basis, kin, grid, stencil, k, gradient):
+    return gradient
+
+
+@point_function()
+def terms(transfer):
+    """Number of terms of the series that XPIC sums on the nodes; 1 is none beyond the first."""
+
+
+@terms.otherwise
+def _(transfer):
+    return 1

@@ -4,13 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import real
-from karamelo_py.points.transfers import (
-    add_moment,
-    add_momentum,
-    updated_velocity,
-    zero_moment,
-)
+from karamelo_py.compile import real, shared
+from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.tensors import add, add_scaled, scale
 
 
@@ -33,24 +28,15 @@ class FLIP(NamedTuple):
     alpha: float = 1.0
 
     keeps_moment = False
+    inverts_spread = False
+
+
+@shared
+def blend(alpha, v, v_pic, dv):
+    """(1 - alpha) v_pic + alpha (v + dv)."""
+    return add_scaled(scale(real(1, alpha) - alpha, v_pic), alpha, add(v, dv))
 
 
 @updated_velocity.on(FLIP)
 def _(transfer, v, v_pic, dv):
-    flip = transfer.alpha
-    return add_scaled(scale(real(1, flip) - flip, v_pic), flip, add(v, dv))
-
-
-@add_momentum.on(FLIP)
-def _(transfer, kin, basis, stencil, k, weighted_mass, mass, v, moment, total):
-    return add_scaled(total, weighted_mass, v)
-
-
-@zero_moment.on(FLIP)
-def _(transfer, kin, like):
-    return ()
-
-
-@add_moment.on(FLIP)
-def _(transfer, kin, basis, stencil, k, weight, velocity, moment):
-    return moment
+    return blend(transfer.alpha, v, v_pic, dv)

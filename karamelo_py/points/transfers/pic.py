@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import (
-    add_moment,
-    add_momentum,
-    updated_velocity,
-    zero_moment,
-)
-from karamelo_py.tensors import add_scaled
+from karamelo_py.points.transfers import updated_velocity
 
 
 class PIC(NamedTuple):
@@ -25,23 +19,9 @@ class PIC(NamedTuple):
     """
 
     keeps_moment = False
+    inverts_spread = False
 
 
 @updated_velocity.on(PIC)
 def _(transfer, v, v_pic, dv):
     return v_pic
-
-
-@add_momentum.on(PIC)
-def _(transfer, kin, basis, stencil, k, weighted_mass, mass, v, moment, total):
-    return add_scaled(total, weighted_mass, v)
-
-
-@zero_moment.on(PIC)
-def _(transfer, kin, like):
-    return ()
-
-
-@add_moment.on(PIC)
-def _(transfer, kin, basis, stencil, k, weight, velocity, moment):
-    return moment

@@ -1,0 +1,182 @@
+"""Lattices: the nodes of the regular grids of a scene, and how they are numbered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.points.grid import Grid
+from karamelo_py.script.errors import ScriptError
+
+# A point this far (in cells) beyond a face still counts as lying on it.
+RELATIVE_TOLERANCE = 1e-9
+# Node numbers have to fit into 32 bits wherever a kernel packs them.
+MAX_NODES = 2**31 - 1
+# Points or nodes looked at together: large enough for NumPy, small enough for the cache and memory.
+CHUNK = 1 << 18
+
+
+class Lattice:
+    """A grid of square cells from a lower corner, over a whole box.
+
+    When a side of the box is not a multiple of `h`, it reaches over the upper corner by less than
+    one cell.
+
+    Parameters
+    ----------
+    dimension
+        1, 2 or 3.
+    lo, hi
+        Corners of the box; only the first `dimension` numbers count.
+    h
+        Cell size.
+    nodes_per_cell
+        1, or 2 with nodes in the middle of cells too.
+    least_nodes
+        Nodes per direction that there are at least; those beyond the box stay without mass.
+    first
+        Number of the first node.
+
+    Attributes
+    ----------
+    cells, shape : tuple of 3 int
+        Cells and nodes per direction, 1 in unused directions.
+
+    Raises
+    ------
+    ScriptError
+        When there would be more nodes than can be counted.
+    """
+
+    def __init__(
+        self,
+        dimension: int,
+        lo: Sequence[float],
+        hi: Sequence[float],
+        h: float,
+        nodes_per_cell: int = 1,
+        least_nodes: int = 2,
+        first: int = 0,
+    ):
+        self.dimension = dimension
+        self.lo, self.hi = np.zeros((2, 3))
+        self.lo[:dimension] = lo[:dimension]
+        self.hi[:dimension] = hi[:dimension]
+        self.h = float(h)
+        self.nodes_per_cell = nodes_per_cell
+        self.first = first
+        lengths = (self.hi - self.lo)[:dimension]
+        cells = [max(1, math.ceil(length / h - RELATIVE_TOLERANCE)) for length in lengths]
+        nodes = [max(n * nodes_per_cell + 1, least_nodes) for n in cells]
+        if first + math.prod(nodes) > MAX_NODES:
+            raise ScriptError(
+                f"cell size {h:g} gives a grid of {math.prod(nodes):.3g} nodes",
+                argument="h",
+                expected=f"at most {MAX_NODES} nodes: a larger h or a smaller domain",
+            )
+        unused = (1,) * (3 - dimension)
+        self.cells = (*cells, *unused)
+        self.shape = (*nodes, *unused)
+
+    @property
+    def spacing(self) -> float:
+        """Distance of nodes."""
+        return self.h / self.nodes_per_cell
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes."""
+        return math.prod(self.shape)
+
+    def positions(self) -> np.ndarray:
+        """Positions of all nodes, (n, 3); node (i, j, k) has the number (i ny + j) nz + k."""
+        positions = np.empty((*self.shape, 3))
+        for axis, count in enumerate(self.shape):
+            along = [1, 1, 1]
+            along[axis] = count
+            positions[..., axis] = (self.lo[axis] + np.arange(count) * self.spacing).reshape(along)
+        return positions.reshape(-1, 3)
+
+    def between(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Nodes in a box, some thousand at a time: their numbers (m,) and positions (m, dimension).
+
+        `lo` and `hi` (3,) may be infinite. Nodes come in the order of their numbers.
+        """
+        first, last = [], []
+        for axis in range(self.dimension):
+            top = self.shape[axis] - 1
+            below = (lo[axis] - self.lo[axis]) / self.spacing - 1e-6
+            above = (hi[axis] - self.lo[axis]) / self.spacing + 1e-6
+            first.append(math.ceil(min(max(below, 0), top + 1)))
+            last.append(math.floor(min(max(above, -1), top)))
+        if any(a > b for a, b in zip(first, last, strict=True)):
+            return
+        _, *trailing = self.shape[: self.dimension]
+        for index in boxes(first, last, 1):
+            number = index[:, 0].copy()
+            for axis, count in enumerate(trailing, start=1):
+                number *= count
+                number += index[:, axis]
+            yield number + self.first, self.lo[: self.dimension] + index * self.spacing
+
+    def numbers(self, real: type) -> Grid:
+        """The lattice as kernels read it, in the precision `real`."""
+        size = (self.hi - self.lo) / self.h
+        reach = float(np.abs([self.lo, self.hi]).max()) / self.h
+        _, ny, nz = self.shape
+        return Grid(
+            *(real(x) for x in self.lo),
+            h=real(self.h),
+            inv_h=real(1 / self.h),
+            spacing=real(self.spacing),
+            nx=int(self.cells[0]),
+            ny=int(self.cells[1]),
+            nz=int(self.cells[2]),
+            lx=real(size[0]),
+            ly=real(size[1]),
+            lz=real(size[2]),
+            slack=real(max(RELATIVE_TOLERANCE, 8 * np.finfo(real).eps * reach)),
+            step_x=int(ny * nz),
+            step_y=int(nz),
+            first=self.first,
+        )
+
+
+def table(lattices: Sequence[Lattice], real: type) -> Grid:
+    """All lattices as kernels read them: a Grid with an array for each number."""
+    rows = [lattice.numbers(real) for lattice in lattices]
+    return Grid(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def numbered(lattices: Sequence[Any]) -> list[Lattice]:
+    """The same lattices with node numbers that follow each other."""
+    first = 0
+    for lattice in lattices:
+        lattice.first = first
+        first += lattice.node_count
+    if first > MAX_NODES:
+        raise ScriptError(
+            f"the grids have {first:.3g} nodes together", expected=f"at most {MAX_NODES} nodes"
+        )
+    return list(lattices)
+
+
+def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
+    """Integer positions between `first` and `last` (inclusive), the last axis fastest, in chunks.
+
+    Each chunk is an int64 array (m, d) with about CHUNK / `weight` rows, so that `weight` items
+    for every position stay a bounded amount of memory however large the box is.
+    """
+    counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
+    total = math.prod(counts)
+    step = max(1, CHUNK // weight)
+    for start in range(0, total, step):
+        number = np.arange(start, min(start + step, total), dtype=np.int64)
+        index = np.empty((len(number), len(counts)), dtype=np.int64)
+        for axis in range(len(counts) - 1, -1, -1):
+            number, index[:, axis] = np.divmod(number, counts[axis])
+            index[:, axis] += first[axis]
+        yield index

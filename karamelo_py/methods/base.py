@@ -1,0 +1,112 @@
+"""What the methods share: which grids there are, what points keep, what a step is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from karamelo_py.kernels.step import FBar, PointByPoint
+from karamelo_py.lattice import Lattice, numbered
+from karamelo_py.points.basis import blank
+from karamelo_py.points.frames import Updated
+from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
+from karamelo_py.script.errors import ScriptError
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+    from karamelo_py.solid import Solid
+
+
+class NoContact(NamedTuple):
+    """Solids act on each other by sharing nodes, or not at all."""
+
+
+class Method:
+    """Base of the method styles.
+
+    Attributes
+    ----------
+    basis
+        The basis' tag.
+    frame
+        Whether weights belong to present or reference positions.
+    contact
+        How solids with velocity fields of their own touch.
+    own_grids
+        Whether every solid has a grid of its own, laid over its own box with its own cell size.
+    fields_per_solid
+        Whether every solid has a velocity field of its own on the grid of the domain.
+    """
+
+    frame: NamedTuple = Updated()
+    own_grids: ClassVar[bool] = False
+    fields_per_solid: ClassVar[bool] = False
+
+    def __init__(self, hub: Hub, basis: NamedTuple):
+        self.basis = basis
+        self.contact: NamedTuple = NoContact()
+
+    def lattices(self, hub: Hub) -> list[Lattice]:
+        """The grids of the scene, in the order of their nodes."""
+        domain = hub.domain
+        return [self._lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
+
+    def lattice_of(self, hub: Hub, solid: Solid) -> int:
+        """Which of the grids the points of a solid see."""
+        return 0
+
+    def kinematics(self, hub: Hub) -> Any:
+        """The kinematics of the scene."""
+        return Axisymmetric() if hub.domain.axisymmetric else KINEMATICS[hub.domain.dimension]()
+
+    def averaging(self, hub: Hub) -> NamedTuple:
+        """Whether changes of volume are averaged."""
+        return FBar() if hub.update.anti_locking else PointByPoint()
+
+    def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
+        """Positions and shapes of the domains of a solid's points before the first step, (n, w)."""
+        return np.concatenate([solid.x0, self.shapes(kin, solid)], axis=1).astype(real)
+
+    def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
+        """What the basis keeps of the domains of a solid's points, (n, s)."""
+        width = len(blank(self.basis, kin, (0.0,) * kin.dimension)) - kin.dimension
+        if not width:
+            return np.empty((len(solid.x0), 0))
+        return type(self.basis).shapes(kin, solid)
+
+    def _lattice(
+        self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float
+    ) -> Lattice:
+        basis = type(self.basis)
+        return Lattice(dimension, lo, hi, h, basis.nodes_per_cell, basis.least_nodes)
+
+    def check(self, hub: Hub) -> None:
+        """Refuse what does not go together; called before every run."""
+        transfer, basis, scheme = hub.update.transfer, self.basis, hub.update.scheme
+        unsteady = transfer.inverts_spread and not basis.steady_moment and self.frame.moves
+        name = type(basis).__name__
+        if unsteady and not getattr(scheme, "maps_velocity_again", False):
+            raise ScriptError(
+                f"{type(transfer).__name__} with {name} functions and "
+                f"{type(scheme).__name__.lower()} is unstable: D of the affine transfers vanishes "
+                "at nodes, and there the moments push where there is next to no mass",
+                hint="scheme(musl), or TPIC in the place of the transfer, or quadratic-spline in "
+                "that of the basis, or method tlmpm",
+            )
+
+
+class OwnGrids(Method):
+    """A grid of its own for every solid."""
+
+    own_grids = True
+
+    def lattices(self, hub: Hub) -> list[Lattice]:
+        """A grid over the box of each solid."""
+        d = hub.domain.dimension
+        return numbered([self._lattice(d, s.lo, s.hi, s.h) for s in hub.solids.values()])
+
+    def lattice_of(self, hub: Hub, solid: Solid) -> int:
+        """The grid of a solid has its number."""
+        return solid.index

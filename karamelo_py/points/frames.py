@@ -1,0 +1,156 @@
+"""Frames: whether weights and gradients belong to the present or to the reference configuration.
+
+``Updated`` takes gradients in space, and forces from the Kirchhoff stress; ``Total`` takes them
+with respect to reference positions, and forces from the first Piola-Kirchhoff stress, for which it
+needs the deformation gradient F of the points.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from karamelo_py.compile import point_function, real
+from karamelo_py.points.kinematics import (
+    Axisymmetric,
+    Line,
+    PlaneStrain,
+    Space,
+    add_symmetric_dot,
+    add_tensor_dot,
+    identity,
+    increment_of,
+    inverse,
+    largest_row_sum,
+    left_cauchy_green,
+    nominal,
+)
+from karamelo_py.tensors import add_scaled, scale
+
+
+class Updated(NamedTuple):
+    """Weights follow the present positions (updated Lagrangian)."""
+
+    moves = True
+
+
+class Total(NamedTuple):
+    """Weights belong to the reference positions and never change (total Lagrangian)."""
+
+    moves = False
+
+
+@point_function()
+def follows(frame):
+    """Whether weights follow the points; constant at compile time."""
+
+
+@follows.on(Updated)
+def _(frame):
+    return True
+
+
+@follows.on(Total)
+def _(frame):
+    return False
+
+
+@point_function()
+def spatial_increment(frame, kin, dl, f):
+    """dt grad v from `dl`, dt times the gradient of velocity in the frame, and F before it."""
+
+
+@spatial_increment.on(Updated)
+def _(frame, kin, dl, f):
+    return dl
+
+
+@spatial_increment.on(Total)
+def _(frame, kin, dl, f):
+    # F + dt Fdot = (I + dt Fdot F^-1) F exactly
+    return increment_of(kin, dl, f)
+
+
+@point_function()
+def force_stress(frame, kin, tau, f):
+    """The stress that makes nodal forces, per reference volume."""
+
+
+@force_stress.on(Updated)
+def _(frame, kin, tau, f):
+    return tau
+
+
+@force_stress.on(Total)
+def _(frame, kin, tau, f):
+    return nominal(kin, tau, f)
+
+
+@point_function()
+def add_force(frame, kin, total, stress, gradient):
+    """total + stress . gradient of a basis function."""
+
+
+@add_force.on(Updated)
+def _(frame, kin, total, stress, gradient):
+    return add_symmetric_dot(kin, total, stress, gradient)
+
+
+@add_force.on(Total)
+def _(frame, kin, total, stress, gradient):
+    return add_tensor_dot(kin, total, stress, gradient)
+
+
+@point_function()
+def scaled_increment(frame, kin, dl, f, ratio):
+    """`dl` changed such that the volume after it is `ratio` times what it would be."""
+
+
+@scaled_increment.on(Updated)
+def _(frame, kin, dl, f, ratio):
+    # (I + dl) s - I
+    s = ratio ** stretched_share(kin, ratio)
+    return add_scaled(scale(s, dl), s - real(1, s), identity(kin, s))
+
+
+@scaled_increment.on(Total)
+def _(frame, kin, dl, f, ratio):
+    # (F + dl) s - F
+    s = ratio ** stretched_share(kin, ratio)
+    return add_scaled(scale(s, dl), s - real(1, s), f)
+
+
+@point_function()
+def stretched_share(kin, like):
+    """One over the number of directions that can stretch."""
+
+
+@stretched_share.on(Line)
+def _(kin, like):
+    return real(1, like)
+
+
+@stretched_share.on(PlaneStrain)
+def _(kin, like):
+    return real(0.5, like)
+
+
+@stretched_share.on(Axisymmetric)
+@stretched_share.on(Space)
+def _(kin, like):
+    return real(1 / 3, like)
+
+
+@point_function()
+def thinning(frame, kin, f, like):
+    """Square of h over the size of a deformed cell, which bounds the step in its place."""
+
+
+@thinning.on(Updated)
+def _(frame, kin, f, like):
+    return real(1, like)
+
+
+@thinning.on(Total)
+def _(frame, kin, f, like):
+    # 1 / (smallest stretch)^2 is the largest eigenvalue of F^-1 F^-T.
+    return largest_row_sum(kin, left_cauchy_green(kin, inverse(kin, f)))

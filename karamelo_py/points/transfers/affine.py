@@ -1,0 +1,34 @@
+"""What the affine transfers share: the moment of velocity B that a point keeps.
+
+B_p = sum_I N_I v*_I (X_I - x_p)^T, and the point gives the node
+m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). Keeping B rather than C = B D^-1 conserves angular
+momentum to round-off for functions whose D changes with the place in the cell, too
+(Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-particle-in-cell method",
+eqs. 15 to 18).
+"""
+
+from __future__ import annotations
+
+from karamelo_py.points.basis import affine_weight, reach
+from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
+from karamelo_py.points.transfers import add_moment, add_momentum, zero_moment
+from karamelo_py.tensors import add_scaled, scale
+
+
+def register(transfer: type) -> None:
+    """Let the points of `transfer` keep the moment of velocity and map it with their velocity."""
+
+    @add_momentum.on(transfer)
+    def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
+        affine = affine_weight(basis, kin, grid, stencil, k)
+        mean = add_scaled(total, weight * mass, v)
+        return add_scaled(mean, mass, tensor_dot(planar(kin), moment, affine))
+
+    @zero_moment.on(transfer)
+    def _(transfer, kin, like):
+        return zero_tensor(planar(kin), like)
+
+    @add_moment.on(transfer)
+    def _(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
+        arm = reach(basis, kin, grid, stencil, k)
+        return add_outer(planar(kin), moment, scale(weight, velocity), arm)

@@ -1,0 +1,38 @@
+"""AFLIP: FLIP with the moment of velocity (Fei et al. 2021)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from karamelo_py.points.transfers import affine, updated_velocity
+from karamelo_py.points.transfers.flip import blend
+
+
+class AFLIP(NamedTuple):
+    """FLIP's mean velocity, and the moment of velocity of APIC.
+
+    Less noise than FLIP and less damping than APIC (Fei, Guo, Wu, Huang & Gao 2021, "Revisiting
+    integration in the material point method", section 4).
+
+    Parameters
+    ----------
+    alpha
+        Share of FLIP, 0 to 1.
+
+    Example
+    -------
+    method(ulmpm, AFLIP, quadratic-spline, 0.99)
+    """
+
+    alpha: float = 1.0
+
+    keeps_moment = True
+    inverts_spread = True
+
+
+@updated_velocity.on(AFLIP)
+def _(transfer, v, v_pic, dv):
+    return blend(transfer.alpha, v, v_pic, dv)
+
+
+affine.register(AFLIP)

@@ -1,0 +1,43 @@
+"""ASFLIP: AFLIP whose points may move against each other (Fei et al. 2021)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from karamelo_py.points.transfers import affine, displacing_velocity, updated_velocity
+from karamelo_py.points.transfers.flip import blend
+
+
+class ASFLIP(NamedTuple):
+    """AFLIP whose points move with their own velocity after the step, not with that of the grid.
+
+    Points that the grid holds together come apart sooner: for granular flow and splashes
+    (Fei et al. 2021, section 5; here, as in Karamelo, without their factor for separation only).
+
+    Parameters
+    ----------
+    alpha
+        Share of FLIP, 0 to 1.
+
+    Example
+    -------
+    method(ulmpm, ASFLIP, quadratic-spline, 0.97)
+    """
+
+    alpha: float = 1.0
+
+    keeps_moment = True
+    inverts_spread = True
+
+
+@updated_velocity.on(ASFLIP)
+def _(transfer, v, v_pic, dv):
+    return blend(transfer.alpha, v, v_pic, dv)
+
+
+@displacing_velocity.on(ASFLIP)
+def _(transfer, v, v_pic):
+    return v
+
+
+affine.register(ASFLIP)

@@ -1,0 +1,56 @@
+"""MLS: APIC with strains and forces from the same moments (Hu et al. 2018)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from karamelo_py.compile import point_function
+from karamelo_py.points.basis import affine_weight
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.transfers import affine, gradient_weight, updated_velocity
+
+
+class MLS(NamedTuple):
+    """APIC; N_I D^-1 (X_I - x), a moving least squares fit, stands for the gradient everywhere.
+
+    The velocity gradient of a point is then B D^-1, which it keeps anyway, and its force on a node
+    is -V sigma N_I D^-1 (X_I - x) (Hu et al. 2018, "A moving least squares material point method",
+    eqs. 16 to 18).
+
+    Example
+    -------
+    method(ulmpm, MLS, quadratic-spline)
+    """
+
+    keeps_moment = True
+    inverts_spread = True
+
+
+@updated_velocity.on(MLS)
+def _(transfer, v, v_pic, dv):
+    return v_pic
+
+
+@gradient_weight.on(MLS)
+def _(transfer, basis, kin, grid, stencil, k, gradient):
+    return with_hoop(kin, affine_weight(basis, kin, grid, stencil, k), gradient)
+
+
+@point_function()
+def with_hoop(kin, planar, gradient):
+    """The planar gradient, with the hoop part N / r of an axisymmetric one."""
+
+
+@with_hoop.on(Line)
+@with_hoop.on(PlaneStrain)
+@with_hoop.on(Space)
+def _(kin, planar, gradient):
+    return planar
+
+
+@with_hoop.on(Axisymmetric)
+def _(kin, planar, gradient):
+    return planar + gradient[2:]
+
+
+affine.register(MLS)

@@ -1,0 +1,31 @@
+"""What the Taylor transfers share: the gradient of velocity that a point keeps.
+
+The point gives the node m_p N_I (v_p + L_p (X_I - x_p)), with L_p = sum_I v*_I (x) grad N_I: no D
+is inverted, so that every basis will do. Where D^-1 N_I (X_I - x) is the gradient (linear,
+Bernstein-quadratic) this is APIC in another form, and angular momentum is conserved as far as D
+stays the same; for splines as far as velocity is linear over their support.
+"""
+
+from __future__ import annotations
+
+from karamelo_py.points.basis import reach
+from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
+from karamelo_py.points.transfers import add_moment, add_momentum, zero_moment
+from karamelo_py.tensors import add, add_scaled
+
+
+def register(transfer: type) -> None:
+    """Let the points of `transfer` keep the gradient of velocity and map it with their velocity."""
+
+    @add_momentum.on(transfer)
+    def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
+        arm = reach(basis, kin, grid, stencil, k)
+        return add_scaled(total, weight * mass, add(v, tensor_dot(planar(kin), moment, arm)))
+
+    @zero_moment.on(transfer)
+    def _(transfer, kin, like):
+        return zero_tensor(planar(kin), like)
+
+    @add_moment.on(transfer)
+    def _(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
+        return add_outer(planar(kin), moment, velocity, gradient)

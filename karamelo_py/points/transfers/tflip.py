@@ -1,0 +1,37 @@
+"""FLIP with the gradient-enhanced projection of Karamelo."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from karamelo_py.points.transfers import taylor, updated_velocity
+from karamelo_py.points.transfers.flip import blend
+
+
+class TFLIP(NamedTuple):
+    """FLIP's velocity, mapped to the nodes as N_I (v_p + L_p (X_I - x_p)).
+
+    ``method(kind, FLIP, basis, alpha, gradient-enhanced)`` is the same thing.
+
+    Parameters
+    ----------
+    alpha
+        Share of FLIP, 0 to 1.
+
+    Example
+    -------
+    method(ulmpm, TFLIP, cubic-spline, 0.99)
+    """
+
+    alpha: float = 1.0
+
+    keeps_moment = True
+    inverts_spread = False
+
+
+@updated_velocity.on(TFLIP)
+def _(transfer, v, v_pic, dv):
+    return blend(transfer.alpha, v, v_pic, dv)
+
+
+taylor.register(TFLIP)
