@@ -115,6 +115,10 @@ class Hub:
             self._simulation = Simulation(self, self._simulation)
         return self._simulation
 
+    def forget_simulation(self) -> None:
+        """The points of a solid were replaced: the arrays are made anew when next asked for."""
+        self._simulation = None
+
     def refresh_values(self) -> None:
         """Let computes and fixes measure the present state."""
         for catalogue in (self.computes, self.fixes):

@@ -104,7 +104,7 @@ def test_the_axis_of_a_cylinder_is_a_word():
         ("solid(s, region, disk1, 2, steel, 0)", "0", "above 0"),
         ("solid(s, region, disk1, 2, steel, 2*h)", "2*h", "0.05, as in dimension(...)"),
         ("solid(s, region, disk1, 2, steel)", None, "solid(ID, region, regionID, ppc, material, h"),
-        ("solid(s, mesh, body.msh, steel, h, 0)", "mesh", "not there yet"),
+        ("solid(s, mesh, body.msh, steel, h, 0)", "body.msh", "file body.msh does not exist"),
         ("solid(s, rgion, disk1, 2, steel, h)", "rgion", "did you mean 'region'?"),
         ("group(all, nodes, region, left, all)", "all", "another name"),
         ("group(g, node, region, left, all)", "node", "did you mean 'nodes'?"),
