@@ -116,7 +116,7 @@ def elements_of(
     if highest > dimension or (highest < dimension and not lower) or highest < 1:
         held = ", ".join(dict.fromkeys(name for name, _, _ in cells))
         raise ScriptError(
-            f"{of} has no elements for {dimension}D: it has {held}",
+            f"{of} has no elements for {dimension}D: it has elements of type {held}",
             argument="file" if group is None else "group",
             expected=_accepted(dimension),
         )
@@ -136,9 +136,15 @@ def elements_of(
     positions = np.ascontiguousarray(positions[:, :dimension])
     found = []
     for name in dict.fromkeys(name for name, _ in wanted):
-        numbers = np.concatenate([nodes for other, nodes in wanted if other == name])
+        numbers = _once(np.concatenate([nodes for other, nodes in wanted if other == name]))
         found.append(Elements(SHAPES[name], numbers, positions[numbers]))
     return found
+
+
+def _once(numbers: np.ndarray) -> np.ndarray:
+    """Each element once: older formats repeat those that belong to two physical groups."""
+    _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
+    return numbers[np.sort(first)]
 
 
 def _accepted(dimension: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import tempfile
+import warnings
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,6 +37,10 @@ def read(path: Path, dimension: int) -> meshio.Mesh:
         When the file cannot be read, or not be meshed.
     """
     status = path.stat()
+    if not status.st_size:
+        raise ScriptError(
+            f"the file {path.name} is empty", argument="file", expected="a mesh or a geometry"
+        )
     # Regions and solids often come from the same file.
     return _read(path.resolve(), dimension, (status.st_mtime_ns, status.st_size))
 
@@ -56,11 +61,16 @@ def _by_meshio(path: Path, name: str | None = None) -> meshio.Mesh:
     said = io.StringIO()
     try:
         # It prints what it has to say, and ends the process where no format fits.
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with (
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(said),
+            warnings.catch_warnings(),
+        ):
+            warnings.simplefilter("ignore")
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:
         unknown = "Could not deduce" in str(error)
-        reason = "its ending tells no format" if unknown else _reason(error, said.getvalue())
+        reason = "its ending tells no format" if unknown else _reason(error)
         raise ScriptError(
             f"the file {name or path.name} cannot be read as a mesh: {reason}",
             argument="file",
@@ -85,11 +95,10 @@ def _by_meshio(path: Path, name: str | None = None) -> meshio.Mesh:
     return mesh
 
 
-def _reason(error: BaseException, said: str) -> str:
-    """What went wrong, in one line; meshio often says so only in passing, or not at all."""
+def _reason(error: BaseException) -> str:
+    """What went wrong, in one line; where no format fits, meshio says so only in passing."""
     if isinstance(error, SystemExit) or not str(error).strip():
-        lines = [line.strip() for line in said.splitlines() if line.strip()]
-        return lines[-1].removeprefix("Error: ") if lines else "its content does not fit its ending"
+        return "its content does not fit its ending"
     return f"{' '.join(str(error).split())} ({type(error).__name__})"
 
 
@@ -112,12 +121,17 @@ def _mesh_geometry(path: Path, dimension: int, target: Path) -> None:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.open(str(path))
         gmsh.model.mesh.generate(dimension)
+        if not len(gmsh.model.mesh.getNodes()[0]):
+            raise ScriptError(f"{path.name} has nothing to mesh", argument="file")
         gmsh.write(str(target))
         if not mine:
             gmsh.model.remove()
+    except ScriptError:
+        raise
     except Exception as error:  # Gmsh has one class for all that it complains about.
+        reason = " ".join(str(error).split()).replace(str(path), path.name)
         raise ScriptError(
-            f"Gmsh cannot mesh {path.name}: {' '.join(str(error).split())}",
+            f"Gmsh cannot mesh {path.name}: {reason}",
             argument="file",
             hint=f"gmsh -{dimension} {path.name} says more",
         ) from None
