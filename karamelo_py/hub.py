@@ -124,6 +124,10 @@ class Hub:
         domain = self.domain
         return [Lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 
+    def forget_simulation(self) -> None:
+        """The points of a solid were replaced: the arrays are made anew when next asked for."""
+        self._simulation = None
+
     def refresh_values(self) -> None:
         """Let computes and fixes measure the present state."""
         for catalogue in (self.computes, self.fixes):

@@ -25,10 +25,7 @@ from combinations import (
 from states import final_state, same_bits
 
 CASES = [
-    (kinematics, *base)
-    for kinematics in KINEMATICS
-    for base in BASES
-    if fits(kinematics, base[2])
+    (kinematics, *base) for kinematics in KINEMATICS for base in BASES if fits(kinematics, base[2])
 ]
 
 
@@ -87,9 +84,7 @@ def test_uncompiled(case, state_interpreted, run_interpreted, tmp_path):
         check(state_interpreted(text), kinematics)
 
 
-COMPILED = [
-    pytest.param(case, id=named(case)) for case in pairwise()
-]
+COMPILED = [pytest.param(case, id=named(case)) for case in pairwise()]
 
 
 def compare(case, state_interpreted, tmp_path):

@@ -27,6 +27,7 @@ TITLES = {
     "compute": ("Computes", "What measures a run: styles of [compute](command/compute.md)."),
     "dump": ("Dumps", "Files of snapshots: styles of [dump](command/dump.md)."),
     "region": ("Regions", "Parts of space: styles of [region](command/region.md)."),
+    "solid": ("Solids", "Bodies of points: styles of [solid](command/solid.md)."),
     "material": ("Materials", "Constitutive laws: styles of [material](command/material.md)."),
 }
 _CODE = re.compile(r"(``[^`]+``|`[^`]+`)")
