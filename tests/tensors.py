@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
-from karamelo_py.points.kinematics import Line, PlaneStrain, Space
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 
-KINEMATICS = [Line(), PlaneStrain(), Space()]
+KINEMATICS = [Line(), PlaneStrain(), Space()]  # those of a dimension
+ALL_KINEMATICS = [*KINEMATICS, Axisymmetric()]
 # Places of the symmetric components xx yy zz xy xz yz in a matrix.
 SYMMETRIC = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
 
@@ -16,14 +17,17 @@ def matrix(kin, flat, rest=0.0):
     """(3, 3) of a tensor; the diagonal out of the kinematics is `rest` (1 for F, 0 for grad v)."""
     d = kin.dimension
     out = np.eye(3) * rest
-    out[:d, :d] = np.reshape(flat, (d, d))
+    out[:d, :d] = np.reshape(flat[: d * d], (d, d))
+    if isinstance(kin, Axisymmetric):
+        out[2, 2] = flat[4]
     return out
 
 
 def flat(kin, full):
     """The components that the kinematics has, of a (3, 3) tensor."""
     d = kin.dimension
-    return tuple(float(a) for a in full[:d, :d].ravel())
+    around = (float(full[2, 2]),) if isinstance(kin, Axisymmetric) else ()
+    return tuple(float(a) for a in full[:d, :d].ravel()) + around
 
 
 def symmetric_matrix(kin, components):
@@ -38,6 +42,11 @@ def symmetric_flat(kin, full):
     """The components that the kinematics has, of a symmetric (3, 3) tensor."""
     count = len(kin.symmetric_names)
     return tuple(float(full[i, j]) for i, j in SYMMETRIC[:count])
+
+
+def gradients(kin):
+    """Gradients of a basis function: a vector, and N/r where there is a radius."""
+    return numbers(kin.dimension + isinstance(kin, Axisymmetric))
 
 
 def numbers(size, low=-1.0, high=1.0):
@@ -59,7 +68,7 @@ def symmetric_tensors(kin, size=1.0):
 def deformations(kin):
     """F with det F well above 0: the identity and something smaller."""
     d = kin.dimension
-    unit = np.eye(d).ravel()
+    unit = flat(kin, np.eye(3))
     return numbers(kin.tensor_size, -0.3 / d, 0.3 / d).map(
         lambda a: tuple(float(x) for x in np.add(unit, a))
     )

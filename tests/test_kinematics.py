@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import njit
+from numba import njit, typeof
 from tensors import (
-    KINEMATICS,
+    ALL_KINEMATICS,
     deformations,
     flat,
+    gradients,
     matrix,
     numbers,
     symmetric_flat,
@@ -23,22 +24,31 @@ from tensors import (
 )
 
 from karamelo_py.points.kinematics import (
+    Axisymmetric,
     Line,
     PlaneStrain,
     Space,
     add_outer,
     add_pressure,
     add_symmetric_dot,
+    add_tensor_dot,
     contract,
     deform,
     determinant,
+    diagonal,
     dimension,
     identity,
+    increment_of,
+    inverse,
     largest_component,
     largest_row_sum,
     left_cauchy_green,
+    multiply,
+    nominal,
+    planar,
     right_cauchy_green,
     spin,
+    stretch,
     symmetric_part,
     tensor_dot,
     trace,
@@ -49,7 +59,9 @@ from karamelo_py.points.kinematics import (
 )
 
 ROUND_OFF = 1e-12
-every_kinematics = pytest.mark.parametrize("kin", KINEMATICS, ids=lambda kin: type(kin).__name__)
+every_kinematics = pytest.mark.parametrize(
+    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
+)
 
 
 def close(a, b, tolerance=ROUND_OFF):
@@ -60,18 +72,48 @@ def close(a, b, tolerance=ROUND_OFF):
 @given(data=st.data())
 def test_products_are_those_of_matrices(kin, data):
     d = kin.dimension
-    t, a, b = data.draw(tensors(kin)), data.draw(numbers(d)), data.draw(numbers(d))
+    t, a = data.draw(tensors(kin)), data.draw(numbers(d))
     s, e = data.draw(symmetric_tensors(kin)), data.draw(symmetric_tensors(kin))
     full = symmetric_matrix(kin, s)
-    zero = (0.0,) * (d * d)
-    assert close(add_outer(kin, zero, a, b), np.outer(a, b).ravel())
-    assert close(tensor_dot(kin, t, a), np.reshape(t, (d, d)) @ a)
-    assert close(add_symmetric_dot(kin, b, s, a), b + full[:d, :d] @ a)
+    assert close(tensor_dot(kin, t, a), matrix(kin, t)[:d, :d] @ a)
+    assert close(diagonal(kin, t), np.diag(matrix(kin, t))[:d])
     assert close(contract(kin, s, e), np.sum(full * symmetric_matrix(kin, e)))
     assert close(trace(s), np.trace(full))
     pressed = add_pressure(kin, 0.7, s, 0.3)
     assert close(symmetric_matrix(kin, pressed), 0.7 * full + 0.3 * np.eye(3))
     assert largest_component(kin, a) == np.abs(a).max()
+
+
+@pytest.mark.parametrize("kin", ALL_KINEMATICS[:3], ids=lambda kin: type(kin).__name__)
+@given(data=st.data())
+def test_gradients_meet_tensors_as_in_space(kin, data):
+    d = kin.dimension
+    v, g = data.draw(numbers(d)), data.draw(gradients(kin))
+    t, s = data.draw(tensors(kin)), data.draw(symmetric_tensors(kin))
+    assert close(add_outer(kin, t, v, g), matrix(kin, t)[:d, :d].ravel() + np.outer(v, g).ravel())
+    assert close(add_symmetric_dot(kin, v, s, g), v + symmetric_matrix(kin, s)[:d, :d] @ g)
+    assert close(add_tensor_dot(kin, v, t, g), v + matrix(kin, t)[:d, :d] @ g)
+
+
+@given(data=st.data())
+def test_gradients_at_an_axisymmetric_point(data):
+    """grad v has v_r/r around the axis, and so power balances: f . v = s : grad v for any node.
+
+    The strain around the axis is u_r/r (Timoshenko & Goodier, Theory of Elasticity); the force of
+    a node is what does the same power.
+    """
+    kin = Axisymmetric()
+    v, g = data.draw(numbers(2)), data.draw(gradients(kin))
+    t, s = data.draw(tensors(kin)), data.draw(symmetric_tensors(kin))
+    grad = add_outer(kin, zero_tensor(kin, 1.0), v, g)
+    expected = np.zeros((3, 3))
+    expected[:2, :2] = np.outer(v, g[:2])
+    expected[2, 2] = v[0] * g[2]
+    assert close(matrix(kin, grad), expected)
+    power = np.dot(v, add_symmetric_dot(kin, (0.0, 0.0), s, g))
+    assert close(power, np.sum(symmetric_matrix(kin, s) * expected))
+    power = np.dot(v, add_tensor_dot(kin, (0.0, 0.0), t, g))
+    assert close(power, np.sum(matrix(kin, t) * expected))
 
 
 @every_kinematics
@@ -99,11 +141,92 @@ def test_increments_multiply_the_volume(kin, data):
 
 
 @every_kinematics
+@given(data=st.data())
+def test_total_lagrangian_algebra_is_that_of_matrices(kin, data):
+    """F^-1, P = tau F^-T; and an increment (dt Fdot) F^-1 takes F to F + dt Fdot."""
+    a, b, f = data.draw(tensors(kin)), data.draw(tensors(kin)), data.draw(deformations(kin))
+    tau = data.draw(symmetric_tensors(kin))
+    full = matrix(kin, f, 1.0)
+    assert close(matrix(kin, multiply(kin, a, b)), matrix(kin, a) @ matrix(kin, b))
+    assert close(matrix(kin, inverse(kin, f), 1.0), np.linalg.inv(full))
+    p = symmetric_matrix(kin, tau) @ np.linalg.inv(full).T
+    assert close(nominal(kin, tau, f), flat(kin, p))
+    dl = increment_of(kin, b, f)
+    assert close(matrix(kin, dl), matrix(kin, b) @ np.linalg.inv(full))
+    assert close(deform(kin, dl, f), np.add(f, b))
+
+
+# --- right stretch ----------------------------------------------------------------------------
+
+
+def exact_stretch(kin, f):
+    """sqrt(F^T F) by the singular values of F, in double precision."""
+    _, values, vt = np.linalg.svd(matrix(kin, [float(a) for a in f], 1.0))
+    return vt.T @ np.diag(values) @ vt
+
+
+@every_kinematics
+@given(data=st.data())
+def test_stretch_is_the_root_of_cauchy_green(kin, data):
+    f = data.draw(deformations(kin))
+    u = symmetric_matrix(kin, stretch(kin, f))
+    assert close(u, exact_stretch(kin, f))
+    assert close(u @ u, symmetric_matrix(kin, right_cauchy_green(kin, f)))
+
+
+def special(kin):
+    """Deformations at which closed forms may fail, as matrices (3, 3)."""
+    yield "identity", np.eye(3)
+    yield "equal stretches", 2.5 * np.eye(3)
+    yield "nearly equal stretches", np.diag([1.0, 1.0 + 1e-9, 1.0 - 1e-9])
+    yield "large stretch", np.diag([100.0, 0.01, 1.0])
+    if kin.dimension > 1:
+        turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        shear = np.array([[1.0, 3.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        yield "right angle", turn
+        yield "right angle and stretch", turn @ np.diag([1.5, 1.5, 0.7])
+        yield "half a turn", np.diag([-1.0, -1.0, 1.0])
+        yield "pure shear", np.diag([2.0, 0.5, 1.0])
+        yield "simple shear", shear
+        yield "turned simple shear", turn @ shear
+        yield "mirror", np.diag([-2.0, 1.0, 1.0])
+    if kin.dimension == 3:
+        about = rotation(np.array([1.0, -2.0, 0.5]))
+        yield "two equal stretches", about @ np.diag([3.0, 3.0, 0.2]) @ about.T
+        yield "flat", about @ np.diag([10.0, 1.0, 1e-3])
+
+
+@every_kinematics
+@pytest.mark.parametrize("number, tolerance", [(np.float64, 1e-13), (np.float32, 1e-6)])
+def test_stretch_of_special_deformations(kin, number, tolerance):
+    """In either precision; errors are relative to the largest stretch. Single stays single."""
+    for name, full in special(kin):
+        f = tuple(number(a) for a in flat(kin, full))
+        u = stretch(kin, f)
+        assert all(type(a) is number for a in u), name
+        exact = exact_stretch(kin, f)
+        error = np.abs(symmetric_matrix(kin, u) - exact).max()
+        assert error <= tolerance * np.abs(exact).max(), name
+
+
+@given(angles=numbers(6, -3, 3), logs=numbers(3, -2.5, 2.5))
+def test_stretch_of_any_rotation_and_stretch(angles, logs):
+    """R U of random rotations and principal stretches up to e^2.5 = 12 and down to its inverse."""
+    kin = Space()
+    axes, turn = (rotation(np.add(a, 1e-6)) for a in (angles[:3], angles[3:]))
+    u = axes @ np.diag(np.exp(logs)) @ axes.T
+    found = symmetric_matrix(kin, stretch(kin, flat(kin, turn @ u)))
+    assert close(found, u, 1e-12 * np.exp(max(logs)) + 1e-12)
+
+
+@every_kinematics
 def test_units_and_zeros(kin):
     assert close(matrix(kin, identity(kin, 1.0), 1.0), np.eye(3))
     assert zero_tensor(kin, 1.0) == (0.0,) * kin.tensor_size
     assert zero_symmetric(kin, 1.0) == (0.0,) * len(kin.symmetric_names)
     assert dimension(kin) == kin.dimension
+    plane = planar(kin)
+    assert (plane.dimension, plane.tensor_size) == (kin.dimension, kin.dimension**2)
     rows = np.arange(12.0).reshape(3, 4)
     assert vector_at(kin, rows, 1) == tuple(rows[1, : kin.dimension])
 
@@ -187,9 +310,11 @@ def test_spin_leaves_out_the_strain():
     assert spin(Line(), (0.3,), (1.0, 2.0, 3.0)) == (1.0, 2.0, 3.0)
 
 
-@given(dl=tensors(PlaneStrain(), 0.5), s=symmetric_tensors(PlaneStrain()))
-def test_plane_and_space_turn_alike(dl, s):
-    plane, space = PlaneStrain(), Space()
+@pytest.mark.parametrize("plane", [PlaneStrain(), Axisymmetric()])
+@given(data=st.data())
+def test_plane_and_space_turn_alike(plane, data):
+    space = Space()
+    dl, s = data.draw(tensors(plane, 0.5)), data.draw(symmetric_tensors(plane))
     in_space = spin(space, flat(space, matrix(plane, dl)), (*s, 0.0, 0.0))
     assert close(in_space, (*spin(plane, dl, s), 0.0, 0.0))
 
@@ -198,8 +323,10 @@ def test_plane_and_space_turn_alike(dl, s):
 
 
 @njit
-def everything(kin, f, dl, s, a):
+def everything(kin, f, dl, s, a, g):
     turned = spin(kin, dl, s)
+    moved = deform(kin, increment_of(kin, dl, f), multiply(kin, inverse(kin, f), dl))
+    rate = add_outer(kin, f, a, g)
     return (
         determinant(kin, deform(kin, dl, f)),
         volume_ratio(kin, dl),
@@ -207,10 +334,11 @@ def everything(kin, f, dl, s, a):
         contract(kin, s, right_cauchy_green(kin, f)),
         trace(symmetric_part(kin, dl)),
         largest_row_sum(kin, s),
-        largest_component(
-            kin, add_symmetric_dot(kin, a, s, tensor_dot(kin, add_outer(kin, f, a, a), a))
-        ),
+        largest_component(kin, add_symmetric_dot(kin, tensor_dot(kin, rate, a), s, g)),
         contract(kin, add_pressure(kin, 0.5, s, 0.25), zero_symmetric(kin, 1.0)),
+        contract(kin, stretch(kin, f), s),
+        largest_component(kin, add_tensor_dot(kin, diagonal(kin, moved), nominal(kin, s, f), g)),
+        dimension(planar(kin)),
     )
 
 
@@ -220,4 +348,41 @@ def everything(kin, f, dl, s, a):
 def test_compiled_is_the_same(kin, data):
     f, dl = data.draw(deformations(kin)), data.draw(tensors(kin))
     s, a = data.draw(symmetric_tensors(kin)), data.draw(numbers(kin.dimension))
-    assert close(everything(kin, f, dl, s, a), everything.py_func(kin, f, dl, s, a))
+    g = data.draw(gradients(kin))
+    assert close(everything(kin, f, dl, s, a, g), everything.py_func(kin, f, dl, s, a, g))
+
+
+@njit
+def all_tensors(kin, f, dl, s, a, g):
+    return (
+        stretch(kin, f),
+        nominal(kin, s, f),
+        multiply(kin, f, inverse(kin, f)),
+        deform(kin, increment_of(kin, dl, f), identity(kin, f[0])),
+        spin(kin, dl, s),
+        add_outer(kin, zero_tensor(kin, a[0]), a, g),
+        add_symmetric_dot(kin, add_tensor_dot(kin, a, dl, g), zero_symmetric(kin, a[0]), g),
+        left_cauchy_green(kin, f),
+        right_cauchy_green(kin, dl),
+        symmetric_part(kin, dl),
+        (determinant(kin, f), volume_ratio(kin, dl), largest_row_sum(kin, s)),
+        (contract(kin, s, add_pressure(kin, a[0], s, a[0])), trace(s)),
+    )
+
+
+@every_kinematics
+def test_single_precision_stays_single(kin):
+    """One double literal would make every number of a kernel double."""
+
+    def single(numbers):
+        return tuple(np.float32(a) for a in numbers)
+
+    d, count = kin.dimension, len(kin.symmetric_names)
+    f, dl = single(flat(kin, np.eye(3) + 0.1)), single(flat(kin, np.full((3, 3), 0.01)))
+    arguments = kin, f, dl, single(range(count)), single(range(d)), single((0.1, 0.2, 0.3))
+    results = all_tensors(*arguments)
+    (compiled,) = [c for types, c in all_tensors.overloads.items() if types[0] == typeof(kin)]
+    assert "float64" not in str(compiled.signature.return_type)
+    for found, exact in zip(results, all_tensors.py_func(*arguments), strict=True):
+        assert all(type(a) is np.float32 for a in exact)
+        assert np.allclose(found, exact, rtol=1e-5, atol=1e-6)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tensors import (
-    KINEMATICS,
+    ALL_KINEMATICS,
     deformations,
     flat,
     matrix,
@@ -39,7 +39,9 @@ LAM, G = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
 LAWS = [law(1 / RHO, LAM, G) for law in (Jaumann, FixedFrame, Hyperelastic)]
 NEO = LAWS[2]
 SPACE = Space()
-every_kinematics = pytest.mark.parametrize("kin", KINEMATICS, ids=lambda kin: type(kin).__name__)
+every_kinematics = pytest.mark.parametrize(
+    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
+)
 every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
 
 

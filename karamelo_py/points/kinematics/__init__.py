@@ -1,0 +1,95 @@
+"""Kinematics: which components of vectors and tensors exist, and the algebra on them.
+
+Every tensor of a point is a flat tuple with the components that its kinematics has:
+
+================  ==============  =============================  =================================
+tag               vector          velocity gradient, F           symmetric tensor (stress, strain)
+================  ==============  =============================  =================================
+``Line``          x               xx                             xx yy zz
+``PlaneStrain``   x y             xx xy yx yy                    xx yy zz xy
+``Axisymmetric``  r z             rr rz zr zz tt                 rr zz tt rz
+``Space``         x y z           xx xy xz yx yy yz zx zy zz     xx yy zz xy xz yz
+================  ==============  =============================  =================================
+
+The gradient of a basis function has the components of a vector, and a third, N/r, at an
+axisymmetric point. The tags are empty NamedTuples: Numba compiles a kernel for each of them,
+without branches.
+"""
+
+from karamelo_py.points.kinematics.deformation import (
+    deform,
+    determinant,
+    identity,
+    increment_of,
+    inverse,
+    left_cauchy_green,
+    multiply,
+    right_cauchy_green,
+    stretch,
+    volume_ratio,
+    zero_tensor,
+)
+from karamelo_py.points.kinematics.symmetric import (
+    add_pressure,
+    contract,
+    largest_row_sum,
+    nominal,
+    spin,
+    symmetric_part,
+    trace,
+    zero_symmetric,
+)
+from karamelo_py.points.kinematics.tags import (
+    KINEMATICS,
+    Axisymmetric,
+    Line,
+    PlaneStrain,
+    Space,
+    dimension,
+    planar,
+)
+from karamelo_py.points.kinematics.vectors import (
+    add_outer,
+    add_symmetric_dot,
+    add_tensor_dot,
+    diagonal,
+    largest_component,
+    tensor_dot,
+    vector_at,
+)
+
+__all__ = [
+    "KINEMATICS",
+    "Axisymmetric",
+    "Line",
+    "PlaneStrain",
+    "Space",
+    "add_outer",
+    "add_pressure",
+    "add_symmetric_dot",
+    "add_tensor_dot",
+    "contract",
+    "deform",
+    "determinant",
+    "diagonal",
+    "dimension",
+    "identity",
+    "increment_of",
+    "inverse",
+    "largest_component",
+    "largest_row_sum",
+    "left_cauchy_green",
+    "multiply",
+    "nominal",
+    "planar",
+    "right_cauchy_green",
+    "spin",
+    "stretch",
+    "symmetric_part",
+    "tensor_dot",
+    "trace",
+    "vector_at",
+    "volume_ratio",
+    "zero_symmetric",
+    "zero_tensor",
+]
