@@ -22,6 +22,7 @@ from karamelo_py.kernels.arrays import (
     Points,
     Setup,
 )
+from karamelo_py.laws import law_in, law_kind, law_table
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.materials import initial_state
 from karamelo_py.script.errors import ScriptError
@@ -40,7 +41,7 @@ class State(NamedTuple):
     count: int  # number of points, N
     x: np.ndarray  # (N, d)
     v: np.ndarray  # (N, d)
-    laws: dict[type, np.ndarray]  # (N, s) state for each class of law
+    laws: dict[tuple, np.ndarray]  # (N, s) state for each kind of law
     moment: np.ndarray | None  # (N, d d)
 
 
@@ -113,27 +114,25 @@ def lower_nodes(domain, d: int, real: type) -> Nodes:
 
 
 def lower_blocks(hub, kin, transfer, tiles: Tiles, real: type, previous: State | None) -> tuple:
-    """One block for each class of law, in the order in which the solids use them."""
-    solids: dict[type, list] = {}
+    """One block for each kind of law, in the order in which the solids use them."""
+    solids: dict[tuple, list] = {}
     for solid in hub.solids.values():
-        solids.setdefault(type(solid.material.law), []).append(solid)
+        solids.setdefault(law_kind(solid.material.law), []).append(solid)
     return tuple(
         lower_block(members, kin, transfer, tiles, real, previous) for members in solids.values()
     )
 
 
 def lower_block(solids, kin, transfer, tiles: Tiles, real: type, previous: State | None) -> Block:
-    """The points of all solids whose law is of one class."""
+    """The points of all solids whose law is of one kind."""
     d = kin.dimension
     materials = list({id(s.material): s.material for s in solids}.values())
-    law = type(materials[0].law)
-    laws = law(
-        *(np.array(column, real) for column in zip(*(m.law for m in materials), strict=True))
-    )
+    laws = law_table([m.law for m in materials], real)
+    kind = law_kind(laws)
     x0 = np.concatenate([s.x0 for s in solids])
     n = len(x0)
     ids = np.concatenate([np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids])
-    fresh = initial_state(law(*(real(p) for p in materials[0].law)), kin, real(1))
+    fresh = initial_state(law_in(materials[0].law, real), kin, real(1))
     state = np.tile(np.array(fresh, real), (n, 1))
     moment = np.zeros((n, kin.tensor_size), real) if transfer.keeps_moment else None
     x = np.empty((2, n, d), real)
@@ -143,8 +142,8 @@ def lower_block(solids, kin, transfer, tiles: Tiles, real: type, previous: State
         old = ids < previous.count
         x[:, old] = previous.x[ids[old]]
         v[old] = previous.v[ids[old]]
-        if law in previous.laws:
-            state[old] = previous.laws[law][ids[old]]
+        if kind in previous.laws:
+            state[old] = previous.laws[kind][ids[old]]
         if moment is not None and previous.moment is not None:
             moment[old] = previous.moment[ids[old]]
     points = Points(
