@@ -29,7 +29,7 @@ def eos(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
 
     See Also
     --------
-    strength, material, eos-strength
+    strength, material, material eos-strength
     """
     _define(hub, hub.eos, ID, style, arguments)
 
@@ -52,7 +52,7 @@ def strength(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
 
     See Also
     --------
-    eos, material, eos-strength
+    eos, material, material eos-strength
     """
     _define(hub, hub.strengths, ID, style, arguments)
 

@@ -22,7 +22,7 @@ class MaxPlasticStrain(Compute):
 
     See Also
     --------
-    plastic
+    strength plastic
     """
 
     published = ("Epmax",)

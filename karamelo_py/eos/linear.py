@@ -32,7 +32,7 @@ class Linear(Eos):
 
     See Also
     --------
-    strength, material, eos-strength
+    strength, material eos-strength
     """
 
     def __init__(self, hub: Hub, rho0: Annotated[float, Positive], K: Annotated[float, Positive]):

@@ -27,7 +27,7 @@ class EosStrength(Material):
     -------
     eos(bulk, linear, 7850, 160e9)
     strength(mild, plastic, 80e9, 400e6)
-    material(steel, eos-strength, bulk, mild)
+    material(body, eos-strength, bulk, mild)
 
     Notes
     -----
@@ -38,7 +38,7 @@ class EosStrength(Material):
 
     See Also
     --------
-    eos, strength, max_plastic_strain
+    eos, strength, compute max_plastic_strain
     """
 
     def __init__(self, hub: Hub, eos: Eos, strength: Strength):

@@ -31,7 +31,7 @@ class Linear(Strength):
 
     See Also
     --------
-    plastic, eos, material, eos-strength
+    plastic, eos, material eos-strength
     """
 
     def __init__(self, hub: Hub, G: Annotated[float, Positive]):

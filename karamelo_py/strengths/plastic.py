@@ -34,7 +34,7 @@ class Plastic(Strength):
 
     See Also
     --------
-    linear, eos, material, eos-strength, max_plastic_strain
+    linear, eos, material eos-strength, compute max_plastic_strain
     """
 
     def __init__(
