@@ -139,20 +139,21 @@ def _tried(lines, dimension, folder):
         interpreter.run_text(line)
 
 
-SCENE_FAMILIES = ("fix", "compute", "region", "solid", "material", "dump")
+SCENE_FAMILIES = ("fix", "compute", "region", "solid", "eos", "strength", "material", "dump")
 TRIED = [(f, n) for f, n in STYLES if f in SCENE_FAMILIES]
 
 
 @pytest.mark.parametrize(("family", "name"), TRIED, ids=[f"{f}-{n}" for f, n in TRIED])
 def test_examples_of_styles_fit_their_signatures(family, name, tmp_path):
     """Each line of an example is right in at least one number of dimensions."""
-    first, *others = catalogue.help_of(family, name).example.splitlines()
-    for line in (first, *others):
+    lines = catalogue.help_of(family, name).example.splitlines()
+    for k, line in enumerate(lines):
         complaints = []
         for dimension in STAGES:
             try:
-                # A line about the log speaks of what the first one defines.
-                _tried([first, line] if line.startswith("log") else [line], dimension, tmp_path)
+                # A line about the log or a composed material speaks of what is defined above it.
+                above = lines[:k] if line.startswith(("log", "material")) else []
+                _tried([*above, line], dimension, tmp_path)
                 break
             except ScriptError as error:
                 complaints.append(f"{dimension}D: {error.render()}")

@@ -28,6 +28,8 @@ TITLES = {
     "dump": ("Dumps", "Files of snapshots: styles of [dump](command/dump.md)."),
     "region": ("Regions", "Parts of space: styles of [region](command/region.md)."),
     "solid": ("Solids", "Bodies of points: styles of [solid](command/solid.md)."),
+    "eos": ("Equations of state", "Pressure and density: styles of [eos](command/eos.md)."),
+    "strength": ("Strengths", "Deviatoric stress: styles of [strength](command/strength.md)."),
     "material": ("Materials", "Constitutive laws: styles of [material](command/material.md)."),
 }
 _CODE = re.compile(r"(``[^`]+``|`[^`]+`)")

@@ -2,7 +2,8 @@
 
 A law is a NamedTuple of parameters (its class is the tag). It owns a state, a flat tuple with as
 many numbers as it needs; kernels only load it, pass it on and store it. All tensors have the
-components of the kinematics `kin`; `j` = det F is the volume over the reference volume.
+components of the kinematics `kin`; `j` = det F is the volume over the reference volume. A law may
+be composed of parts, NamedTuples among its parameters (`eos_strength`).
 """
 
 from karamelo_py.compile import point_function
@@ -51,6 +52,11 @@ def energy_density(law, kin, state):
 @point_function()
 def elastic_strain(law, kin, state):
     """Elastic strain, for output."""
+
+
+@point_function()
+def plastic_strain(law, kin, state):
+    """Equivalent plastic strain, for output; left out by laws without."""
 
 
 @point_function()
