@@ -109,9 +109,9 @@ def axisymmetric(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    Needs two dimensions, no part of the domain below x = 0, and comes before the first solid. Points
-    carry the volume and mass of one radian: forces and energies of the whole body are 2 pi times
-    those of the log.
+    Needs two dimensions, no part of the domain below x = 0, and comes before the first solid.
+    Points carry the volume and mass of one radian: forces and energies of the whole body are 2 pi
+    times those of the log.
 
     See Also
     --------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 from karamelo_py import registry
 from karamelo_py.points.transfers.flip import FLIP
@@ -127,7 +127,7 @@ def _enhanced(transfer_class: type, argument: Argument) -> type:
 
 def _parameter(hub: Hub, transfer: type, name: str, words: list[Argument], call: str) -> Any:
     """The next number of a transfer: a share, or a whole number where the class says so."""
-    whole = transfer.__annotations__[name] in ("int", int)
+    whole = get_type_hints(transfer)[name] is int
     wanted = "a whole number from 1 to 20" if whole else "a number from 0 (PIC) to 1 (pure FLIP)"
     first_word = words[0].word() if words else None
     value = None
