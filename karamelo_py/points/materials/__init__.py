@@ -6,7 +6,37 @@ components of the kinematics `kin`; `j` = det F is the volume over the reference
 be composed of parts, NamedTuples among its parameters (`eos_strength`).
 """
 
+from typing import NamedTuple
+
 from karamelo_py.compile import point_function
+
+
+class Whole(NamedTuple):
+    """Tag of laws that have no parts."""
+
+
+@point_function()
+def separate(law):
+    """A tag that stands for the class of a law, and its parts, two at most.
+
+    Numba hands tuples of arrays to threads, but no tuples of such tuples: laws that are made of
+    parts cross one by one.
+    """
+
+
+@separate.otherwise
+def _(law):
+    return Whole(), law, ()
+
+
+@point_function()
+def assemble(tag, first, second):
+    """The law again from what `separate` returned."""
+
+
+@assemble.on(Whole)
+def _(tag, first, second):
+    return first
 
 
 @point_function()

@@ -23,6 +23,7 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.materials import (
     advance,
+    assemble,
     cauchy_stress,
     elastic_strain,
     energy_density,
@@ -30,6 +31,7 @@ from karamelo_py.points.materials import (
     jacobian,
     kirchhoff_stress,
     plastic_strain,
+    separate,
     specific_volume,
     wave_speed_squared,
     with_stress,
@@ -55,6 +57,20 @@ class EosStrength(NamedTuple):
 
     eos: Any  # parameters of an equation of state (karamelo_py.points.materials.eos)
     strength: Any  # parameters of a strength (karamelo_py.points.materials.strength)
+
+
+class EosStrengthParts(NamedTuple):
+    """Tag of the law while its parts travel one by one."""
+
+
+@separate.on(EosStrength)
+def _(law):
+    return EosStrengthParts(), law.eos, law.strength
+
+
+@assemble.on(EosStrengthParts)
+def _(tag, first, second):
+    return EosStrength(first, second)
 
 
 @initial_state.on(EosStrength)
