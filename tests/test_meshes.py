@@ -135,8 +135,8 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
     ("nodes", "cells", "says"),
     [
         (SQUARE, {"triangle6": [[0, 1, 2, 3, 0, 1]]}, "elements of type triangle6"),
-        (SQUARE, {"line": [[0, 1]]}, "no elements for 2D: it has elements of type line"),
-        (SQUARE, {"tetra": [[0, 1, 2, 3]]}, "no elements for 2D: it has elements of type tetra"),
+        (SQUARE, {"line": [[0, 1]]}, "does not fit 2D: it has elements of type line"),
+        (SQUARE, {"tetra": [[0, 1, 2, 3]]}, "does not fit 2D: it has elements of type tetra"),
         (SQUARE, {"quad": [[0, 1, 2, 3]], "triangle": [[0, 1, 2]]}, "have one shape"),
         (SQUARE, {"triangle": [[0, 1, 2], [0, 1, 1]]}, "element 2 of the 2 triangles with 3 nodes"),
         (SQUARE + [0, 0, 0.1], {"triangle": [[0, 1, 2]]}, "not lie in the plane z = 0"),
@@ -228,7 +228,7 @@ def test_a_geometry_and_its_groups(plate, name, capfd):
     assert set(caught.value.expected.removeprefix("one of ").split(", ")) == {
         "core", "rest", "both", "rim",
     }  # fmt: skip
-    with pytest.raises(ScriptError, match="group 'rim' has no elements for 2D"):
+    with pytest.raises(ScriptError, match="group 'rim' does not fit 2D"):
         solid_of(plate / name, 2, group="rim")
     assert capfd.readouterr() == ("", "")
 

@@ -56,7 +56,7 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
     hub.solids.add(ID, new)
 
 
-solid.syntax = "ID, region|mesh, ..."
+solid.syntax = "ID, region, regionID, ppc, material, h[, T0] | ID, mesh, file, material, h[, T0]"
 
 
 def group(

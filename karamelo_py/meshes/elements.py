@@ -116,7 +116,7 @@ def elements_of(
     if highest > dimension or (highest < dimension and not lower) or highest < 1:
         held = ", ".join(dict.fromkeys(name for name, _, _ in cells))
         raise ScriptError(
-            f"{of} has no elements for {dimension}D: it has elements of type {held}",
+            f"{of} does not fit {dimension}D: it has elements of type {held}",
             argument="file" if group is None else "group",
             expected=_accepted(dimension),
         )
