@@ -62,7 +62,7 @@ def mapped_again(basis, grid, moment):
 
 
 @mapped_again.otherwise
-def _(basis, moment):
+def _(basis, grid, moment):
     return moment
 
 
