@@ -91,6 +91,14 @@ def _basis(
     kind: str, method_class: type, basis: str, words: list[Argument]
 ) -> tuple[type, Argument | None]:
     """The class of the basis, and the option that chose the variant."""
+    if basis in (getattr(method_class, "variants", None) or ()):
+        numbers = "".join(f", {x.text}" for x in words if x.word() is None)
+        raise ScriptError(
+            f"{basis} is the shape of the domains, not a basis",
+            argument="basis",
+            expected=f"linear, and {basis} at the end: method({kind}, FLIP, linear"
+            f"{numbers or ', 1'}, {basis})",
+        )
     basis_class = registry.find("basis", basis)
     variants = _variants(method_class, basis_class)
     if getattr(method_class, "variants", None) and basis != "linear":
