@@ -77,6 +77,7 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
                 hint="another region for one of them, or region(ID, difference, ...)",
             )
     hub.solids.add(ID, new)
+    hub.update.method.welcome(hub, new)
 
 
 solid.syntax = "ID, region, regionID, ppc, material, h[, T0]"
