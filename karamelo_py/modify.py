@@ -51,6 +51,9 @@ class Fix:
         "s" and "" when a style does not say.
     first_step_only
         Whether it acts in the first step after its definition and is idle thereafter.
+    holds_nodes
+        Whether it prescribes velocities of the nodes of its group in ``post_update_grid_state``,
+        in the directions in which it has a formula: contact does not move them.
     puts_force_on_points
         Whether it sets forces on points in ``initial_integrate``, so that they have a field for it.
     id
@@ -61,6 +64,7 @@ class Fix:
     formulas: tuple = ()
     published: tuple[str, ...] = SUFFIXES
     first_step_only = False
+    holds_nodes = False
     puts_force_on_points = False
     id: str = ""
     style: str = ""

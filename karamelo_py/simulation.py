@@ -233,6 +233,7 @@ class Simulation:
         # Twice: initial values may be formulas of dt, and dt follows the fastest point.
         self._choose_dt()
         self._prepare_hooks()
+        update.method.begin(self.hub, self.setup.contact)
         self._choose_dt()
         control.whole[WATCH_LIMIT] = int(not self.above_limit())
         control.whole[OVER_LIMIT] = 0

@@ -160,6 +160,24 @@ def _add_to_optional(array, i, factor, values):
     return add
 
 
+def clear_optional(array, i):
+    """Set row `i` of an array that may be absent (None) to zero."""
+    if array is not None:
+        array[i, :] = 0
+
+
+@overload(clear_optional)
+def _clear_optional(array, i):
+    if isinstance(array, types.NoneType):
+        return lambda array, i: None
+
+    def clear(array, i):
+        for k in range(array.shape[1]):
+            array[i, k] = 0
+
+    return clear
+
+
 def put_from(array, i, first, values):
     """array[i, k] = values[k] for k >= first."""
     for k in range(first, len(values)):

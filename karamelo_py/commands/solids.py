@@ -54,6 +54,7 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
     new = signature.call(target, hub, list(arguments), f"solid {kind}")
     warn_of_coinciding(hub, new, ID)
     hub.solids.add(ID, new)
+    hub.update.method.welcome(hub, new)
 
 
 solid.syntax = "ID, region, regionID, ppc, material, h[, T0] | ID, mesh, file, material, h[, T0]"
