@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from math import atan, pi, radians
 
 import exact
 import fem
 import numpy as np
 import pytest
+from conftest import INPUTS
 
 # Sixth-order differences with steps of 4e-3 and 2e-3 on fields whose scale is 0.25 or more leave
 # about 1e-8 (truncation) and 1e-16/4e-3^2 = 1e-11 (round-off), relative to the largest force.
@@ -151,3 +153,42 @@ def test_published_curve_of_the_vertical_bar_is_deeper_than_a_clamped_one():
     published_time, published = exact.minimum(*exact.vertical_bar_curve())
     assert moment == pytest.approx(published_time, rel=0.02)
     assert depth == pytest.approx(published, rel=0.05)
+
+
+def printed(run_script, scene, kind, place, time, *formulas):
+    """Values of formulas of inputs/in.`scene` at a node: its assignments alone, with numbers."""
+    numbers = {"x0": place[0], "y0": place[1], "z0": place[-1], "time": time, "dt": 0}
+    text = (INPUTS / f"in.{scene}").read_text("utf-8")
+    lines = [line for line in text.splitlines() if re.match(r"\w+\s*=", line)]
+    for name, number in numbers.items():
+        # In front of a power a negative number needs its parentheses.
+        lines = [re.sub(rf"\b{name}\b", f"({number!r})", line) for line in lines]
+    script = "\n".join([*lines, *(f"print({formula})" for formula in formulas)])
+    out = run_script(script, "-var", "kind", kind, "-var", "G", "0.1").out
+    return [
+        float(line.rpartition("=")[2].split()[-1]) for line in out.splitlines()[-len(formulas) :]
+    ]
+
+
+# At nodes that stay, two Newton steps from a start within (pi G)^2 of X leave about 1e-6.
+AT_NODES = {"ulmpm": 1e-5, "tlmpm": 1e-12}
+
+
+@pytest.mark.parametrize("kind", ["ulmpm", "tlmpm"])
+@pytest.mark.parametrize(("scene", "d"), [("axis_aligned", 2), ("axis_aligned_3d", 3)])
+def test_axis_aligned_scripts_have_the_exact_source(run_script, kind, scene, d):
+    solution = exact.AxisAligned(d=d, G=0.1)
+    X, t = np.array([[0.31, 0.77, 0.4][:d]]), 0.11
+    place = X + solution.displacement(X, t) if kind == "ulmpm" else X
+    found = printed(run_script, scene, kind, place[0].tolist(), t, *("bx", "by", "bz")[:d])
+    assert found == pytest.approx(solution.body_force(X, t)[0], rel=AT_NODES[kind])
+
+
+@pytest.mark.parametrize("kind", ["ulmpm", "tlmpm"])
+def test_vortex_script_has_the_exact_source(run_script, kind):
+    solution = exact.Vortex(G=0.1)
+    X, t = np.array([[0.7, -0.6]]), 0.3
+    place = X + solution.displacement(X, t) if kind == "ulmpm" else X
+    source = ("br*ex - bt*ey", "br*ey + bt*ex")
+    found = printed(run_script, "vortex", kind, place[0].tolist(), t, *source)
+    assert found == pytest.approx(solution.body_force(X, t)[0], rel=AT_NODES[kind])

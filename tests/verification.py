@@ -96,12 +96,14 @@ def needs(*styles: tuple[str, str]):
     return pytest.mark.skipif(bool(missing), reason=f"{', '.join(missing)}: not there yet")
 
 
-def run_scene(run_script, scene: str, way: Way | None = LINEAR, **variables: Any) -> Result:
+def run_scene(
+    run_script, scene: str, way: Way | None = LINEAR, status: int = 0, **variables: Any
+) -> Result:
     """Run inputs/in.`scene` with a way and more variables, in a folder of its own."""
     words = {**(way.variables if way else {}), **variables}
     options = [part for name, value in words.items() for part in ("-var", name, str(value))]
     folder = "_".join([scene, *(str(value) for value in words.values())]).replace("/", "-")
-    return run_script(INPUTS / f"in.{scene}", *options, folder=folder)
+    return run_script(INPUTS / f"in.{scene}", *options, status=status, folder=folder)
 
 
 def last_dump(result: Result, name: str) -> Table:
