@@ -29,7 +29,6 @@ class Way:
     transfer: str = "FLIP"
     share: float = 1
     domains: str = "mechanical"
-    scheme: str = "musl"
 
     @property
     def name(self) -> str:
