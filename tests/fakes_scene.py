@@ -9,6 +9,8 @@ from typing import NamedTuple
 from karamelo_py.domain import Domain
 from karamelo_py.hub import Catalogue
 from karamelo_py.material import Material
+from karamelo_py.methods.base import Method
+from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.materials import specific_volume
 from karamelo_py.script.errors import Place
 from karamelo_py.script.values import Values
@@ -67,13 +69,17 @@ class FakeHub:
         self.materials.add("steel", FakeMaterial())
         self.rehearsing = self.checking = False
         self.warnings = []
-        self.update = SimpleNamespace(method=object())
+        self.update = SimpleNamespace(method=Method(self, Linear()))
         self.regions = Catalogue("region", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
         self.domain = (
             Domain(dimension, [lo] * dimension, [hi] * dimension, h) if dimension else None
         )
+
+    @property
+    def lattices(self):
+        return self.update.method.lattices(self)
 
     def warn(self, message, place=None, hint=None):
         self.warnings.append(message)

@@ -1,4 +1,4 @@
-"""method ulmpm/contacts: updated Lagrangian, a velocity field for each solid, contact on the grid."""
+"""method ulmpm/contacts: a velocity field for each solid, and contact on the grid."""
 
 from __future__ import annotations
 
