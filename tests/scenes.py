@@ -6,9 +6,17 @@ TRANSFERS = {
     "PIC": "PIC, linear",
     "FLIP": "FLIP, linear, 1",
     "FLIP 0.9": "FLIP, linear, 0.9",
-    "APIC": "APIC, linear",
+    "APIC": "APIC, quadratic-spline",
+    "AFLIP": "AFLIP, quadratic-spline, 1",
+    "ASFLIP": "ASFLIP, quadratic-spline, 1",
+    "MLS": "MLS, quadratic-spline",
+    "TPIC": "TPIC, quadratic-spline",
+    "XPIC": "XPIC, quadratic-spline, 3",
+    "TFLIP": "FLIP, quadratic-spline, 1, gradient-enhanced",
+    "FLIP quadratic": "FLIP, quadratic-spline, 1",
+    "FLIP cubic": "FLIP, cubic-spline, 1",
 }
-SCHEMES = ["musl", "usl", "usf"]
+SCHEMES = ["musl", "usl", "usf", "usavg"]
 LAWS = {
     "linear": "linear, 2, 100, 0.3",
     "rate=none": "linear, 2, 100, 0.3, rate=none",

@@ -116,9 +116,12 @@ def test_usl_keeps_the_two_disks_together(run_script):
     assert 0.9 * 2.6 < total[-1] < 2.6
 
 
-def test_affine_transfer_without_a_second_mapping_is_warned_of(run_interpreted):
-    assert "unstable" in run_interpreted(block(2, "run(1)", transfer="APIC", scheme="usl")).err
-    assert "unstable" not in run_interpreted(block(2, "run(1)", transfer="APIC")).err
+def test_affine_transfer_without_a_second_mapping_is_refused(run_interpreted):
+    text = block(2, "run(1)", transfer="FLIP", scheme="usl").replace(
+        "FLIP, linear, 1", "APIC, linear"
+    )
+    assert "is unstable" in run_interpreted(text, status=1).err
+    assert "unstable" not in run_interpreted(text.replace("scheme(usl)", "scheme(musl)")).err
 
 
 def test_a_hook_that_moves_points_moves_their_mass(tmp_path):

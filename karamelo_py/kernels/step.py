@@ -297,12 +297,18 @@ def map_to_nodes(s, mode, scatter):
 
 
 @shared
-def update_nodes(s, mode, hooks):
+def accelerate_nodes(s, mode, hooks):
     """v* = v + dt f / m, with what the fixes add and prescribe."""
     at_nodes(hooks, POST_PARTICLES_TO_GRID, ON_SUMS, s)
     sweep_nodes(mode, Update(), s.kin, s.nodes, s.spans, step_size(s))
     at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_UPDATE, s)
     touch(s.contact, s)
+
+
+@shared
+def update_nodes(s, mode, hooks):
+    """All of the nodes' update: what points gather is ready then."""
+    accelerate_nodes(s, mode, hooks)
     sum_series(s.transfer, s, mode)
 
 

@@ -19,6 +19,7 @@ from karamelo_py.kernels.stages import (
 from karamelo_py.kernels.step import (
     Fused,
     Staged,
+    accelerate_nodes,
     at_points,
     begin,
     light_node,
@@ -27,7 +28,7 @@ from karamelo_py.kernels.step import (
     step,
     step_size,
     strain,
-    update_nodes,
+    sum_series,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
 
@@ -59,8 +60,9 @@ def _(scheme, visits, mode, s):
 @step.on(USL, Fused)
 def _(scheme, visits, mode, s, hooks, more):
     dt = step_size(s)
-    update_nodes(s, mode, hooks)
+    accelerate_nodes(s, mode, hooks)
     sweep_nodes(mode, UpdateToVelocity(light_node(s)), s.kin, s.nodes, s.spans, dt)
+    sum_series(s.transfer, s, mode)
     if not more:
         return strain(s, mode, VelocityAndGradient(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
@@ -78,8 +80,9 @@ def _(scheme, visits, mode, s, hooks, more):
     at_points(hooks, INITIAL_INTEGRATE, 0, s)
     if not map_to_nodes(s, mode, Everything()):
         return False
-    update_nodes(s, mode, hooks)
+    accelerate_nodes(s, mode, hooks)
     sweep_nodes(mode, UpdateToVelocity(light_node(s)), s.kin, s.nodes, s.spans, dt)
+    sum_series(s.transfer, s, mode)
     if not move_points(s, mode, hooks):
         return False
     if not strain(s, mode, Gradient(), Nothing(), dt):
