@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -152,12 +153,14 @@ class CPGIMP(NamedTuple):
     least_nodes = 4
     steady_moment = True
 
-    variants: ClassVar[dict[str, type]] = {
-        "det": CPGIMPDet,
-        "diagonal": CPGIMPDiagonal,
-        "stretch": CPGIMPStretch,
-        "corners": CPGIMPCorners,
-    }
+    variants = MappingProxyType(
+        {
+            "det": CPGIMPDet,
+            "diagonal": CPGIMPDiagonal,
+            "stretch": CPGIMPStretch,
+            "corners": CPGIMPCorners,
+        }
+    )
     default_variant = "stretch"
 
 
