@@ -84,14 +84,21 @@ def _row(array, i, first, like):
 
 
 def record(table, i):
-    """A NamedTuple of arrays, seen at index `i`: the same NamedTuple of scalars."""
-    return type(table)(*(column[i] for column in table))
+    """A NamedTuple of arrays, seen at index `i`: the same NamedTuple of scalars.
+
+    NamedTuples of arrays in it become NamedTuples of scalars, too.
+    """
+    return type(table)(*(record(c, i) if isinstance(c, tuple) else c[i] for c in table))
 
 
 @overload(record)
 def _record(table, i):
-    columns = ", ".join(f"table[{k}][i]" for k in range(len(table)))
-    return define("table, i", f"return make({columns})", make=table.instance_class)
+    terms = [
+        f"record(table[{k}], i)" if isinstance(column, types.BaseNamedTuple) else f"table[{k}][i]"
+        for k, column in enumerate(table)
+    ]
+    made = f"return make({', '.join(terms)})"
+    return define("table, i", made, make=table.instance_class, record=record)
 
 
 def optional_row(array, i, like):
@@ -151,6 +158,24 @@ def _add_to_optional(array, i, factor, values):
             array[i, k] = fma(factor, values[k], array[i, k])
 
     return add
+
+
+def clear_optional(array, i):
+    """Set row `i` of an array that may be absent (None) to zero."""
+    if array is not None:
+        array[i, :] = 0
+
+
+@overload(clear_optional)
+def _clear_optional(array, i):
+    if isinstance(array, types.NoneType):
+        return lambda array, i: None
+
+    def clear(array, i):
+        for k in range(array.shape[1]):
+            array[i, k] = 0
+
+    return clear
 
 
 def put_from(array, i, first, values):

@@ -9,10 +9,12 @@ from typing import NamedTuple
 from karamelo_py.domain import Domain
 from karamelo_py.hub import Catalogue
 from karamelo_py.material import Material
+from karamelo_py.methods.base import Method
+from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.materials import specific_volume
 from karamelo_py.script.errors import Place
 from karamelo_py.script.values import Values
-from karamelo_py.solid import Solid
+from karamelo_py.solids.region import RegionSolid
 
 DENSITY = 1000.0
 
@@ -67,13 +69,17 @@ class FakeHub:
         self.materials.add("steel", FakeMaterial())
         self.rehearsing = self.checking = False
         self.warnings = []
-        self.update = SimpleNamespace(method=object())
+        self.update = SimpleNamespace(method=Method(self, Linear()))
         self.regions = Catalogue("region", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
         self.domain = (
             Domain(dimension, [lo] * dimension, [hi] * dimension, h) if dimension else None
         )
+
+    @property
+    def lattices(self):
+        return self.update.method.lattices(self)
 
     def warn(self, message, place=None, hint=None):
         self.warnings.append(message)
@@ -89,5 +95,6 @@ class FakeHub:
     def solid(self, ID, region, ppc=2, h=None, **options):
         """Make and file a solid."""
         return self.solids.add(
-            ID, Solid(self, region, ppc, self.materials["steel"], h or self.domain.h, **options)
+            ID,
+            RegionSolid(self, region, ppc, self.materials["steel"], h or self.domain.h, **options),
         )

@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 
 from karamelo_py.lattice import Lattice
 from karamelo_py.points.basis import (
     affine_weight,
-    carried,
-    carrier,
-    carriers,
-    carry,
-    deformed,
     entry,
     extent,
     locate,
@@ -140,7 +134,7 @@ def test_corners_beyond_the_grid(basis, kin, seed, push):
     axis = push % d
     to = (LO if push < d else HI)[axis]
     shift = to - place[axis]
-    place[axis :: d][: None if basis not in (R4, R8) else 1] += shift
+    place[axis::d][: None if basis not in (R4, R8) else 1] += shift
     _, nodes, weights, gradients = stencil_of(basis, kin, grid, tuple(place))
     assert (nodes >= 0).all()
     assert (nodes < lattice(kin).node_count).all()

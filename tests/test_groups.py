@@ -64,7 +64,7 @@ def test_nodes_in_a_box_are_all_nodes_in_it(dimension, exterior):
     hub = FakeHub(dimension, 0, 1, 0.15)
     region = hub.region("r", Block, *[0.3, 0.75] * dimension, *exterior)
     group(hub, "g", "nodes", "region", region, "all")
-    want = np.flatnonzero(region.inside(hub.domain.node_positions()))
+    want = np.flatnonzero(region.inside(hub.lattices[0].positions()))
     np.testing.assert_array_equal(hub.groups["g"].nodes, want)
     assert len(want)
 

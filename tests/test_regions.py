@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from karamelo_py.commands import domain as commands
 from karamelo_py.domain import Domain
+from karamelo_py.lattice import Lattice
 from karamelo_py.regions.block import Block
 from karamelo_py.regions.cylinder import Cylinder
 from karamelo_py.regions.difference import Difference
@@ -39,16 +40,16 @@ def test_dimension_sets_box_and_grid():
 
 
 def test_node_counts_of_the_reference():
-    assert Domain(2, [0, 0], [0.4, 0.4], 0.1).node_count == 25
-    assert Domain(3, [0, 0, 0], [0.4, 0.4, 0.4], 0.1).node_count == 125
+    assert Lattice(2, [0, 0], [0.4, 0.4], 0.1).node_count == 25
+    assert Lattice(3, [0, 0, 0], [0.4, 0.4, 0.4], 0.1).node_count == 125
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_node_positions_have_z_fastest(dimension):
-    domain = Domain(dimension, [1.0] * dimension, [2.0, 1.5, 1.75][:dimension], 0.25)
-    x = domain.node_positions()
-    assert x.shape == (domain.node_count, 3)
-    _, ny, nz = domain.shape
+    lattice = Lattice(dimension, [1.0] * dimension, [2.0, 1.5, 1.75][:dimension], 0.25)
+    x = lattice.positions()
+    assert x.shape == (lattice.node_count, 3)
+    _, ny, nz = lattice.shape
     index = (3 * ny + min(1, ny - 1)) * nz + min(2, nz - 1)
     want = np.array([1.75, 1.25, 1.5])
     np.testing.assert_allclose(x[index][:dimension], want[:dimension])

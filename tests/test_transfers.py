@@ -6,102 +6,198 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tensors import KINEMATICS, numbers, tensors
-from test_basis import LO, fractions, made, place, stencil_of
+from tensors import ALL_KINEMATICS, numbers, tensors
 
-from karamelo_py.points.basis import affine_weight, reach, support
+from karamelo_py.lattice import Lattice
+from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
+from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
+from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
+from karamelo_py.points.kinematics import planar
 from karamelo_py.points.transfers import (
     add_moment,
     add_momentum,
+    displacing_velocity,
+    gradient_weight,
+    terms,
     updated_velocity,
     zero_moment,
 )
+from karamelo_py.points.transfers.aflip import AFLIP
 from karamelo_py.points.transfers.apic import APIC
+from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.points.transfers.flip import FLIP
+from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
+from karamelo_py.points.transfers.tflip import TFLIP
+from karamelo_py.points.transfers.tpic import TPIC
+from karamelo_py.points.transfers.xpic import XPIC
 
-every_kinematics = pytest.mark.parametrize("kin", KINEMATICS, ids=lambda kin: type(kin).__name__)
-every_transfer = pytest.mark.parametrize(
-    "transfer", [PIC(), FLIP(1.0), FLIP(0.4), APIC()], ids=lambda transfer: str(transfer)
-)
+LO, H, CELLS = (0.0, 0.5, -2.0), 0.15, (7, 4, 5)
+AFFINE = [APIC(), AFLIP(0.9), ASFLIP(0.9), MLS()]
+TAYLOR = [TPIC(), TFLIP(0.9)]
+PLAIN = [PIC(), FLIP(1.0), FLIP(0.4), XPIC(3)]
+
+
+def over(name, values, text=lambda value: type(value).__name__):
+    return pytest.mark.parametrize(name, values, ids=text)
+
+
+every_kinematics = over("kin", ALL_KINEMATICS)
+every_basis = over("basis", [Linear(), QuadraticSpline(), CubicSpline()])
+everywhere = st.one_of(st.sampled_from([0.0, 1.0, 0.5]), st.floats(0, 1))
+# Where D does not vanish: affine fields are then taken exactly.
+inner = st.floats(0.01, 0.99)
+
+
+def position(kin, fractions):
+    """A position in the box."""
+    parts = zip(LO, CELLS, fractions, strict=True)
+    return tuple(lo + f * n * H for lo, n, f in parts)[: kin.dimension]
+
+
+class Met:
+    """A point at `x` and the nodes it sees."""
+
+    def __init__(self, basis, kin, x):
+        d = kin.dimension
+        hi = [lo + n * H for lo, n in zip(LO, CELLS, strict=True)]
+        lattice = Lattice(d, LO, hi, H, type(basis).nodes_per_cell, type(basis).least_nodes)
+        self.basis, self.kin, self.grid = basis, kin, lattice.numbers(float)
+        self.stencil = locate(basis, kin, self.grid, x)
+        entries = [entry(basis, kin, self.grid, self.stencil, k) for k in self.count]
+        nodes, weights, gradients = zip(*entries, strict=True)
+        self.weights, self.gradients = np.array(weights), np.array(gradients)
+        self.x = np.array(x)
+        self.positions = lattice.positions()[np.array(nodes)][:, :d]
+        self.arms = self.each(reach)
+        self.spread = (self.weights[:, None] * self.arms).T @ self.arms  # D
+
+    @property
+    def count(self):
+        return range(support(self.basis, self.kin))
+
+    def each(self, function):
+        """A function of the k-th node, for all of them."""
+        return np.array(
+            [function(self.basis, self.kin, self.grid, self.stencil, k) for k in self.count]
+        )
+
+    def given(self, transfer, mass, v, moment):
+        """Momentum (n, d) that the nodes get."""
+        start = (0.0,) * len(v)
+        return np.array(
+            [
+                add_momentum(
+                    transfer, self.kin, self.basis, self.grid, self.stencil, k, self.weights[k],
+                    mass, v, moment, start,
+                )
+                for k in self.count
+            ]
+        )  # fmt: skip
+
+    def taken(self, transfer, field):
+        """What the point keeps of the nodal velocity `field` (n, d)."""
+        moment = zero_moment(transfer, self.kin, 1.0)
+        for k in self.count:
+            moment = add_moment(
+                transfer, self.kin, self.basis, self.grid, self.stencil, k, self.weights[k],
+                tuple(self.gradients[k]), tuple(field[k]), moment,
+            )  # fmt: skip
+        return moment
 
 
 def test_definitions():
     """v_p = (1 - alpha) v_pic + alpha (v_p + dv); alpha = 0 is PIC (Brackbill & Ruppel 1986)."""
     v, v_pic, dv = (1.0, 2.0), (3.0, 4.0), (0.1, 0.2)
-    assert updated_velocity(PIC(), v, v_pic, dv) == v_pic
-    assert updated_velocity(APIC(), v, v_pic, dv) == v_pic
+    for transfer in (PIC(), APIC(), MLS(), TPIC()):
+        assert updated_velocity(transfer, v, v_pic, dv) == v_pic
     assert updated_velocity(FLIP(1.0), v, v_pic, dv) == pytest.approx((1.1, 2.2))
     assert updated_velocity(FLIP(0.0), v, v_pic, dv) == pytest.approx(v_pic)
     mixed = (0.4 * 1.1 + 0.6 * 3, 0.4 * 2.2 + 0.6 * 4)
-    assert updated_velocity(FLIP(0.4), v, v_pic, dv) == pytest.approx(mixed)
+    for transfer in (FLIP(0.4), AFLIP(0.4), ASFLIP(0.4), TFLIP(0.4)):
+        assert updated_velocity(transfer, v, v_pic, dv) == pytest.approx(mixed)
+    assert displacing_velocity(FLIP(0.4), v, v_pic) == v_pic
+    assert displacing_velocity(ASFLIP(0.4), v, v_pic) == v  # Fei et al. 2021
+    assert (terms(FLIP(1.0)), terms(XPIC(5))) == (1, 5)
 
 
-def scattered(transfer, kin, x, mass, v, moment):
-    """Positions (n, d) and momentum (n, d) of the nodes of a point, and its stencil."""
-    domain, basis = made(Linear, kin)
-    stencil, nodes, weights, _ = stencil_of(basis, kin, x)
-    momentum = [
-        add_momentum(
-            transfer, kin, basis, stencil, k, weights[k] * mass, mass, v, moment, (0.0,) * len(v)
-        )
-        for k in range(support(basis, kin))
-    ]
-    return domain.node_positions()[nodes][:, : kin.dimension], np.array(momentum), basis, stencil
-
-
-@every_transfer
+@over("transfer", [*PLAIN, *AFFINE, *TAYLOR], str)
+@every_basis
 @every_kinematics
 @given(data=st.data())
-def test_linear_momentum_is_given_whole(transfer, kin, data):
-    """sum_I p_I = m v, whatever the moment of velocity."""
-    x = place(kin, data.draw(st.tuples(fractions, fractions, fractions)))
+def test_linear_momentum_is_given_whole(transfer, basis, kin, data):
+    """sum_I p_I = m v, whatever the point keeps beside its velocity."""
+    x = position(kin, data.draw(st.tuples(everywhere, everywhere, everywhere)))
     v = data.draw(numbers(kin.dimension))
-    moment = data.draw(tensors(kin)) if transfer.keeps_moment else ()
-    _, momentum, _, _ = scattered(transfer, kin, x, 2.5, v, moment)
-    assert momentum.sum(axis=0) == pytest.approx(2.5 * np.array(v), abs=1e-12)
+    moment = data.draw(tensors(planar(kin))) if transfer.keeps_moment else ()
+    momentum = Met(basis, kin, x).given(transfer, 2.5, v, moment)
+    assert momentum.sum(axis=0) == pytest.approx(2.5 * np.array(v), abs=1e-11)
 
 
+@over("transfer", AFFINE, str)
+@every_basis
 @every_kinematics
 @given(data=st.data())
-def test_apic_gives_its_angular_momentum_whole(kin, data):
+def test_affine_transfers_give_their_angular_momentum_whole(transfer, basis, kin, data):
     """sum_I (X_I - x) p_I^T = m B^T: the moment arrives at the nodes (Jiang et al. 2017)."""
-    x = place(kin, data.draw(st.tuples(fractions, fractions, fractions)))
+    x = position(kin, data.draw(st.tuples(inner, inner, inner)))
     d = kin.dimension
-    v, moment = data.draw(numbers(d)), data.draw(tensors(kin))
-    positions, momentum, _, _ = scattered(APIC(), kin, x, 2.5, v, moment)
-    arms = positions - np.array(x)
-    assert momentum.T @ arms == pytest.approx(2.5 * np.reshape(moment, (d, d)), abs=1e-12)
+    v, moment = data.draw(numbers(d)), data.draw(tensors(planar(kin)))
+    met = Met(basis, kin, x)
+    momentum = met.given(transfer, 2.5, v, moment)
+    assert momentum.T @ met.arms == pytest.approx(2.5 * np.reshape(moment, (d, d)), abs=1e-11)
 
 
+@over("transfer", [*AFFINE, *TAYLOR], str)
+@every_basis
 @every_kinematics
 @given(data=st.data())
-def test_apic_takes_an_affine_field_as_it_is(kin, data):
-    """From the nodal field v + C (X - x) a point gathers v and B = C D, and gives it back."""
+def test_an_affine_field_is_taken_and_given_as_it_is(transfer, basis, kin, data):
+    """The nodal field v + C (X - x) comes back from the point exactly: mass times weight times it.
+
+    The affine transfers keep B = C D of it, the Taylor transfers C itself.
+    """
     d = kin.dimension
-    inner = st.floats(0.01, 0.99)
-    x = place(kin, data.draw(st.tuples(inner, inner, inner)))
-    v, c = np.array(data.draw(numbers(d))), np.reshape(data.draw(tensors(kin)), (d, d))
-    _, basis = made(Linear, kin)
-    stencil, _, weights, _ = stencil_of(basis, kin, x)
-    arms = np.array([reach(basis, kin, stencil, k) for k in range(len(weights))])
-    field = v + arms @ c.T
-    moment = zero_moment(APIC(), kin, 1.0)
-    for k, weight in enumerate(weights):
-        moment = add_moment(APIC(), kin, basis, stencil, k, weight, tuple(field[k]), moment)
-    spread = (weights[:, None] * arms).T @ arms  # D
-    assert np.reshape(moment, (d, d)) == pytest.approx(c @ spread, abs=1e-12)
-    _, momentum, _, _ = scattered(APIC(), kin, x, 1.0, tuple(v), moment)
-    assert momentum == pytest.approx(weights[:, None] * field, abs=1e-12)
-    affine = np.array([affine_weight(basis, kin, stencil, k) for k in range(len(weights))])
-    assert np.isfinite(affine).all()
+    x = position(kin, data.draw(st.tuples(inner, inner, inner)))
+    v, c = np.array(data.draw(numbers(d))), np.reshape(data.draw(tensors(planar(kin))), (d, d))
+    met = Met(basis, kin, x)
+    field = v + met.arms @ c.T
+    kept = met.taken(transfer, field)
+    expected = c @ met.spread if transfer in AFFINE else c
+    assert np.reshape(kept, (d, d)) == pytest.approx(expected, abs=1e-11)
+    momentum = met.given(transfer, 1.0, tuple(v), kept)
+    assert momentum == pytest.approx(met.weights[:, None] * field, abs=1e-11)
 
 
+@every_basis
 @every_kinematics
-def test_apic_on_a_node_stays_finite(kin):
-    """There D of the hat functions vanishes, but N D^-1 (X - x) does not need its inverse."""
+@given(data=st.data())
+def test_mls_takes_the_gradient_of_an_affine_field(basis, kin, data):
+    """sum_I v_I (x) N_I D^-1 (X_I - x) = C of the field v + C (X - x) (Hu et al. 2018)."""
+    d = kin.dimension
+    x = position(kin, data.draw(st.tuples(inner, inner, inner)))
+    c = np.reshape(data.draw(tensors(planar(kin))), (d, d))
+    met = Met(basis, kin, x)
+    field = 0.3 + met.arms @ c.T
+    weights = np.array(
+        [
+            gradient_weight(MLS(), basis, kin, met.grid, met.stencil, k, tuple(met.gradients[k]))
+            for k in met.count
+        ]
+    )
+    assert field.T @ weights[:, :d] == pytest.approx(c, abs=1e-9)
+    # The hoop part N / r of axisymmetric gradients is the same as ever.
+    assert weights[:, d:] == pytest.approx(met.gradients[:, d:])
+
+
+@over("transfer", [*AFFINE, *TAYLOR], str)
+@every_basis
+@every_kinematics
+def test_on_a_wall_all_stays_finite(transfer, basis, kin):
+    """There D vanishes; N D^-1 (X - x) has a limit."""
     x = tuple(LO[: kin.dimension])
-    moment = tuple(0.1 for _ in range(kin.tensor_size))
-    _, momentum, _, _ = scattered(APIC(), kin, x, 1.0, (1.0,) * kin.dimension, moment)
-    assert np.isfinite(momentum).all()
+    moment = tuple(0.1 for _ in range(planar(kin).tensor_size))
+    met = Met(basis, kin, x)
+    assert np.isfinite(met.given(transfer, 1.0, (1.0,) * kin.dimension, moment)).all()
+    assert np.isfinite(met.each(affine_weight)).all()

@@ -51,6 +51,7 @@ class VelocityNodes(Fix):
 
     syntax = "group, vx[, vy[, vz]]"
     published = ("x", "y", "z")
+    holds_nodes = True
 
     post_update_grid_state = node_hook(prescribe, uses_before=True)
     post_velocities_to_grid = node_hook(hold, publishes=False)

@@ -70,6 +70,7 @@ from karamelo_py.tensors import (
     add_row,
     add_scaled,
     add_to_optional,
+    clear_optional,
     optional_row,
     put_at,
     put_from,
@@ -740,7 +741,7 @@ def _(scatter, w, stencil, k, burden):
 
 
 class ClearSums(NamedTuple):
-    """Mass, momentum and force of the nodes start from zero."""
+    """Mass, momentum, force and normal of the nodes start from zero."""
 
 
 class ClearVelocity(NamedTuple):
@@ -799,6 +800,7 @@ def at_node(task, kin, nodes, n, dt):
 def _(task, kin, nodes, n, dt):
     for k in range(1 + 2 * dimension(kin)):
         nodes.sums[n, k] = 0
+    clear_optional(nodes.normal, n)
 
 
 @at_node.on(ClearVelocity)

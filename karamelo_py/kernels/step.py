@@ -317,6 +317,16 @@ def _(contact, s):
 
 
 @point_function()
+def touch_velocity(contact, s):
+    """The same for the velocity that deforms the points, where it has been mapped on its own."""
+
+
+@touch_velocity.otherwise
+def _(contact, s):
+    return None
+
+
+@point_function()
 def sum_series(transfer, s, mode):
     """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
 

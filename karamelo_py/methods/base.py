@@ -32,8 +32,6 @@ class Method:
         The basis' tag.
     frame
         Whether weights belong to present or reference positions.
-    contact
-        How solids with velocity fields of their own touch.
     own_grids
         Whether every solid has a grid of its own, laid over its own box with its own cell size.
     fields_per_solid
@@ -46,7 +44,16 @@ class Method:
 
     def __init__(self, hub: Hub, basis: NamedTuple):
         self.basis = basis
-        self.contact: NamedTuple = NoContact()
+
+    def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
+        """How solids with velocity fields of their own touch: a tag with what that takes."""
+        return NoContact()
+
+    def begin(self, hub: Hub, contact: NamedTuple) -> None:
+        """Before every run: bring what `contact_between` made up to date with the fixes."""
+
+    def welcome(self, hub: Hub, solid: Solid) -> None:
+        """A solid has been defined."""
 
     def lattices(self, hub: Hub) -> list[Lattice]:
         """The grids of the scene, in the order of their nodes."""

@@ -33,6 +33,7 @@ from karamelo_py.kernels.step import (
     strain,
     sweep,
     sweep_here,
+    touch_velocity,
     update_nodes,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
@@ -75,6 +76,7 @@ def _(scheme, visits, mode, s, hooks, more):
         return False
     sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
+    touch_velocity(s.contact, s)
     if not more:
         return strain(s, mode, Gradient(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
@@ -99,6 +101,7 @@ def _(scheme, visits, mode, s, hooks, more):
     sweep_here(s, mode, Nothing(), Momentum(), dt)
     sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
+    touch_velocity(s.contact, s)
     if not strain(s, mode, Gradient(), Nothing(), dt):
         return False
     at_points(hooks, FINAL_INTEGRATE, 1, s)

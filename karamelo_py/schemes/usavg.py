@@ -38,6 +38,7 @@ from karamelo_py.kernels.step import (
     strain,
     sweep,
     sweep_here,
+    touch_velocity,
     update_nodes,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
@@ -86,6 +87,7 @@ def _half_first(s, mode, hooks, half):
     """From the momentum on the nodes to v*, by way of half of the strain."""
     sweep_nodes(mode, SumsToVelocity(), s.kin, s.nodes, s.spans, half)
     at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_VELOCITY, s)
+    touch_velocity(s.contact, s)
     if not strain(s, mode, Gradient(), Force(), half):
         return False
     update_nodes(s, mode, hooks)
@@ -97,6 +99,7 @@ def _half_first(s, mode, hooks, half):
 def _remap(s, mode, hooks, half):
     sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, half)
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
+    touch_velocity(s.contact, s)
 
 
 @step.on(USAVG, Fused)

@@ -32,6 +32,7 @@ from karamelo_py.kernels.step import (
     step_size,
     strain,
     sweep,
+    touch_velocity,
     update_nodes,
 )
 from karamelo_py.kernels.sweep import sweep_nodes
@@ -69,6 +70,7 @@ def _stress_first(s, mode, hooks):
     dt = step_size(s)
     sweep_nodes(mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_VELOCITY, s)
+    touch_velocity(s.contact, s)
     if not strain(s, mode, Gradient(), Force(), dt):
         return False
     update_nodes(s, mode, hooks)

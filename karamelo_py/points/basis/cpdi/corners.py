@@ -289,9 +289,7 @@ def farthest(kin, place):
 def _farthest(kin, place):
     d = kin.instance_class.dimension
     lines = [f"far = abs(place[{d}] - place[0])"]
-    lines += [
-        f"far = max(abs(place[{k}] - place[{k % d}]), far)" for k in range(d + 1, len(place))
-    ]
+    lines += [f"far = max(abs(place[{k}] - place[{k % d}]), far)" for k in range(d + 1, len(place))]
     return define("kin, place", *lines, "return far")
 
 
@@ -418,8 +416,6 @@ def register_carried(basis: type, d: int, corners: int) -> None:
 
     zeros = "zero, " * (d * corners)
     own = "".join(f"x[{k}], " for k in range(d))
-    blanked = define(
-        "basis, kin, x", "zero = real(0, x[0])", f"return ({own}{zeros})", real=real
-    )
+    blanked = define("basis, kin, x", "zero = real(0, x[0])", f"return ({own}{zeros})", real=real)
     for kin_class in KINEMATICS[d]:
         blank.on(basis, kin_class)(blanked)

@@ -65,7 +65,12 @@ def _at_gauss(a, b, c, d):
     near, far = real(NEAR, a[0]), real(FAR, a[0])
     e, f = _mix(near, a, far, b), _mix(far, a, near, b)
     g, h = _mix(near, c, far, d), _mix(far, c, near, d)
-    return _mix(near, e, far, g), _mix(near, f, far, h), _mix(far, e, near, g), _mix(far, f, near, h)
+    return (
+        _mix(near, e, far, g),
+        _mix(near, f, far, h),
+        _mix(far, e, near, g),
+        _mix(far, f, near, h),
+    )
 
 
 @shared

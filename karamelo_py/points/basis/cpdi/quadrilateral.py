@@ -70,7 +70,9 @@ def _(basis, kin, place):
     ax, ay, bx, by = x2 - x1, y2 - y1, x3 - x2, y3 - y2
     cx, cy, dx, dy = x4 - x3, y4 - y3, x1 - x4, y1 - y4
     # Jacobians at the corners, from the edges that meet there.
-    least = min(min(ax * by - bx * ay, bx * cy - cx * by), min(cx * dy - dx * cy, dx * ay - ax * dy))
+    least = min(
+        min(ax * by - bx * ay, bx * cy - cx * by), min(cx * dy - dx * cy, dx * ay - ax * dy)
+    )
     return least > 0
 
 
