@@ -6,10 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import njit
+from states import final_hub, final_state, same_bits
 
 from karamelo_py.lattice import Lattice
 from karamelo_py.points.basis import (
     affine_weight,
+    carried,
+    carrier,
+    carriers,
+    carry,
+    deformed,
     entry,
     extent,
     locate,
@@ -295,9 +302,41 @@ def test_one_dimension(run_interpreted):
     assert "cpgimp" in run_interpreted(script, status=1).err
 
 
-# Domains that reach several cells: fast strains in a body of few points, tiles of one or two cells.
-STRETCHED = (
-    "fix(v, initial_velocity_particles, all, 8*(x0-0.6), 2*sin(5*x0))",
-    "dt_factor(0.3)",
-)
-LONG = {"size": "0.4, 0.8, 0.4, 0.9", "ppc": 1}
+# A body of 4 x 4 points that is torn apart almost freely: domains come to reach three cells.
+TORN = """
+method(ulcpdi, FLIP, linear, 1, {})
+dimension(2, 0, 6, 0, 2, 0.1)
+region(box, block, 2.8, 3.2, 0.8, 1.2)
+material(putty, linear, 1, 1e-3, 0.3)
+solid(body, region, box, 1, putty, 0.1, 0)
+fix(v, initial_velocity_particles, all, 8*(x0-3), 0.3*sin(9*x0))
+dt_factor(0.3)
+set_output(1000)
+"""
+
+
+def test_tiles_grow_with_domains(tmp_path, monkeypatch):
+    """Domains stretch to six times their length: tiles become larger before they touch.
+
+    One thread and two, and a run in pieces, give the same bits.
+    """
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "in.script"
+
+    def run(threads, *lines):
+        path.write_text("\n".join([TORN.format("Q4"), *lines]), encoding="utf-8")
+        state = final_state(path, threads)
+        return final_hub(path, threads).simulation.tiles, state
+
+    tiles, whole = run(1, "run(45)")
+    assert tiles.size == 16  # 8 at first
+    reach = np.abs(whole["x"][:, 2::2] - whole["x"][:, :1]).max() / 0.1
+    assert 2.5 < reach < 4
+    assert same_bits(whole, run(2, "run(45)")[1])
+    assert same_bits(whole, run(1, "run(20)", "run(25)")[1])
+
+
+def test_torn_apart_in_any_way(state_interpreted):
+    """The same with edges instead of corners, interpreted: in pieces and whole."""
+    whole = state_interpreted(TORN.format("R4") + "run(45)")
+    assert same_bits(whole, state_interpreted(TORN.format("R4") + "run(20)\nrun(25)"))
