@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from karamelo_py.kernels.step import ABOVE_LIMIT
+from karamelo_py.points.basis import carried, extent
 from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.tensors import record
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
+    from karamelo_py.kernels.arrays import Block
     from karamelo_py.simulation import Simulation
 
 LAST_GOOD = "last_good.*.LAMMPS"
@@ -114,10 +117,29 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
             f"{name} at {_place(old)} moves by {move:.3g} cells in one step",
             f"the run is unstable: {smaller}",
         )
+    tangled = _tangled(simulation, block, p)
+    if tangled is not None:
+        plain = "R4" if d == 2 else "R8"
+        instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
+        return (
+            f"the domain of {name} at {_place(old)} is tangled: one of its corners folds over",
+            f"finer points, so that the corners of a domain move more alike{instead}, or method "
+            f"tlcpdi, whose domains keep their shape; or {smaller}",
+        )
     return (
         f"{name} at {_place(old)} is turned inside out (det F <= 0)",
         f"{smaller}, or a finer grid, or a law that resists the compression (neo-hookean)",
     )
+
+
+def _tangled(simulation: Simulation, block: Block, p: int) -> str | None:
+    """The name of the basis where the domain of a point, whose corners move, is folded over."""
+    s = simulation.setup
+    if not s.frame.moves or carried(s.basis, s.kin) == 0:
+        return None
+    grid = record(s.grids, int(block.grid[p]))
+    place = tuple(float(a) for a in block.x[1 - simulation.now][p])
+    return None if np.isfinite(extent(s.basis, s.kin, grid, place)) else type(s.basis).__name__
 
 
 def _smaller_step(hub: Hub, simulation: Simulation) -> str:

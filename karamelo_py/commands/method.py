@@ -52,6 +52,7 @@ def method(hub: Hub, kind: str, transfer: str, basis: str, *options: Argument) -
     method_class = registry.find("method", kind)
     transfer_class = registry.find("transfer", transfer)
     words = list(options)
+    _refuse_shape(kind, transfer_class, method_class, basis, words)
     parameters = [
         _parameter(hub, transfer_class, name, words, f"method({kind}, {transfer}, {basis}")
         for name in transfer_class._fields
@@ -87,18 +88,25 @@ def _variants(method_class: type, basis_class: type) -> dict[str, type]:
     return getattr(method_class, "variants", None) or getattr(basis_class, "variants", {})
 
 
+def _refuse_shape(
+    kind: str, transfer_class: type, method_class: type, basis: str, words: list[Argument]
+) -> None:
+    """The shape of the domains in the place of the basis, as older scripts have it."""
+    if basis not in (getattr(method_class, "variants", None) or ()):
+        return
+    numbers = [x.text for x in words if x.word() is None] or ["1"] * len(transfer_class._fields)
+    form = ", ".join([kind, transfer_class.__name__, "linear", *numbers, basis])
+    raise ScriptError(
+        f"'{basis}' is the shape of the domains, not a basis",
+        argument="basis",
+        expected=f"linear, and the shape at the end: method({form})",
+    )
+
+
 def _basis(
     kind: str, method_class: type, basis: str, words: list[Argument]
 ) -> tuple[type, Argument | None]:
     """The class of the basis, and the option that chose the variant."""
-    if basis in (getattr(method_class, "variants", None) or ()):
-        numbers = "".join(f", {x.text}" for x in words if x.word() is None)
-        raise ScriptError(
-            f"{basis} is the shape of the domains, not a basis",
-            argument="basis",
-            expected=f"linear, and {basis} at the end: method({kind}, FLIP, linear"
-            f"{numbers or ', 1'}, {basis})",
-        )
     basis_class = registry.find("basis", basis)
     variants = _variants(method_class, basis_class)
     if getattr(method_class, "variants", None) and basis != "linear":

@@ -340,6 +340,11 @@ def register(basis: type, d: int, corners: int) -> None:
     """
     nodes = 2**d
 
+    @carrier.on(basis)
+    def _(basis, kin, grid, stencil, corner, j):
+        at = stencil[0][corner]
+        return node(kin, grid, at[0], j), hat(kin, at[1], j)
+
     for kin_class in KINEMATICS[d]:
         locate.on(basis, kin_class)(stencil_of)
 
@@ -398,11 +403,6 @@ def register_carried(basis: type, d: int, corners: int) -> None:
     @carriers.on(basis)
     def _(basis, kin):
         return nodes
-
-    @carrier.on(basis)
-    def _(basis, kin, grid, stencil, corner, j):
-        at = stencil[0][corner]
-        return node(kin, grid, at[0], j), hat(kin, at[1], j)
 
     @carry.on(basis)
     def _(basis, kin, place, old, corner, displacement):
