@@ -190,8 +190,8 @@ def _singular(word: str) -> str:
 
 
 def _plural(family: str) -> str:
-    if family == "basis":
-        return "bases"
+    if family in ("basis", "eos"):
+        return {"basis": "bases", "eos": "eos"}[family]
     return family + ("es" if family.endswith(("x", "s")) else "s")
 
 

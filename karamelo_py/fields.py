@@ -12,8 +12,10 @@ from karamelo_py.kernels.export import (
     JACOBIAN,
     STRAIN,
     export_energy,
+    export_plastic_strain,
     export_state,
 )
+from karamelo_py.points.materials import plastic_strain
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -40,7 +42,7 @@ NODE_NAMES = (
 )
 
 
-# Columns of Karamelo that are always zero here: nothing keeps them apart, or there is none.
+# Columns of Karamelo that are zero here: nothing keeps them apart, or only some materials do.
 ABSENT_AT_POINTS = (
     "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
 )  # fmt: skip
@@ -142,6 +144,12 @@ class Fields:
         """Names that `node` knows."""
         return list(NODE_NAMES)
 
+    def absent_at_points(self) -> list[str]:
+        """Names that `particle` knows, but that are 0 because no material has them."""
+        laws = [type(material.law) for material in self.hub.materials.values()]
+        present = {"ep"} if any(plastic_strain.defined(law) for law in laws) else set()
+        return [name for name in ABSENT_AT_POINTS if name not in present]
+
     def particle(self, name: str) -> np.ndarray:
         """A field of all points, (N,). What the scene does not have is zero, as in Karamelo."""
         simulation = self._simulation
@@ -161,6 +169,8 @@ class Fields:
             return self.reference_volume * self._exported[:, JACOBIAN]
         if name == "ienergy":
             return self._exported[:, ENERGY].copy()
+        if name == "ep":
+            return self._cached("ep", _plastic_strain).copy()
         if name == "seq":
             return _von_mises(self._exported[:, :STRAIN])
         if name[:1] in "se" and name[1:] in COMPONENTS:
@@ -221,6 +231,17 @@ def _stored_energy(simulation: Any) -> np.ndarray:
         rows = np.zeros(len(block.id))
         export_energy(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
         out[block.id] = rows
+    return out
+
+
+def _plastic_strain(simulation: Any) -> np.ndarray:
+    s = simulation.setup
+    out = np.zeros(simulation.count)
+    for block in s.blocks:
+        if plastic_strain.defined(type(block.laws)):
+            rows = np.zeros(len(block.id))
+            export_plastic_strain(s.kin, s.basis.h, block.points, block.laws, rows)
+            out[block.id] = rows
     return out
 
 

@@ -71,7 +71,7 @@ class Hub:
     ----------
     domain
         The domain, or None before ``dimension``.
-    regions, materials, solids, groups, fixes, computes, dumps
+    regions, eos, strengths, materials, solids, groups, fixes, computes, dumps
         Catalogues of what the script has named.
     values
         Numbers that fixes and computes publish, and time, timestep, dt.
@@ -95,6 +95,8 @@ class Hub:
         self.domain: Domain | None = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
+        self.eos = Catalogue("eos", self)
+        self.strengths = Catalogue("strength", self)
         self.materials = Catalogue("material", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
@@ -124,6 +126,10 @@ class Hub:
         domain = self.domain
         return [Lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 
+    def forget_simulation(self) -> None:
+        """The points of a solid were replaced: the arrays are made anew when next asked for."""
+        self._simulation = None
+
     def refresh_values(self) -> None:
         """Let computes and fixes measure the present state."""
         for catalogue in (self.computes, self.fixes):
@@ -148,7 +154,8 @@ class Hub:
         other = copy.copy(self)
         other.rehearsing = True
         for name in (
-            "regions", "materials", "solids", "groups", "fixes", "computes", "dumps",
+            "regions", "eos", "strengths", "materials", "solids", "groups", "fixes", "computes",
+            "dumps",
         ):  # fmt: skip
             catalogue = Catalogue(getattr(self, name).kind, other)
             catalogue.update(getattr(self, name))

@@ -23,6 +23,7 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.step import FBar
 from karamelo_py.lattice import table
+from karamelo_py.laws import law_in, law_kind, law_table
 from karamelo_py.methods.base import NoContact
 from karamelo_py.points.kinematics import identity, planar
 from karamelo_py.points.materials import deformation, initial_state
@@ -43,7 +44,7 @@ class State(NamedTuple):
     count: int  # number of points, N
     x: np.ndarray  # (N, w) places
     v: np.ndarray  # (N, d)
-    laws: dict[type, np.ndarray]  # (N, s) state for each class of law
+    laws: dict[tuple, np.ndarray]  # (N, s) state for each kind of law
     moment: np.ndarray | None  # (N, t) what the transfer keeps
     deformation: np.ndarray | None  # (N, t) F, where it has an array of its own
 
@@ -141,10 +142,10 @@ def lower_nodes(count: int, kin, needs: Needs, real: type) -> Nodes:
 
 
 def lower_blocks(hub, kin, needs: Needs, tiles: Tiles, real: type, previous: State | None) -> tuple:
-    """One block for each class of law, in the order in which the solids use them."""
-    solids: dict[type, list] = {}
+    """One block for each kind of law, in the order in which the solids use them."""
+    solids: dict[tuple, list] = {}
     for solid in hub.solids.values():
-        solids.setdefault(type(solid.material.law), []).append(solid)
+        solids.setdefault(law_kind(solid.material.law), []).append(solid)
     return tuple(
         lower_block(hub, members, kin, needs, tiles, real, previous) for members in solids.values()
     )
@@ -153,20 +154,18 @@ def lower_blocks(hub, kin, needs: Needs, tiles: Tiles, real: type, previous: Sta
 def lower_block(
     hub, solids, kin, needs: Needs, tiles: Tiles, real: type, previous: State | None
 ) -> Block:
-    """The points of all solids whose law is of one class."""
+    """The points of all solids whose law is of one kind."""
     method = hub.update.method
     materials = list({id(s.material): s.material for s in solids}.values())
-    law = type(materials[0].law)
-    laws = law(
-        *(np.array(column, real) for column in zip(*(m.law for m in materials), strict=True))
-    )
+    laws = law_table([m.law for m in materials], real)
+    kind = law_kind(laws)
     n = sum(len(s.x0) for s in solids)
     d = kin.dimension
     ids = np.concatenate([np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids])
-    fresh = initial_state(law(*(real(p) for p in materials[0].law)), kin, real(1))
+    fresh = initial_state(law_in(materials[0].law, real), kin, real(1))
     state = np.tile(np.array(fresh, real), (n, 1))
     moment = np.zeros((n, planar(kin).tensor_size), real) if needs.moment else None
-    stores_f = not method.frame.moves and not deformation.defined(law)
+    stores_f = not method.frame.moves and not deformation.defined(type(laws))
     unit = np.array(identity(kin, real(1)), real)
     f = np.tile(unit, (n, 1)) if stores_f else None
     places = np.concatenate([method.places(kin, s, real) for s in solids])
@@ -178,8 +177,8 @@ def lower_block(
         kept = previous.x.shape[1]
         x[:, old, :kept] = previous.x[ids[old]][:, : x.shape[2]]
         v[old] = previous.v[ids[old]]
-        if law in previous.laws:
-            state[old] = previous.laws[law][ids[old]]
+        if kind in previous.laws:
+            state[old] = previous.laws[kind][ids[old]]
         if moment is not None and previous.moment is not None:
             moment[old] = previous.moment[ids[old]]
         if f is not None and previous.deformation is not None:

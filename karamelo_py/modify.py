@@ -47,8 +47,8 @@ class Fix:
     formulas
         One formula (or None) for each component, for compiled hooks.
     published
-        Suffixes of the values it sets: "x" for ``ID_x`` (also "y", "z" and "s"), "" for ``ID``. All
-        when a style does not say.
+        Suffixes of the values it sets: "x" for ``ID_x`` and the like, "" for ``ID``; "x", "y", "z",
+        "s" and "" when a style does not say.
     first_step_only
         Whether it acts in the first step after its definition and is idle thereafter.
     holds_nodes
@@ -76,7 +76,7 @@ class Fix:
             self.group = group
 
     def publish(self, name: str, value: float) -> None:
-        """Publish `value` as ID_`name` (x, y, z or s), or as the plain ID when `name` is empty."""
+        """Publish `value` as ID_`name`, or as the plain ID when `name` is empty."""
         if name not in self.published:
             raise ValueError(f"'{name}' is not in {type(self).__name__}.published")
         self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from karamelo_py.kernels.step import Fused, Staged
+from karamelo_py.laws import law_name
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -35,7 +36,7 @@ def report(hub: Hub, simulation: Simulation) -> None:
     say("fields of a point                 shape       bytes")
     total = 0
     for block in s.blocks:
-        law = type(block.laws).__name__
+        law = law_name(block.laws)
         for name, shape, size in point_fields(block):
             say(f"  {name + ' (' + law + ')':<30}  {shape:<10} {size:>6}")
             total += size * len(block.id)
@@ -52,7 +53,7 @@ def report(hub: Hub, simulation: Simulation) -> None:
     say("")
     visits = "stage by stage" if simulation.staged else "fused"
     kernels = [type(x).__name__ for x in (s.kin, s.basis, s.transfer, hub.update.scheme)]
-    laws = [type(block.laws).__name__ for block in s.blocks]
+    laws = [law_name(block.laws) for block in s.blocks]
     say(f"kernels        {', '.join(kernels + laws)}; {visits}")
     say("stages of a step")
     for stage in stages(hub, simulation):

@@ -43,6 +43,7 @@ from karamelo_py.kernels.step import (
     step_size,
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
+from karamelo_py.laws import law_kind
 from karamelo_py.lowering import State, lower, thread_count
 from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
@@ -180,7 +181,7 @@ class Simulation:
             points = block.points
             rows = np.zeros((self.count, points.state.shape[1]), points.state.dtype)
             rows[block.id] = points.state
-            laws[type(block.laws)] = rows
+            laws[law_kind(block.laws)] = rows
         keeps = self.setup.blocks[0].points.moment is not None
         moment = self.by_id(lambda block: block.points.moment) if keeps else None
         places = self.by_id(lambda block: block.x[self.now])

@@ -1,45 +1,43 @@
-"""Solids: bodies of material points, and where the points are put."""
+"""Solids: bodies of material points. Where their points are put is said by the styles of solid."""
 
 from __future__ import annotations
 
-import itertools
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from karamelo_py.domain import Domain, boxes, require_domain
+from karamelo_py.domain import Domain, require_domain
 from karamelo_py.forms import finite
 from karamelo_py.material import Material
+from karamelo_py.placement import MAX_POINTS, Placement
 from karamelo_py.points.materials import specific_volume
-from karamelo_py.regions.base import Region, look_up
+from karamelo_py.regions.base import look_up
 from karamelo_py.script.errors import Place, ScriptError
-from karamelo_py.signature import Argument, AtLeast, Positive
+from karamelo_py.signature import Argument
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
-MAX_POINTS = 2**31 - 1
 _SAMPLE = 5000
-# Beyond this many candidates the points outside the domain are no longer counted, only mentioned.
-_MAX_COUNTED = 20_000_000
 
 
 class Solid:
-    """A body of points that fills a region, `ppc` points per cell and direction.
+    """Base of the styles of solid: a body of points. A style calls `put` with its points.
 
     Parameters
     ----------
-    region
-        ID of the region to fill.
-    ppc
-        Points per cell in each direction: 2 gives 4 points per cell in 2D, 8 in 3D.
+    hub
+        The scene. Its domain must exist.
     material
-        ID of the material.
+        What the points are made of.
     h
-        Cell size. With a grid shared by all solids (ulmpm) it must be that of the domain.
+        Cell size. With a grid shared by all solids it must be that of the domain; a method with
+        the attribute ``own_grids`` lays a grid of its own for each solid.
     T0
         Initial temperature.
+    glued_to
+        The solid with which this one shares a velocity field, in methods that have several.
 
     Attributes
     ----------
@@ -47,83 +45,146 @@ class Solid:
         0 for the first solid made, and so on.
     first_id : int
         Number (from 0) of its first point; point ids are these numbers plus 1.
-    x0 : ndarray (n, dimension)
+    x0 : ndarray (n, d)
         Reference positions.
-    point_volume, point_mass : float
-        Volume and mass of each point (per unit thickness in 2D, per unit area in 1D).
+    volume0 : ndarray (n,)
+        Initial volumes: per unit thickness in 2D, per unit area in 1D, per radian where the domain
+        is axisymmetric. Read only, as is all that follows.
+    mass : ndarray (n,)
+        Masses, per the same unit.
+    half_size : ndarray (n, d)
+        Half edge lengths of the initial domain of each point along the axes.
+    corners : ndarray (n, c, d) or None
+        Corners of the initial domains in the order of the nodes of an element, for solids from a
+        mesh; None where the domains are boxes.
+    shape : str
+        ``box``, or as meshio says: ``line``, ``triangle``, ``quad``, ``tetra``, ``hexahedron``.
+    lo, hi : ndarray (d,)
+        Box of the solid.
     """
 
-    syntax = "regionID, ppc, material, h[, T0]"
     id: str = ""
     place: Place | None = None
+    # The argument that says where the points are, for messages.
+    source = "region"
 
     def __init__(
-        self,
-        hub: Hub,
-        region: Region,
-        ppc: Annotated[int, AtLeast(1)],
-        material: Material,
-        h: Annotated[float, Positive],
-        T0: float = 0.0,
+        self, hub: Hub, material: Material, h: float, T0: float, glued_to: Solid | None = None
     ):
-        domain = require_domain(hub)
+        self.domain = require_domain(hub)
         for name, value in (("h", h), ("T0", T0)):
             finite(hub, value, name)
-        if domain.h is None:
-            domain.set_cell_size(h)
-        elif abs(h - domain.h) > 1e-9 * domain.h:
-            raise ScriptError(
-                f"cell size {h:g} differs from that of the domain's grid, {domain.h:g}, "
-                "which all solids share",
-                argument="h",
-                expected=f"{domain.h:g}, as in dimension(...)",
-            )
-        self.region = region
-        self.ppc = ppc
+        self.h = _cell_size(hub, self.domain, h)
         self.material = material
-        self.h = domain.h
         self.T0 = T0
+        self.glued_to = glued_to
+        if glued_to is not None and not getattr(hub.update.method, "fields_per_solid", False):
+            hub.warn(
+                "GlueToSolid has no effect: with this method all solids share one velocity field",
+                hint="leave it out",
+            )
         self.index = len(hub.solids)
-        self.first_id = sum(len(other.x0) for other in hub.solids.values())
-        self.point_volume = (self.h / ppc) ** domain.dimension
-        self.point_mass = self.point_volume / float(specific_volume(material.law))
-        self.x0, outside = fill(region, domain, ppc)
-        if not len(self.x0) and not region.unknown:
+        self.first_id = sum(other.count for other in hub.solids.values())
+
+    def put(self, hub: Hub, placement: Placement, *, may_be_empty: bool = False) -> None:
+        """Give the solid its points, in place of those that it has.
+
+        Raises
+        ------
+        ScriptError
+            For none, for too many, or for points left of the axis of symmetry.
+        """
+        x0, count = placement.x0, len(placement.x0)
+        if not count and not may_be_empty:
             raise ScriptError(
                 "the solid has no points: "
-                + ("all of them lie outside the domain" if outside else _why_empty(region, domain)),
-                argument="region",
-                expected=f"a region that holds points of the grid with cell size {self.h:g} and "
-                f"{ppc} per cell and direction, inside the domain",
+                + ("all of them lie outside the domain" if placement.outside else self.why_empty()),
+                argument=self.source,
+                expected=self.wanted(),
             )
-        if self.first_id + len(self.x0) > MAX_POINTS:
+        if self.first_id + count > MAX_POINTS:
             raise ScriptError(f"the scene has more than {MAX_POINTS} points", argument="h")
-        if outside:
+        volume = np.asarray(placement.volume, float)
+        if self.domain.axisymmetric:
+            self._check_radii(x0)
+            volume = volume * x0[:, 0]
+        # Equal volumes are stored once, however many points there are.
+        self.x0 = x0
+        self.volume0 = np.broadcast_to(volume, (count,))
+        self.mass = np.broadcast_to(volume / float(specific_volume(self.material.law)), (count,))
+        self.half_size = np.broadcast_to(placement.half_size, x0.shape)
+        self.shape, self.corners = placement.shape, placement.corners
+        self.lo, self.hi = placement.lo, placement.hi
+        if placement.outside:
             hub.warn(
-                f"{_counted(outside)} of region '{region.id}' outside the domain "
+                f"{_counted(placement.outside)} of {self.described()} outside the domain "
                 "left out of the solid",
-                hint="make the domain larger or the region smaller",
+                hint=f"make the domain larger or the {self.described().split()[0]} smaller",
             )
+
+    def described(self) -> str:
+        """Where the points come from, in words, such as ``region 'disk'``."""
+        raise NotImplementedError
+
+    def why_empty(self) -> str:
+        """Why there are no points, though none lies outside the domain."""
+        raise NotImplementedError
+
+    def wanted(self) -> str:
+        """What would give points."""
+        raise NotImplementedError
 
     @property
     def count(self) -> int:
         """Number of points."""
         return len(self.x0)
 
-    @property
-    def volume0(self) -> np.ndarray:
-        """Initial volumes (n,), made anew at each call."""
-        return np.full(len(self.x0), self.point_volume)
-
-    @property
-    def mass(self) -> np.ndarray:
-        """Masses (n,), made anew at each call."""
-        return np.full(len(self.x0), self.point_mass)
-
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Solid:
         """The solid that `argument` names."""
         return look_up(hub.solids, argument)
+
+    def _check_radii(self, x0: np.ndarray) -> None:
+        # A point on the axis itself would have no mass.
+        if len(x0) and x0[:, 0].min() <= 0:
+            raise ScriptError(
+                f"points at x = {x0[:, 0].min():g}: in an axisymmetric domain x is the radius, "
+                "and points lie at x > 0",
+                argument=self.source,
+                expected=f"a {self.described().split()[0]} at x >= 0",
+            )
+
+
+def own_grids(hub: Hub) -> bool:
+    """Whether the method lays a grid of its own for each solid."""
+    return bool(getattr(hub.update.method, "own_grids", False))
+
+
+def _cell_size(hub: Hub, domain: Domain, h: float) -> float:
+    """The cell size of a solid that asks for `h`; the first one sets that of a domain without."""
+    if domain.h is None:
+        domain.set_cell_size(h)
+    if own_grids(hub):
+        return float(h)
+    if abs(h - domain.h) > 1e-9 * domain.h:
+        raise ScriptError(
+            f"cell size {h:g} differs from that of the domain's grid, {domain.h:g}, "
+            "which all solids share",
+            argument="h",
+            expected=f"{domain.h:g}, as in dimension(...)",
+        )
+    return domain.h
+
+
+def warn_of_coinciding(hub: Hub, new: Solid, ID: str) -> None:
+    """Warn when points of `new`, to be called `ID`, lie where those of another solid are."""
+    for other in hub.solids.values():
+        if other is not new and coinciding(new, other):
+            hub.warn(
+                f"points of solid '{ID}' lie where points of solid '{other.id}' are: "
+                "there is twice the mass",
+                hint="another region for one of them, or region(ID, difference, ...)",
+            )
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
@@ -150,120 +211,3 @@ def _counted(outside: float) -> str:
     if math.isinf(outside):
         return "points"
     return "1 point" if outside == 1 else f"{outside:.0f} points"
-
-
-def _why_empty(region: Region, domain: Domain) -> str:
-    used = slice(0, domain.dimension)
-    if (region.box_lo > region.box_hi)[used].any():
-        return f"region '{region.id}' is empty"
-    return f"no point lies in region '{region.id}'"
-
-
-def offsets(ppc: int) -> np.ndarray:
-    """Places of `ppc` points along one cell of size 1, measured from its centre: (ppc,).
-
-    Equally spaced, but for 3, which are the Gauss points of order 3 as Karamelo writes them.
-    """
-    if ppc == 3:
-        return np.array([-0.3873, 0.0, 0.3873])
-    return (np.arange(ppc) + 0.5) / ppc - 0.5
-
-
-def cell_pattern(ppc: int, dimension: int) -> np.ndarray:
-    """Places of the points of one cell of size 1, measured from its centre: (ppc^d, d).
-
-    In Karamelo's order: x before y; in 3D the lowest z first.
-    """
-    along = offsets(ppc)
-    if dimension == 3:
-        return np.array([(x, y, z) for z, x, y in itertools.product(along, repeat=3)])
-    return np.array(list(itertools.product(along, repeat=dimension)))
-
-
-def fill(region: Region, domain: Domain, ppc: int) -> tuple[np.ndarray, float]:
-    """Positions of the points that fill `region`, and how many more would lie outside the domain.
-
-    Cells are counted from the lower corner of the domain, x outermost, then y, then z. Only cells
-    that the box around the region reaches are looked at, a bounded number at a time.
-
-    Returns
-    -------
-    x0 : ndarray (n, dimension)
-    outside : float
-        Points of the region that were left out; inf when there are too many to count.
-
-    Raises
-    ------
-    ScriptError
-        When there would be more points than can be numbered.
-    """
-    dimension, h = domain.dimension, domain.h
-    lo, hi = region.box_lo[:dimension], region.box_hi[:dimension]
-    corner, end = domain.lo[:dimension], domain.hi[:dimension]
-    last_cell = np.array(domain.cells[:dimension]) - 1
-    if region.unknown or (lo > hi).any():
-        return np.empty((0, dimension)), 0
-    # One cell more on either side: rounding must not lose a point that lies on a face.
-    first = np.floor((lo - corner) / h) - 1
-    last = np.floor((hi - corner) / h) + 1
-    # An open side ends at the domain; a closed one may reach beyond it, and then we say so.
-    first = np.where(np.isinf(lo), 0, first)
-    last = np.where(np.isinf(hi), last_cell, last)
-    inner_first = np.clip(first, 0, last_cell + 1)
-    inner_last = np.clip(last, -1, last_cell)
-    inner = math.prod(np.maximum(inner_last - inner_first + 1, 0).tolist()) * ppc**dimension
-    if inner > MAX_POINTS * 4:
-        raise ScriptError(
-            f"about {inner:.3g} points would be needed", expected=f"at most {MAX_POINTS}"
-        )
-    reaches_out = (lo < corner - domain.tolerance) & np.isfinite(lo)
-    reaches_out |= (hi > end + domain.tolerance) & np.isfinite(hi)
-    whole = math.prod(np.maximum(last - first + 1, 0).tolist()) * float(ppc) ** dimension
-    counted = reaches_out.any() and whole <= max(_MAX_COUNTED, 4 * inner)
-    if not counted:
-        first, last = inner_first, inner_last
-
-    pattern = cell_pattern(ppc, dimension) * h
-    chunks: list[np.ndarray] = []
-    outside = 0.0
-    for index in boxes([int(i) for i in first], [int(i) for i in last], len(pattern)):
-        centre = corner + (index + 0.5) * h
-        x = (centre[:, None, :] + pattern).reshape(-1, dimension)
-        x = x[region.inside(x)]
-        in_domain = domain.contains(x)
-        if not in_domain.all():
-            if counted:
-                outside += _beyond_closed_sides(x[~in_domain], lo, hi, domain)
-            x = x[in_domain]
-        if len(x):
-            chunks.append(x)
-    if reaches_out.any() and not counted:
-        outside = math.inf
-    return _joined(chunks, dimension), outside
-
-
-def _beyond_closed_sides(x: np.ndarray, lo: np.ndarray, hi: np.ndarray, domain: Domain) -> int:
-    """How many of `x` lie outside the domain across sides where the region is closed."""
-    beyond = np.zeros(len(x), dtype=bool)
-    within_open = np.ones(len(x), dtype=bool)
-    for axis in range(domain.dimension):
-        below = x[:, axis] < domain.lo[axis] - domain.tolerance
-        above = x[:, axis] > domain.hi[axis] + domain.tolerance
-        for out, end in ((below, lo[axis]), (above, hi[axis])):
-            if np.isfinite(end):
-                beyond |= out
-            else:
-                within_open &= ~out
-    return int(np.count_nonzero(beyond & within_open))
-
-
-def _joined(chunks: list[np.ndarray], dimension: int) -> np.ndarray:
-    """The chunks in one array; each is freed once copied, so that memory holds the points once."""
-    x0 = np.empty((sum(len(chunk) for chunk in chunks), dimension))
-    start = 0
-    chunks.reverse()
-    while chunks:
-        chunk = chunks.pop()
-        x0[start : start + len(chunk)] = chunk
-        start += len(chunk)
-    return x0

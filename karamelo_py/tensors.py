@@ -84,14 +84,21 @@ def _row(array, i, first, like):
 
 
 def record(table, i):
-    """A NamedTuple of arrays, seen at index `i`: the same NamedTuple of scalars."""
-    return type(table)(*(column[i] for column in table))
+    """A NamedTuple of arrays, seen at index `i`: the same NamedTuple of scalars.
+
+    NamedTuples of arrays in it become NamedTuples of scalars, too.
+    """
+    return type(table)(*(record(c, i) if isinstance(c, tuple) else c[i] for c in table))
 
 
 @overload(record)
 def _record(table, i):
-    columns = ", ".join(f"table[{k}][i]" for k in range(len(table)))
-    return define("table, i", f"return make({columns})", make=table.instance_class)
+    terms = [
+        f"record(table[{k}], i)" if isinstance(column, types.BaseNamedTuple) else f"table[{k}][i]"
+        for k, column in enumerate(table)
+    ]
+    made = f"return make({', '.join(terms)})"
+    return define("table, i", made, make=table.instance_class, record=record)
 
 
 def optional_row(array, i, like):

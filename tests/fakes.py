@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from karamelo_py.console import Console
+from karamelo_py.fields import ABSENT_AT_POINTS
 
 
 class FakeValues(dict):
@@ -40,6 +41,9 @@ class FakeFields:
         self.nodes = {name: nodes[:, i] for i, name in enumerate("xyz")}
         self.nodes["mass"] = np.where(nodes[:, 0] > 0, 1.0, 0.0)
         self.node_count = len(nodes)
+
+    def absent_at_points(self):
+        return list(ABSENT_AT_POINTS)
 
     def particle_names(self):
         return list(self.points)

@@ -12,7 +12,7 @@ from karamelo_py.material import Material
 from karamelo_py.points.materials import specific_volume
 from karamelo_py.script.errors import Place
 from karamelo_py.script.values import Values
-from karamelo_py.solid import Solid
+from karamelo_py.solids.region import RegionSolid
 
 DENSITY = 1000.0
 
@@ -89,5 +89,6 @@ class FakeHub:
     def solid(self, ID, region, ppc=2, h=None, **options):
         """Make and file a solid."""
         return self.solids.add(
-            ID, Solid(self, region, ppc, self.materials["steel"], h or self.domain.h, **options)
+            ID,
+            RegionSolid(self, region, ppc, self.materials["steel"], h or self.domain.h, **options),
         )

@@ -25,7 +25,11 @@ def final_state(script: Path, threads: int | None = None) -> dict[str, np.ndarra
     hub = final_hub(script, threads)
     state = hub.simulation.state()
     arrays = {"x": state.x, "v": state.v, "time": np.array([hub.update.time, hub.update.step])}
-    arrays |= {law.__name__: rows for law, rows in state.laws.items()}
+    arrays["mass"] = hub.simulation.mass
+    arrays["nodal mass"] = hub.simulation.setup.nodes.sums[:, 0].sum()
+    arrays |= {"-".join(k.__name__ for k in kind): rows for kind, rows in state.laws.items()}
+    if state.deformation is not None:
+        arrays["deformation"] = state.deformation
     if state.moment is not None:
         arrays["moment"] = state.moment
     return arrays

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import meshio
+import numpy as np
 import pytest
 
 from karamelo_py import catalogue, registry
@@ -105,8 +107,24 @@ def _scene(dimension, folder):
     return interpreter
 
 
+def _write_meshes(folder):
+    """The files that examples speak of: part.msh with the group "inside", and body.stl."""
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) / 2
+    part = meshio.Mesh(
+        square,
+        {"quad": [[0, 1, 2, 3]]},
+        cell_data={"gmsh:physical": [np.array([1])], "gmsh:geometrical": [np.array([1])]},
+        field_data={"inside": np.array([1, 2])},
+    )
+    meshio.write(folder / "part.msh", part, file_format="gmsh22", binary=False)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) / 2
+    faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+    meshio.write(folder / "body.stl", meshio.Mesh(corners, {"triangle": faces}))
+
+
 def _tried(lines, dimension, folder):
     """The last of these lines, on a scene that has the groups and regions they speak of."""
+    _write_meshes(folder)
     interpreter = _scene(dimension, folder)
     for line in lines:
         words = re.findall(r"\w+", line)
@@ -116,23 +134,26 @@ def _tried(lines, dimension, folder):
         if words[2] in ("union", "intersection", "difference"):
             for region in set(words[3:]) - {"disk", "wall"}:
                 interpreter.run_text(f"region({region}, {STAGES[dimension][2]})")
-        interpreter.run_text(line.replace("region(disk,", "region(this,"))
+        for ID in ("region(disk", "solid(s1"):
+            line = line.replace(f"{ID},", f"{ID}x,")
+        interpreter.run_text(line)
 
 
-SCENE_FAMILIES = ("fix", "compute", "region", "material", "dump")
+SCENE_FAMILIES = ("fix", "compute", "region", "solid", "eos", "strength", "material", "dump")
 TRIED = [(f, n) for f, n in STYLES if f in SCENE_FAMILIES]
 
 
 @pytest.mark.parametrize(("family", "name"), TRIED, ids=[f"{f}-{n}" for f, n in TRIED])
 def test_examples_of_styles_fit_their_signatures(family, name, tmp_path):
     """Each line of an example is right in at least one number of dimensions."""
-    first, *others = catalogue.help_of(family, name).example.splitlines()
-    for line in (first, *others):
+    lines = catalogue.help_of(family, name).example.splitlines()
+    for k, line in enumerate(lines):
         complaints = []
         for dimension in STAGES:
             try:
-                # A line about the log speaks of what the first one defines.
-                _tried([first, line] if line.startswith("log") else [line], dimension, tmp_path)
+                # A line about the log or a composed material speaks of what is defined above it.
+                above = lines[:k] if line.startswith(("log", "material")) else []
+                _tried([*above, line], dimension, tmp_path)
                 break
             except ScriptError as error:
                 complaints.append(f"{dimension}D: {error.render()}")

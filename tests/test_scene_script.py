@@ -60,6 +60,18 @@ group(one, particles, region, left, solid, s1, s2)
     assert len(hub.groups["bc"]) == 11 * 21
 
 
+def test_keywords_of_solids():
+    hub = run(
+        SCENE
+        + """
+solid(s1, region, disk1, 3, steel, h, 0, points=gauss)
+solid(s2, region, disk2, 2, steel, h, 0, GlueToSolid=s1)
+"""
+    )
+    assert len(set(hub.solids["s1"].volume0)) > 1
+    assert hub.solids["s2"].glued_to is hub.solids["s1"]
+
+
 def test_the_older_form():
     hub = run(
         """dimension(2)
@@ -104,7 +116,10 @@ def test_the_axis_of_a_cylinder_is_a_word():
         ("solid(s, region, disk1, 2, steel, 0)", "0", "above 0"),
         ("solid(s, region, disk1, 2, steel, 2*h)", "2*h", "0.05, as in dimension(...)"),
         ("solid(s, region, disk1, 2, steel)", None, "solid(ID, region, regionID, ppc, material, h"),
-        ("solid(s, mesh, body.msh, steel, h, 0)", "mesh", "not there yet"),
+        ("solid(s, mesh, body.msh, steel, h, 0)", "body.msh", "file body.msh does not exist"),
+        ("solid(s, region, disk1, 2, steel, h, points=gaus)", "gaus", "did you mean 'gauss'?"),
+        ("solid(s, region, disk1, 2, steel, h, GlueToSolid=s1)", "s1", "unknown solid 's1'"),
+        ("solid(s, region, disk1, 2, steel, h, GlueTo=s1)", "GlueTo=s1", "GlueToSolid=..."),
         ("solid(s, rgion, disk1, 2, steel, h)", "rgion", "did you mean 'region'?"),
         ("group(all, nodes, region, left, all)", "all", "another name"),
         ("group(g, node, region, left, all)", "node", "did you mean 'nodes'?"),

@@ -27,6 +27,9 @@ TITLES = {
     "compute": ("Computes", "What measures a run: styles of [compute](command/compute.md)."),
     "dump": ("Dumps", "Files of snapshots: styles of [dump](command/dump.md)."),
     "region": ("Regions", "Parts of space: styles of [region](command/region.md)."),
+    "solid": ("Solids", "Bodies of points: styles of [solid](command/solid.md)."),
+    "eos": ("Equations of state", "Pressure and density: styles of [eos](command/eos.md)."),
+    "strength": ("Strengths", "Deviatoric stress: styles of [strength](command/strength.md)."),
     "material": ("Materials", "Constitutive laws: styles of [material](command/material.md)."),
 }
 _CODE = re.compile(r"(``[^`]+``|`[^`]+`)")

@@ -100,21 +100,43 @@ def axisymmetric(hub: Hub, active: bool) -> None:
     Parameters
     ----------
     active
-        ``true`` or ``false``. ``true`` is not there yet.
+        ``true`` or ``false`` (the default).
 
     Example
     -------
-    axisymmetric(false)
+    dimension(2, 0, 10, 0, 30, 0.5)
+    axisymmetric(true)
+
+    Notes
+    -----
+    Needs two dimensions, no part of the domain below x = 0, and comes before the first solid.
+    Points carry the volume and mass of one radian: forces and energies of the whole body are 2 pi
+    times those of the log.
+
+    See Also
+    --------
+    dimension
     """
     domain = require_domain(hub)
-    if not active:
-        domain.axisymmetric = False
-        return
-    raise ScriptError(
-        "axisymmetric kinematics is not there yet",
-        argument="active",
-        expected="axisymmetric(false), or a scene in 3D",
-    )
+    if active and domain.dimension != 2:
+        raise ScriptError(
+            f"axisymmetric scenes have two dimensions, radius and axis, not {domain.dimension}",
+            argument="active",
+            expected="dimension(2, ...) before axisymmetric(true)",
+        )
+    if active and domain.lo[0] < 0:
+        raise ScriptError(
+            f"the domain begins at x = {domain.lo[0]:g}, and x is a radius",
+            argument="active",
+            expected="dimension(2, 0, ...), or more than 0 in the place of 0",
+        )
+    if hub.solids and active != domain.axisymmetric:
+        raise ScriptError(
+            "the points of solids are made already",
+            argument="active",
+            expected="axisymmetric(true) before the first solid",
+        )
+    domain.axisymmetric = active
 
 
 def region(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 from karamelo_py import registry
 from karamelo_py.points.transfers.flip import FLIP
@@ -91,6 +91,14 @@ def _basis(
     kind: str, method_class: type, basis: str, words: list[Argument]
 ) -> tuple[type, Argument | None]:
     """The class of the basis, and the option that chose the variant."""
+    if basis in (getattr(method_class, "variants", None) or ()):
+        numbers = "".join(f", {x.text}" for x in words if x.word() is None)
+        raise ScriptError(
+            f"{basis} is the shape of the domains, not a basis",
+            argument="basis",
+            expected=f"linear, and {basis} at the end: method({kind}, FLIP, linear"
+            f"{numbers or ', 1'}, {basis})",
+        )
     basis_class = registry.find("basis", basis)
     variants = _variants(method_class, basis_class)
     if getattr(method_class, "variants", None) and basis != "linear":
@@ -127,7 +135,7 @@ def _enhanced(transfer_class: type, argument: Argument) -> type:
 
 def _parameter(hub: Hub, transfer: type, name: str, words: list[Argument], call: str) -> Any:
     """The next number of a transfer: a share, or a whole number where the class says so."""
-    whole = transfer.__annotations__[name] == "int"
+    whole = get_type_hints(transfer)[name] is int
     wanted = "a whole number from 1 to 20" if whole else "a number from 0 (PIC) to 1 (pure FLIP)"
     first_word = words[0].word() if words else None
     value = None
@@ -145,3 +153,30 @@ def _parameter(hub: Hub, transfer: type, name: str, words: list[Argument], call:
     if not in_range:
         raise ScriptError(f"{name} is {value}", place=argument.place, expected=wanted)
     return int(value) if whole else float(value)
+
+
+def anti_volumetric_locking(hub: Hub, active: bool) -> None:
+    """Average changes of volume over the surroundings of a point (F-bar).
+
+    Nearly incompressible and plastic bodies are too stiff where each point keeps its own volume:
+    low-order functions cannot follow. Averaging the increment of volume with the weights of the
+    basis takes the excess of constraints away (Coombs et al. 2018).
+
+    Parameters
+    ----------
+    active
+        ``true`` or ``false`` (the default).
+
+    Example
+    -------
+    anti_volumetric_locking(true)
+
+    Notes
+    -----
+    One more visit of the points for each update of the stress.
+
+    See Also
+    --------
+    method
+    """
+    hub.update.anti_locking = active

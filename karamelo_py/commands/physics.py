@@ -61,7 +61,7 @@ def material(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     ID
         Name of the material.
     style
-        ``linear``, ``neo-hookean``, or the style of a plug-in.
+        ``linear``, ``neo-hookean``, ``eos-strength``, or the style of a plug-in.
     arguments
         What the style asks for; see its page.
 

@@ -5,35 +5,32 @@ from __future__ import annotations
 import copy
 from typing import TYPE_CHECKING, Literal
 
-from karamelo_py import signature
+from karamelo_py import registry, signature
 from karamelo_py.domain import require_domain
 from karamelo_py.group import ALL, KINDS
 from karamelo_py.regions.base import Region
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.signature import Argument
-from karamelo_py.solid import Solid, coinciding
+from karamelo_py.solid import Solid, warn_of_coinciding
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
 
 def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
-    """Make a body: fill a region with material points.
-
-    Points are put into the cells of the grid, `ppc` along each direction, and kept where they
-    lie in the region and in the domain. Each carries the volume ``(h / ppc)^dimension`` and the
-    mass that its material has in it.
+    """Make a body of material points: fill a region with them, or put them into a mesh.
 
     Parameters
     ----------
     ID
         Name of the solid.
     kind
-        ``region``.
+        ``region`` or ``mesh``, or the style of a plug-in.
     arguments
-        ``regionID, ppc, material, h[, T0]``: the region to fill, the points per cell in each
+        What the style asks for, see the page of the style. For ``region``:
+        ``regionID, ppc, material, h[, T0]``, the region to fill, the points per cell in each
         direction, the material, the cell size (that of the domain), and the initial temperature
-        (0 when left out).
+        (0 when left out). For ``mesh``: ``file, material, h[, T0]``.
 
     Example
     -------
@@ -41,8 +38,7 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
 
     Notes
     -----
-    The points of a cell stand at equal distances, but for ``ppc`` 3, where they stand at the
-    Gauss points. The method, the domain, the region and the material come before.
+    The method, the domain, the region and the material come before.
 
     See Also
     --------
@@ -54,33 +50,14 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
             expected="method(...) before the first solid, such as method(ulmpm, FLIP, linear, 1)",
         )
     require_domain(hub)
-    if kind in ("mesh", "file"):
-        raise ScriptError(
-            f"solids from a {kind} are not there yet",
-            argument="kind",
-            expected=f"solid({solid.syntax})",
-        )
-    if kind != "region":
-        close = nearest(kind, ["region", "mesh"])
-        raise ScriptError(
-            f"unknown kind of solid '{kind}'",
-            argument="kind",
-            expected=f"solid({solid.syntax})",
-            hint=f"did you mean '{close}'?" if close else None,
-        )
-    new = signature.call(Solid, hub, list(arguments), "solid region")
-    for other in hub.solids.values():
-        if coinciding(new, other):
-            hub.warn(
-                f"points of solid '{ID}' lie where points of solid '{other.id}' are: "
-                "there is twice the mass",
-                hint="another region for one of them, or region(ID, difference, ...)",
-            )
+    target = registry.find("solid", kind)
+    new = signature.call(target, hub, list(arguments), f"solid {kind}")
+    warn_of_coinciding(hub, new, ID)
     hub.solids.add(ID, new)
     hub.update.method.welcome(hub, new)
 
 
-solid.syntax = "ID, region, regionID, ppc, material, h[, T0]"
+solid.syntax = "ID, region, regionID, ppc, material, h[, T0] | ID, mesh, file, material, h[, T0]"
 
 
 def group(

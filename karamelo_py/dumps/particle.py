@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from karamelo_py.dumps.lammps import LammpsDump
-from karamelo_py.fields import ABSENT_AT_POINTS
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -38,12 +37,15 @@ class Particle(LammpsDump):
     dump(d1, all, particle, 100, dump_p.*.LAMMPS, x, y, z, vx, vy, vz, s11, s22, s12)
     """
 
-    absent = ABSENT_AT_POINTS
-
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:
         """Names of the columns that can be written."""
         return hub.fields.particle_names()
+
+    @property
+    def absent(self) -> Sequence[str]:
+        """Columns that are 0 because no point keeps them."""
+        return self.hub.fields.absent_at_points()
 
     def ids(self) -> tuple[np.ndarray, np.ndarray]:
         """Number and solid of each point."""

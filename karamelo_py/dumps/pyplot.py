@@ -8,7 +8,6 @@ import numpy as np
 
 from karamelo_py.dumps.base import Dump
 from karamelo_py.dumps.files import picture_format, savefig, unwarned, whole
-from karamelo_py.fields import ABSENT_AT_POINTS
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.signature import OutputFile, Positive
 
@@ -64,7 +63,7 @@ class PyPlot(Dump):
         self.format = picture_format(self.file)
         self.size = (_inches("width", width), _inches("height", height))
         if field is not None:
-            self.warn_of_absent([field], ABSENT_AT_POINTS, "points")
+            self.warn_of_absent([field], hub.fields.absent_at_points(), "points")
         self.field = field
         self._picture: Any = None
 

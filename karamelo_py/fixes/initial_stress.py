@@ -66,7 +66,7 @@ class InitialStress(Fix):
                     f"the stress of solid '{solid.id}' follows from its deformation "
                     "and cannot be set",
                     argument="group",
-                    expected="points of a material in rate form, such as linear",
+                    expected="points of a material in rate form, such as linear or eos-strength",
                 )
 
     def initial_integrate(self, points: PointsView) -> None:

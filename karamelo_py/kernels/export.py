@@ -9,6 +9,7 @@ from karamelo_py.points.materials import (
     energy_density,
     initial_state,
     jacobian,
+    plastic_strain,
     specific_volume,
     with_stress,
 )
@@ -39,6 +40,15 @@ def export_energy(kin, like, points, laws, out):
         state = row(points.state, p, 0, initial_state(law, kin, like))
         volume = points.mass[p] * specific_volume(law)
         out[p] = volume * energy_density(law, kin, state)
+
+
+@kernel
+def export_plastic_strain(kin, like, points, laws, out):
+    """Equivalent plastic strain ``out`` (n,) of each point, for laws that have one."""
+    for p in range(points.mass.size):
+        law = record(laws, points.material[p])
+        state = row(points.state, p, 0, initial_state(law, kin, like))
+        out[p] = plastic_strain(law, kin, state)
 
 
 @kernel

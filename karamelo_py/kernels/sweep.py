@@ -25,6 +25,7 @@ from karamelo_py.kernels.stages import (
 )
 from karamelo_py.points.basis import locate, support
 from karamelo_py.points.kinematics import vector_at
+from karamelo_py.points.materials import assemble, separate
 from karamelo_py.tensors import record
 
 
@@ -81,10 +82,12 @@ def _tiles_serial(
 
 @kernel(parallel=True)
 def _tiles_threaded(
-    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling, places, dt
-):
+    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, law, first, second, tiling,
+    places, dt,
+):  # fmt: skip
     for c in range(tiling.colour.size - 1):
         for t in prange(tiling.colour[c], tiling.colour[c + 1]):
+            laws = assemble(law, first, second)
             sweep_tile(
                 gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling,
                 places, dt, t,
@@ -106,9 +109,10 @@ def _(mode, gather, scatter, s, block, places, dt):
 
 @sweep_tiles.on(Threaded)
 def _(mode, gather, scatter, s, block, places, dt):
+    law, first, second = separate(block.laws)
     _tiles_threaded(
-        gather, scatter, s.frame, s.kin, s.basis, s.grids, s.transfer, s.nodes, block.points,
-        block.laws, block.tiling, places, dt,
+        gather, scatter, s.frame, s.kin, s.basis, s.grids, s.transfer, s.nodes, block.points, law,
+        first, second, block.tiling, places, dt,
     )  # fmt: skip
 
 

@@ -110,8 +110,9 @@ def look_up(catalogue: Catalogue, argument: Argument):
     """
     word = argument.word()
     if word is None:
+        article = "an" if catalogue.kind[0] in "aeiou" else "a"
         raise ScriptError(
-            f"'{argument.text}' is not the ID of a {catalogue.kind}", place=argument.place
+            f"'{argument.text}' is not the ID of {article} {catalogue.kind}", place=argument.place
         )
     try:
         return catalogue[word]

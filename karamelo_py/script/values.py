@@ -24,6 +24,7 @@ class Values:
         self.array = np.zeros(CAPACITY)
         self._slots: dict[str, int] = {}
         self._first: dict[str, int] = {}
+        self._others: dict[str, list[str]] = {}
         self._used = 0
         for name in ("time", "timestep", "dt"):
             self.publish(name)
@@ -40,7 +41,8 @@ class Values:
         """Publish the values of a fix or compute: ``ID_x`` for "x" and so on, ``ID`` for "".
 
         ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` lie in consecutive slots, whether or not all of them
-        have a name. Names that the ID had before and `suffixes` leaves out are forgotten.
+        have a name; other suffixes get slots of their own. Names that the ID had before and
+        `suffixes` leaves out are forgotten.
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))
@@ -51,6 +53,12 @@ class Values:
                 self.publish(name)
             elif self._slots.get(name) == self._first[ID] + k:
                 del self._slots[name]
+        others = [f"{ID}_{suffix}" for suffix in suffixes if suffix not in SUFFIXES]
+        for name in set(self._others.get(ID, ())) - set(others):
+            del self._slots[name]
+        for name in others:
+            self.publish(name)
+        self._others[ID] = others
 
     def slot(self, name: str) -> int:
         """Where in the array `name` is kept.

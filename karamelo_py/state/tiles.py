@@ -114,7 +114,7 @@ class Tiles:
             now = s.control.whole[NOW]
             far = max(widest(s.kin, s.basis, s.grids, b.x[now], b.grid) for b in s.blocks)
             # Corners lie in cells of their own, on both sides.
-            cells = max(cells, 2 * far + 2) if far > 0 else cells
+            cells = max(cells, 2 * far + 2) if 0 < far < np.inf else cells
         size = max(self.size, tile_size(self.dimension, cells))
         if size != self.size:
             self._lay(size)

@@ -15,7 +15,7 @@ A basis that is the product of one function a direction gives only `along` and c
 :func:`karamelo_py.points.basis.product.register`. Every class has these attributes:
 
 cells
-    how many nodes beyond the two of its own cell a point may see, both sides together;
+    how many cells the nodes that points of one cell may see span (1: those of its corners only);
 nodes_per_cell
     1, or 2 where there are nodes between the corners of cells;
 least_nodes
@@ -62,7 +62,7 @@ def mapped_again(basis, grid, moment):
 
 
 @mapped_again.otherwise
-def _(basis, moment):
+def _(basis, grid, moment):
     return moment
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from karamelo_py.compile import real
 from karamelo_py.points.basis import mapped_again
-from karamelo_py.points.basis.product import affine_along, along, register
+from karamelo_py.points.basis.product import along, register
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.tensors import scale
 
@@ -34,15 +34,11 @@ def _(basis, kin, grid, place, direction):
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
     r = a - real(i, a)
     one = real(1, r)
-    return i, r, (one - r, r), (-grid.inv_h, grid.inv_h), one
-
-
-@affine_along.on(Linear)
-def _(basis, grid, line, k):
+    gradients = (-grid.inv_h, grid.inv_h)
     # D = r (1 - r) h^2 vanishes at the nodes, but N D^-1 (X - x) is the gradient everywhere
     # (Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-particle-in-cell
     # method", section 5.3).
-    return line[3][k]
+    return i, r, (one - r, r), gradients, gradients
 
 
 @mapped_again.on(Linear)

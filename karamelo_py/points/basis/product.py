@@ -23,20 +23,10 @@ def along(basis, kin, grid, place, direction):
         Distance of the point from that node, in cells.
     weights, gradients : tuple
         N and dN/dx of the nodes.
-    spread : float
-        1 / D in units of the cell size: D is the mean square of X_I - x under the weights.
+    affine : tuple
+        N D^-1 (X_I - x) of the nodes, for the affine transfers; D is the mean of (X_I - x)^2 under
+        the weights.
     """
-
-
-@point_function()
-def affine_along(basis, grid, line, k):
-    """N_I D^-1 (X_I - x) along one direction, of the k-th node in what `along` returned."""
-
-
-@affine_along.otherwise
-def _(basis, grid, line, k):
-    arm = real(k, line[1]) * spacing(basis, line[1]) - line[1]
-    return line[2][k] * arm * line[4] * grid.inv_h
 
 
 @point_function()
@@ -63,8 +53,8 @@ def hoop(weight, gradient, inv_r):
 
 @shared
 def inverse_radius(r):
-    """1 / r, or 0 on the axis."""
-    return real(1, r) / r if r > 0 else real(0, r)
+    """1 / r, or 0 on the axis and so close to it that 1 / r would overflow."""
+    return real(1, r) / r if r > real(1e-30, r) else real(0, r)
 
 
 def register(basis: type, width: int) -> None:
@@ -168,7 +158,7 @@ def register(basis: type, width: int) -> None:
 
     @affine_weight.on(basis, Line)
     def _(basis, kin, grid, stencil, k):
-        return (affine_along(basis, grid, stencil[1][0], k),)
+        return (stencil[1][0][4][k],)
 
     @affine_weight.on(basis, PlaneStrain)
     @affine_weight.on(basis, Axisymmetric)
@@ -176,7 +166,7 @@ def register(basis: type, width: int) -> None:
         a, b = stencil[1]
         i = k // width
         j = k % width
-        return affine_along(basis, grid, a, i) * b[2][j], a[2][i] * affine_along(basis, grid, b, j)
+        return a[4][i] * b[2][j], a[2][i] * b[4][j]
 
     @affine_weight.on(basis, Space)
     def _(basis, kin, grid, stencil, k):
@@ -186,7 +176,7 @@ def register(basis: type, width: int) -> None:
         m = k % width
         wa, wb, wc = a[2][i], b[2][j], c[2][m]
         return (
-            affine_along(basis, grid, a, i) * wb * wc,
-            wa * affine_along(basis, grid, b, j) * wc,
-            wa * wb * affine_along(basis, grid, c, m),
+            a[4][i] * wb * wc,
+            wa * b[4][j] * wc,
+            wa * wb * c[4][m],
         )

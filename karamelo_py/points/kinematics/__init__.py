@@ -31,12 +31,16 @@ from karamelo_py.points.kinematics.deformation import (
 )
 from karamelo_py.points.kinematics.symmetric import (
     add_pressure,
+    after_symmetric,
     contract,
+    deviator,
     largest_row_sum,
+    leading_symmetric,
     nominal,
     spin,
     symmetric_part,
     trace,
+    von_mises,
     zero_symmetric,
 )
 from karamelo_py.points.kinematics.tags import (
@@ -68,9 +72,11 @@ __all__ = [
     "add_pressure",
     "add_symmetric_dot",
     "add_tensor_dot",
+    "after_symmetric",
     "contract",
     "deform",
     "determinant",
+    "deviator",
     "diagonal",
     "dimension",
     "identity",
@@ -78,6 +84,7 @@ __all__ = [
     "inverse",
     "largest_component",
     "largest_row_sum",
+    "leading_symmetric",
     "left_cauchy_green",
     "multiply",
     "nominal",
@@ -90,6 +97,7 @@ __all__ = [
     "trace",
     "vector_at",
     "volume_ratio",
+    "von_mises",
     "zero_symmetric",
     "zero_tensor",
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from karamelo_py.compile import fma, point_function, real, shared
 from karamelo_py.points.kinematics.deformation import inverse, zero_tensor
 from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
@@ -103,6 +105,60 @@ def _(kin, factor, s, p):
         factor * s[4],
         factor * s[5],
     )
+
+
+@shared
+def deviator(kin, s):
+    """s - tr(s)/3 I of a symmetric tensor."""
+    return add_pressure(kin, real(1, s[0]), s, real(-1 / 3, s[0]) * trace(s))
+
+
+@shared
+def von_mises(kin, s):
+    """sqrt(3/2 s:s) of a deviatoric tensor, which is |s_xx - s_yy| in uniaxial stress."""
+    return sqrt(real(1.5, s[0]) * contract(kin, s, s))
+
+
+@point_function()
+def leading_symmetric(kin, values):
+    """The symmetric tensor that `values` begin with."""
+
+
+@leading_symmetric.on(Line)
+def _(kin, values):
+    return values[:3]
+
+
+@leading_symmetric.on(PlaneStrain)
+@leading_symmetric.on(Axisymmetric)
+def _(kin, values):
+    return values[:4]
+
+
+@leading_symmetric.on(Space)
+def _(kin, values):
+    return values[:6]
+
+
+@point_function()
+def after_symmetric(kin, values):
+    """What follows the symmetric tensor that `values` begin with, perhaps nothing."""
+
+
+@after_symmetric.on(Line)
+def _(kin, values):
+    return values[3:]
+
+
+@after_symmetric.on(PlaneStrain)
+@after_symmetric.on(Axisymmetric)
+def _(kin, values):
+    return values[4:]
+
+
+@after_symmetric.on(Space)
+def _(kin, values):
+    return values[6:]
 
 
 @point_function()

@@ -2,10 +2,41 @@
 
 A law is a NamedTuple of parameters (its class is the tag). It owns a state, a flat tuple with as
 many numbers as it needs; kernels only load it, pass it on and store it. All tensors have the
-components of the kinematics `kin`; `j` = det F is the volume over the reference volume.
+components of the kinematics `kin`; `j` = det F is the volume over the reference volume. A law may
+be composed of parts, NamedTuples among its parameters (`eos_strength`).
 """
 
+from typing import NamedTuple
+
 from karamelo_py.compile import point_function
+
+
+class Whole(NamedTuple):
+    """Tag of laws that have no parts."""
+
+
+@point_function()
+def separate(law):
+    """A tag that stands for the class of a law, and its parts, two at most.
+
+    Numba hands tuples of arrays to threads, but no tuples of such tuples: laws that are made of
+    parts cross one by one.
+    """
+
+
+@separate.otherwise
+def _(law):
+    return Whole(), law, ()
+
+
+@point_function()
+def assemble(tag, first, second):
+    """The law again from what `separate` returned."""
+
+
+@assemble.on(Whole)
+def _(tag, first, second):
+    return first
 
 
 @point_function()
@@ -51,6 +82,11 @@ def energy_density(law, kin, state):
 @point_function()
 def elastic_strain(law, kin, state):
     """Elastic strain, for output."""
+
+
+@point_function()
+def plastic_strain(law, kin, state):
+    """Equivalent plastic strain, for output; left out by laws without."""
 
 
 @point_function()

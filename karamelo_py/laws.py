@@ -1,0 +1,40 @@
+"""Laws of materials as a run needs them: in its precision, in tables, told apart by their types.
+
+A law is a NamedTuple of numbers, or of parts that are NamedTuples of numbers
+(:mod:`karamelo_py.points.materials`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+
+def law_kind(law: NamedTuple) -> tuple[type, ...]:
+    """The classes of a law and of its parts: laws of one kind share kernels and arrays.
+
+    A table of laws (`law_table`) is of the kind of its laws.
+    """
+    parts = [law_kind(part) for part in law if isinstance(part, tuple)]
+    return type(law), *(kind for part in parts for kind in part)
+
+
+def law_name(law: NamedTuple) -> str:
+    """The names of a law and of its parts, such as EosStrength(LinearPressure, Plastic)."""
+    parts = ", ".join(law_name(part) for part in law if isinstance(part, tuple))
+    return type(law).__name__ + (f"({parts})" if parts else "")
+
+
+def law_in(law: NamedTuple, real: type) -> NamedTuple:
+    """The law with its numbers in the type `real`."""
+    return type(law)(*(law_in(p, real) if isinstance(p, tuple) else real(p) for p in law))
+
+
+def law_table(laws: Sequence[NamedTuple], real: type) -> NamedTuple:
+    """The NamedTuple of `laws` of one kind with an array (m,) for each number, m their count."""
+    columns = zip(*laws, strict=True)
+    return type(laws[0])(
+        *(law_table(c, real) if isinstance(c[0], tuple) else np.array(c, real) for c in columns)
+    )

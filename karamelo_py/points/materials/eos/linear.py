@@ -1,0 +1,47 @@
+"""Pressure in proportion to the change of volume."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from karamelo_py.compile import real
+from karamelo_py.points.materials import specific_volume
+from karamelo_py.points.materials.eos import (
+    bulk_modulus,
+    compression_energy,
+    pressure,
+    ratio_at_pressure,
+)
+
+
+class LinearPressure(NamedTuple):
+    """p = K (1 - J)."""
+
+    specific_volume: float  # reference volume per mass
+    K: float  # bulk modulus
+
+
+@pressure.on(LinearPressure)
+def _(eos, j):
+    return eos.K * (real(1, eos.K) - j)
+
+
+@bulk_modulus.on(LinearPressure)
+def _(eos, j):
+    return eos.K * j
+
+
+@compression_energy.on(LinearPressure)
+def _(eos, j):
+    change = real(1, eos.K) - j
+    return real(0.5, eos.K) * eos.K * change * change
+
+
+@ratio_at_pressure.on(LinearPressure)
+def _(eos, p):
+    return real(1, eos.K) - p / eos.K
+
+
+@specific_volume.on(LinearPressure)
+def _(eos):
+    return eos.specific_volume

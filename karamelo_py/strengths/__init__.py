@@ -1,0 +1,1 @@
+"""Strengths: deviatoric stress from strain. One style a file, named as in the script."""

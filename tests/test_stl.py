@@ -1,0 +1,125 @@
+"""Region stl: what closed surfaces enclose."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from fakes_scene import FakeHub
+from meshed import cube_surface, enclosed_volume, sphere_surface, write
+from test_scene_script import message
+
+from karamelo_py.meshes.surface import Surface
+from karamelo_py.regions.stl import STL
+from karamelo_py.script.errors import ScriptError
+
+
+@pytest.fixture(params=[True, False], ids=["binary", "text"])
+def stl(request, tmp_path):
+    """Writes a surface to a file."""
+
+    def written(points, triangles):
+        path = tmp_path / "body.stl"
+        return write(path, points, {"triangle": triangles}, binary=request.param)
+
+    return written
+
+
+def test_a_cube(stl):
+    """Nodes on its faces belong to it; the body fills exactly its volume."""
+    hub = FakeHub(3, -0.5, 1.5, 0.1)
+    region = STL(hub, stl(*cube_surface(0.1, 0.9)))
+    nodes = hub.domain.node_positions()
+    want = ((nodes > 0.1 - 1e-6) & (nodes < 0.9 + 1e-6)).all(axis=1)
+    np.testing.assert_array_equal(region.inside(nodes), want)
+    assert math.isclose(hub.solid("s", region).volume0.sum(), 0.8**3, rel_tol=1e-12)
+    np.testing.assert_allclose(region.box_hi, 0.9, rtol=1e-6)
+    outside = STL(hub, stl(*cube_surface(0.1, 0.9)), "exterior")
+    np.testing.assert_array_equal(outside.inside(nodes), ~want)
+
+
+def test_a_sphere(stl):
+    """The volume of the polyhedron, by the divergence theorem, to within the lattice of points."""
+    points, triangles = sphere_surface(0.4, 24, 12, (0.05, 0, 0))
+    hub = FakeHub(3, -0.5, 0.5, 0.04)
+    solid = hub.solid("s", STL(hub, stl(points, triangles)))
+    assert math.isclose(solid.volume0.sum(), enclosed_volume(points, triangles), rel_tol=5e-3)
+    assert not hub.warnings
+
+
+def test_rays_through_edges_and_vertices_count_once():
+    """Positions straight below vertices, edges and the poles, off the surface itself."""
+    points, triangles = sphere_surface(1.0, 16, 8)
+    surface = Surface(points, triangles, 1e-9)
+    edges = (points[triangles] + points[np.roll(triangles, 1, axis=1)]).reshape(-1, 3) / 2
+    above = np.concatenate([points, edges])
+    for height in (-2.0, -0.01, 0.0, 0.013, 2.0):
+        x = above.copy()
+        x[:, 2] = height
+        radius = np.linalg.norm(x, axis=1)
+        inside = surface.encloses(x)
+        assert inside[radius < 0.9].all()
+        assert not inside[radius > 1 + 1e-9].any()
+
+
+def test_neither_the_order_of_vertices_nor_a_rotation_changes_what_is_inside():
+    rng = np.random.default_rng(3)
+    rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    points, triangles = cube_surface(-1, 1)
+    flipped = triangles.copy()
+    flipped[::2] = flipped[::2, ::-1]
+    local = rng.uniform(-1.3, 1.3, (20_000, 3))
+    local[:5000] = rng.choice([-0.5, 0.0, 0.5], (5000, 3))
+    local[5000:6000] = np.sign(local[5000:6000])  # vertices
+    want = (np.abs(local) <= 1).all(axis=1)
+    for faces in (triangles, flipped):
+        straight = Surface(points, faces, 1e-9).encloses(local)
+        turned = Surface(points @ rotation, faces, 1e-9).encloses(local @ rotation)
+        np.testing.assert_array_equal(straight, want)
+        np.testing.assert_array_equal(turned, want)
+
+
+def test_a_part_inside_is_a_cavity():
+    outer, faces = cube_surface(0, 1)
+    inner, _ = cube_surface(0.25, 0.75)
+    surface = Surface(np.concatenate([outer, inner]), np.concatenate([faces, faces + 8]), 1e-9)
+    x = np.array([[0.1, 0.1, 0.1], [0.5, 0.5, 0.5], [0.5, 0.5, 0.1], [0.5, 0.5, 1.1]])
+    np.testing.assert_array_equal(surface.encloses(x), [True, False, True, False])
+
+
+def test_vertices_with_few_digits_are_joined():
+    points, triangles = cube_surface()
+    apart = points[triangles].reshape(-1, 3)
+    apart += np.random.default_rng(4).uniform(-1e-8, 1e-8, apart.shape)
+    surface = Surface(apart, np.arange(len(apart)).reshape(-1, 3), 1e-6)
+    np.testing.assert_array_equal(
+        surface.encloses(np.array([[0.5, 0.5, 0.5], [0.3, 0.3, -0.1]])), [True, False]
+    )
+
+
+SCENE = "dimension(3, 0, 1, 0, 1, 0, 1, 0.1)\n"
+
+
+def test_an_open_surface_is_refused(stl, monkeypatch):
+    points, triangles = cube_surface()
+    path = stl(points, triangles[:-1])
+    monkeypatch.chdir(path.parent)
+    text = message(SCENE + "region(r, stl, body.stl)")
+    assert "the surface is not closed: 3 edges belong to one triangle only" in text
+    assert re.search(r"^ +\| +\^{8}$", text, re.M)
+
+
+def test_what_is_no_surface(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    points, triangles = cube_surface()
+    write("body.stl", points, {"triangle": triangles})
+    write("box.vtu", points, {"hexahedron": [range(8)]})
+    assert "in 3D only" in message("dimension(2, 0, 1, 0, 1, 0.1)\nregion(r, stl, body.stl)")
+    assert "box.vtu has no triangles" in message(SCENE + "region(r, stl, box.vtu)")
+    assert "outside" in message(SCENE + "region(r, stl, body.stl, outside)")
+    (tmp_path / "cut.stl").write_bytes((tmp_path / "body.stl").read_bytes()[:150])
+    assert "cut.stl cannot be read as a mesh" in message(SCENE + "region(r, stl, cut.stl)")
+    with pytest.raises(ScriptError, match="not exist"):
+        from karamelo_py.script.interpreter import Interpreter
+
+        Interpreter(FakeHub(3)).run_text("region(r, stl, bdy.stl)")

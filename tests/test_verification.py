@@ -1,0 +1,307 @@
+"""The scenes of inputs/ against exact solutions: orders of convergence, frequencies, momenta.
+
+Rows of the tables whose styles are not installed are skipped and run once they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import exact
+import numpy as np
+import pytest
+from conftest import INPUTS
+from verification import (
+    BERNSTEIN,
+    CPDI_Q,
+    CPDI_R,
+    CUBIC,
+    LINEAR,
+    QUADRATIC,
+    STRETCH,
+    TOTAL,
+    TOTAL_BERNSTEIN,
+    TOTAL_CPDI,
+    TOTAL_CUBIC,
+    UGIMP,
+    errors_on,
+    last_dump,
+    order,
+    run_scene,
+    table,
+    transfers,
+)
+
+# --- Axis-aligned manufactured solution ---------------------------------------------------------
+
+# Cells of 1/8, 1/16, 1/32: the coarsest resolves the half wave by eight cells.
+GRIDS = (0.5, 1, 2)
+# Displacements that stay in their cells (below h/4), and those that cross up to three of them.
+SMALL, LARGE = 1e-4, 0.1
+
+# Lumped masses and midpoint quadrature are of second order whatever the basis, and the time steps
+# shrink with h. Slopes over grids this coarse are off by a tenth or two; 0.3 is allowed.
+SECOND_ORDER = [
+    (LINEAR,),
+    (QUADRATIC,),
+    (CUBIC,),
+    (BERNSTEIN,),
+    (UGIMP,),
+    (STRETCH,),
+    (CPDI_R,),
+    (CPDI_Q,),
+    (TOTAL,),
+    (TOTAL_CUBIC,),
+    (TOTAL_BERNSTEIN,),
+    (TOTAL_CPDI,),
+]
+
+
+@pytest.mark.parametrize(("way",), table(*SECOND_ORDER))
+@pytest.mark.parametrize("scene", ["axis_aligned", "axis_aligned_1d"])
+def test_axis_aligned_is_of_second_order_at_small_amplitude(run_script, scene, way):
+    if scene.endswith("1d") and "cpdi" in way.kind:
+        pytest.skip("CPDI domains R4 and Q4 are two-dimensional")
+    errors = errors_on(run_script, scene, way, GRIDS, G=SMALL)
+    assert order([1 / grid for grid in GRIDS], errors) > 1.7, errors
+    # A half wave over 32 cells: (pi/32)^2 = 1 %, times a constant below one.
+    assert errors[-1] < 0.01
+
+
+def test_linear_basis_loses_all_order_when_points_cross_cells(run_script):
+    """The gradient of the hat functions jumps under the points (Steffen et al. 2008)."""
+    errors = errors_on(run_script, "axis_aligned", LINEAR, (0.5, 1, 2), G=LARGE)
+    assert order([2, 1, 0.5], errors) < 0, errors
+    assert errors[-1] > 0.5  # nothing of the solution is left
+
+
+# What cures cell crossing: (way, least order). Total Lagrangian methods never cross and keep their
+# order; the smooth bases keep most of it.
+CURES = [
+    (QUADRATIC, 1.0),
+    (CUBIC, 1.0),
+    (STRETCH, 1.0),
+    (CPDI_R, 1.0),
+    (CPDI_Q, 1.0),
+    (TOTAL, 1.7),
+    (TOTAL_CUBIC, 1.7),
+    (TOTAL_BERNSTEIN, 1.7),
+    (TOTAL_CPDI, 1.7),
+]
+
+
+@pytest.mark.parametrize(("way", "least"), table(*CURES))
+def test_cures_of_cell_crossing_keep_an_order(run_script, way, least):
+    errors = errors_on(run_script, "axis_aligned", way, GRIDS, G=LARGE)
+    assert order([1 / grid for grid in GRIDS], errors) > least, errors
+    assert errors[-1] < 0.1
+
+
+def test_wrong_body_force_does_not_converge(run_script):
+    """The test above sees an error: a modulus of the source 5 % off leaves an error that stays."""
+    text = (INPUTS / "in.axis_aligned_1d").read_text("utf-8")
+    assert "mu*(1 + 1/F^2) - E)" in text
+    wrong = text.replace("mu*(1 + 1/F^2) - E)", "mu*(1 + 1/F^2) - 1.05*E)")
+    errors = []
+    for grid in GRIDS:
+        result = run_script(wrong, "-var", "refine", str(grid), "-var", "G", str(SMALL))
+        errors.append(result.log.error_z[-1])
+    assert order([1 / grid for grid in GRIDS], errors) < 1.5, errors
+    assert errors[-1] > 0.01
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("way",), table(*SECOND_ORDER))
+def test_axis_aligned_at_published_size(run_script, way):
+    """Down to 1/128. Points leave their places by up to G: with G/h = 0.013 nothing shows of it."""
+    grids = (1, 2, 4, 8)
+    errors = errors_on(run_script, "axis_aligned", way, grids, G=1e-5)
+    assert order([1 / grid for grid in grids], errors) > 1.8, errors
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("way",), table((LINEAR,), (QUADRATIC,), (CUBIC,), (TOTAL,)))
+def test_axis_aligned_3d(run_script, way):
+    errors = errors_on(run_script, "axis_aligned_3d", way, GRIDS, G=SMALL)
+    assert order([1 / grid for grid in GRIDS], errors) > 1.7, errors
+
+
+# --- Generalised vortex -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("way",), table((LINEAR,), (QUADRATIC,), (CUBIC,), (STRETCH,), (TOTAL,)))
+def test_vortex_converges_at_small_angle(run_script, way):
+    """Cells of 1/8, 1/16, 1/32; the ring is 0.5 wide, its profile changes within four cells.
+
+    At 1/8 that is not yet the range of second order: linear has a slope of 1.4.
+    """
+    errors = errors_on(run_script, "vortex", way, GRIDS, G=0.01)
+    assert order([1 / grid for grid in GRIDS], errors) > 1.2, errors
+    assert errors[-1] < 0.12
+
+
+@pytest.mark.parametrize("factor", [-1, 2])
+def test_vortex_does_not_converge_with_a_wrong_source(run_script, factor):
+    """The shear of the tangential source with another factor: the error stays above one half."""
+    text = (INPUTS / "in.vortex").read_text("utf-8")
+    assert "- m*(3*g*w1" in text
+    wrong = text.replace("- m*(3*g*w1", f"- {factor}*m*(3*g*w1").replace("- -1*", "+ ")
+    result = run_script(wrong, "-var", "refine", "1", "-var", "G", "0.01")
+    assert result.log.error_z[-1] > 0.5
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("way",), table((TOTAL,), (TOTAL_CUBIC,), (TOTAL_BERNSTEIN,)))
+def test_vortex_at_a_radian(run_script, way):
+    """The published amplitude; total Lagrangian methods do not notice the rotation."""
+    errors = errors_on(run_script, "vortex", way, (1, 2, 4), G=1)
+    assert order([1, 0.5, 0.25], errors) > 1.5, errors
+
+
+# --- Column under its weight --------------------------------------------------------------------
+
+
+def column_error(run_script, way, grid, g=9.81):
+    """sum |sigma_yy - exact| V0 / (rho g l0 V0tot), as Wyser et al. 2020 measure."""
+    points = last_dump(run_scene(run_script, "column", way, refine=grid, g=g), "column")
+    return np.abs(points.s22 - exact.column_stress(points.y0, 80, g, 10)).mean() / (80 * g * 10)
+
+
+def test_linear_basis_has_one_stress_a_cell_while_points_stay(run_script):
+    """A hundredth of the weight: the top sinks by h/16 at most, and no point crosses.
+
+    The stress is then that of the middle of the cell, and points lie h/4 off it: an error of
+    1 / (4 n) with n cells, exactly. The base carries the weight, but for 1 % that swings.
+    """
+    for cells in (4, 8, 16):
+        error = column_error(run_script, LINEAR, cells / 16, g=0.0981)
+        assert error * 4 * cells == pytest.approx(1, rel=1e-3)
+    log = run_scene(run_script, "column", LINEAR, refine=1, g=0.0981).log
+    assert log.base_y[-1] == pytest.approx(80 * 0.0981 * 10 * 10 / 16, rel=0.02)
+
+
+def test_linear_basis_does_not_converge_on_the_column(run_script):
+    """Points cross cells, and each has a stress of its own: 4 to 16 cells bring no order."""
+    errors = [column_error(run_script, LINEAR, grid) for grid in (0.25, 0.5, 1)]
+    assert order([4, 2, 1], errors) < 0.8, errors
+    assert errors[-1] > 0.05
+
+
+@pytest.mark.parametrize(
+    ("way",), table((replace(STRETCH, domains="diagonal"),), (CPDI_R,), (CPDI_Q,))
+)
+def test_column_is_of_second_order(run_script, way):
+    """Wyser et al. 2020, figure 5: cpGIMP and CPDI2q. 0.3 for coarse grids."""
+    errors = [column_error(run_script, way, grid) for grid in (0.25, 0.5, 1)]
+    assert order([4, 2, 1], errors) > 1.7, errors
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("way",), table((STRETCH,), (CPDI_R,), (CPDI_Q,), (CUBIC,), (TOTAL,)))
+def test_column_on_finer_grids(run_script, way):
+    errors = [column_error(run_script, way, grid) for grid in (0.5, 1, 2, 4)]
+    assert order([2, 1, 0.5, 0.25], errors) > 1.7, errors
+
+
+# --- Vibrating bar ------------------------------------------------------------------------------
+
+
+def frequency(time, v):
+    """omega from the falls of a velocity through zero, linear in between."""
+    falls = np.flatnonzero((v[:-1] > 0) & (v[1:] <= 0))
+    crossings = time[falls] + (time[falls + 1] - time[falls]) * v[falls] / (v[falls] - v[falls + 1])
+    return 2 * pi * (len(crossings) - 1) / (crossings[-1] - crossings[0])
+
+
+@pytest.mark.parametrize(
+    ("way",),
+    table(
+        *[(way,) for way in transfers("FLIP", "AFLIP", "ASFLIP")],
+        (QUADRATIC,),
+        (CUBIC,),
+        (UGIMP,),
+        (STRETCH,),
+        (TOTAL,),
+    ),
+)
+def test_bar_keeps_its_frequency(run_script, way):
+    """Ten periods, 25 cells: within 0.2 %.
+
+    Lumping and hats change omega by (k h)^2 / 24 with k h = pi / 50: 2e-4; masses that the free end
+    shares with an empty node count as up to h/4 of length, 1 % of it, but of second order in k h
+    where the wave has no slope.
+    """
+    log = run_scene(run_script, "vibrating_bar", way).log
+    assert frequency(log.Time, log.v_x) == pytest.approx(exact.bar_frequency(25, 100, 1), rel=2e-3)
+    total = log.Ek + log.Es
+    first, last = total[log.Time < 10].mean(), total[log.Time > 90].mean()
+    assert 0.98 < last / first < 1.002
+
+
+# --- Spinning disk ------------------------------------------------------------------------------
+
+
+def disk(run_script, way, **variables):
+    """Angular momentum and total energy after a turn, relative to the start."""
+    log = run_scene(run_script, "spinning_disk", way, **variables).log
+    total = log.Ek + log.Es
+    # A staircase of points is heavier than the disk by 1 to 2 %; L and E belong to each other.
+    assert log.Lz_z[0] == pytest.approx(pi / 2, rel=0.03)
+    assert log.Ek[0] == pytest.approx(log.Lz_z[0] / 2, rel=1e-9)
+    return log.Lz_z[-1] / log.Lz_z[0], total[-1] / total[0]
+
+
+def test_apic_keeps_angular_momentum(run_script):
+    """To the ten digits of the log: 1600 steps of round-off stay far below."""
+    momentum, energy = disk(run_script, replace(LINEAR, transfer="APIC"))
+    assert momentum == pytest.approx(1, abs=1e-8)
+    assert 0.9 < energy < 1.001
+
+
+def test_flip_loses_little_angular_momentum_and_pic_nearly_all(run_script):
+    momentum, energy = disk(run_script, LINEAR)
+    assert 0.95 < momentum < 1.001
+    assert 0.9 < energy < 1.03  # the points cross cells, which feeds FLIP 1.5 %
+    momentum, energy = disk(run_script, replace(LINEAR, transfer="PIC"))
+    assert momentum < 0.5
+    assert energy < 0.25
+
+
+@pytest.mark.parametrize(("way",), table(*[(way,) for way in transfers("TPIC", "MLS", "AFLIP")]))
+def test_affine_kin_keep_angular_momentum(run_script, way):
+    """What carries a gradient with the point: below 1 % in a turn."""
+    momentum, energy = disk(run_script, way)
+    assert momentum == pytest.approx(1, abs=0.01)
+    assert 0.8 < energy < 1.01
+
+
+# --- Two disks: when contact is felt ------------------------------------------------------------
+
+# Two points feel each other while their functions overlap: 2, 3, 4 cells along each axis; along
+# each axis the disks close in with 2 v.
+SUPPORTS = [(LINEAR, 2), (QUADRATIC, 3), (CUBIC, 4), (UGIMP, 3), (STRETCH, 3)]
+
+
+@pytest.mark.parametrize(("way", "support"), table(*SUPPORTS))
+def test_contact_is_felt_early_in_proportion_to_the_cells(run_script, way, support):
+    """Exact: 1.5858 s. Felt (a ten-thousandth of the energy stored) not after 1.6, and not earlier
+    than the functions overlap, support h / (2 v); half the cells, about half the lead.
+    """
+    method = f"method({way.kind}, FLIP, {way.basis}, 1, {way.domains})"
+    text = (INPUTS / "in.two_disks").read_text("utf-8")
+    assert "method(ulmpm, FLIP, linear, 1)" in text
+    text = text.replace("method(ulmpm, FLIP, linear, 1)", method).replace("output(50)", "output(5)")
+    leads = []
+    for cells in (20, 40, 80):
+        options = ["-var", "N", str(cells), "-var", "ppc", "2"]
+        result = run_script(
+            text.replace("run_time(3.5)", "run_time(1.7)"), *options, folder=str(cells)
+        )
+        log = result.log
+        felt = log.Time[np.argmax(log.Es > 1e-4 * log.Ek[0])]
+        lead = exact.contact_time(0.6 * 2**0.5, 0.4, 0.2 * 2**0.5) - felt
+        assert -0.02 < lead < support / cells / 0.2, (cells, lead)
+        leads.append(lead)
+    # The lead is of first order; the staircase of points blurs it.
+    assert 0.5 < order([4, 2, 1], leads) < 1.6, leads
