@@ -116,6 +116,11 @@ class Fields:
             return None
         return simulation.by_id(lambda block: block.points.moment)
 
+    @property
+    def has_point_forces(self) -> bool:
+        """Whether a fix puts forces on points."""
+        return self._simulation.setup.blocks[0].points.force is not None
+
     def members(self, group: Any) -> np.ndarray:
         """Ids (0-based) of a particle group."""
         return self._simulation.members(group)
@@ -171,6 +176,8 @@ class Fields:
         if name[:1] in "se" and name[1:] in COMPONENTS:
             first = 0 if name[0] == "s" else STRAIN
             return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
+        if name in ("bx", "by", "bz") and self.has_point_forces:
+            return _column(simulation.by_id(lambda b: b.points.force), AXES.index(name[1]))
         return np.zeros(simulation.count)
 
     def node(self, name: str) -> np.ndarray:

@@ -102,6 +102,8 @@ def _(hooks, stage, target, s):
 @at_points.on(PythonHooks)
 def _(hooks, stage, then, s):
     at_points(hooks.compiled, stage, then, s)
+    if stage == INITIAL_INTEGRATE:
+        hooks.simulation.clear_forces()
     for fix, hook in hooks.by_stage.get(stage, ()):
         view = PointsView(hooks.simulation, fix.group, bool(then))
         hook(view)
@@ -216,6 +218,12 @@ class Simulation:
                 impose_stress(s.kin, like, block.points, block.laws, part, flags, rows)
         self.version += 1
 
+    def clear_forces(self) -> None:
+        """Points bear no force of fixes, until these say so anew."""
+        for block in self.setup.blocks:
+            if block.points.force is not None:
+                block.points.force[:] = 0
+
     # --- stepping -----------------------------------------------------------------------------
 
     def begin(self, end_time: float) -> None:
@@ -305,6 +313,7 @@ class Simulation:
             if status in (DONE, SORT):
                 self._begun |= set(self._first_fixes)
                 self._first = None
+                self.clear_forces()  # the steps to come may have no hook that does it
                 return SORT  # there is more to do, unless that was all
             return status
         if self._python.by_stage:

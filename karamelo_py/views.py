@@ -189,6 +189,24 @@ class PointsView(_View):
         """(n,) masses; read only."""
         return self._gather(lambda block: block.points.mass)
 
+    @property
+    def force(self) -> np.ndarray:
+        """(n, d) forces that fixes put on the points; add to it in ``initial_integrate``.
+
+        Only for fixes with ``puts_force_on_points = True``. It is zero before the first of them.
+        """
+        return self._gather(self._force)
+
+    @force.setter
+    def force(self, value: np.ndarray) -> None:
+        self._scatter(self._force, value)
+
+    @staticmethod
+    def _force(block: Any) -> np.ndarray:
+        if block.points.force is None:
+            raise ValueError("points have no force: the fix needs puts_force_on_points = True")
+        return block.points.force
+
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
         self._simulation.set_stress(self.ids, given)

@@ -12,6 +12,8 @@ from karamelo_py.signature import OutputFile, Positive
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
+POINT_FORCE = ("bx", "by", "bz")  # there when a fix puts forces on points
+
 
 class Dump:
     """Base of the dump styles: override `write`, which is called when the dump is due.
@@ -56,6 +58,8 @@ class Dump:
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
         """Warn of columns that are 0 because no point or node (`what`) keeps them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]
+        if what == "points" and any(fix.puts_force_on_points for fix in self.hub.fixes.values()):
+            empty = [name for name in empty if name not in POINT_FORCE]
         if empty:
             self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} have no such field")
 

@@ -1,0 +1,210 @@
+"""Pairs of points of two bodies that touch: found with linked cells, and what they do.
+
+Everything here is in the order of the points' ids and runs on one thread: the sums do not depend on
+threads nor on how the points are sorted. It takes double precision throughout.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.compile import kernel
+from karamelo_py.points.kinematics import dimension, vector_at
+from karamelo_py.points.materials import initial_state, jacobian, specific_volume
+from karamelo_py.points.pairs import force_between, radius
+from karamelo_py.tensors import record, row, subtract
+
+
+class Bodies(NamedTuple):
+    """The points of two bodies by id, those of the second (from `first2` on) behind the others."""
+
+    x: np.ndarray  # (n, d)
+    v: np.ndarray  # (n, d)
+    mass: np.ndarray  # (n,)
+    radius: np.ndarray  # (n,)
+    force: np.ndarray  # (n, d)
+    first2: int
+
+
+class Cells(NamedTuple):
+    """Scratch of the search."""
+
+    start: np.ndarray  # (c + 1,) int64: room for c cells
+    cell: np.ndarray  # (n,) int64: the cell of each point, or -1 where nothing can touch it
+    order: np.ndarray  # (n,) int64: points of the second body by cell
+    corner: np.ndarray  # (3,) float64: lower corner of the cells
+    length: np.ndarray  # (3,) float64: lengths of the region that they cover
+    count: np.ndarray  # (3,) int64: cells along each direction
+
+
+@kernel
+def collect(kin, x, points, laws, ids, begin1, end1, begin2, end2, bodies):
+    """Take from a block the points whose ids lie in one of the two ranges."""
+    for p in range(ids.size):
+        if begin1 <= ids[p] < end1:
+            i = ids[p] - begin1
+        elif begin2 <= ids[p] < end2:
+            i = ids[p] - begin2 + bodies.first2
+        else:
+            continue
+        law = record(laws, points.material[p])
+        mass = points.mass[p]
+        state = row(points.state, p, 0, initial_state(law, kin, mass))
+        volume = mass * specific_volume(law) * jacobian(law, kin, state)
+        bodies.mass[i] = mass
+        for k in range(dimension(kin)):
+            bodies.x[i, k] = x[p, k]
+            bodies.v[i, k] = points.v[p, k]
+            bodies.force[i, k] = 0.0
+        bodies.radius[i] = radius(kin, float(volume), vector_at(kin, bodies.x, i))
+
+
+@kernel
+def distribute(kin, points, ids, begin1, end1, begin2, end2, bodies):
+    """Add the forces to the points of a block."""
+    for p in range(ids.size):
+        if begin1 <= ids[p] < end1:
+            i = ids[p] - begin1
+        elif begin2 <= ids[p] < end2:
+            i = ids[p] - begin2 + bodies.first2
+        else:
+            continue
+        for k in range(dimension(kin)):
+            points.force[p, k] += bodies.force[i, k]
+
+
+@kernel
+def _range(x, begin, end, k):
+    """Least and largest coordinate k of some points."""
+    lo, hi = inf, -inf
+    for i in range(begin, end):
+        lo = min(lo, x[i, k])
+        hi = max(hi, x[i, k])
+    return lo, hi
+
+
+@kernel
+def _largest(values, begin, end):
+    largest = 0.0
+    for i in range(begin, end):
+        largest = max(largest, values[i])
+    return largest
+
+
+@kernel
+def _lay_cells(d, bodies, cells, reach):
+    """Cells over all places where the bodies may touch; returns their width, 0 if there are none.
+
+    They are as wide as two points that touch can be apart, or wider where there is no room.
+    """
+    n, m = bodies.first2, bodies.mass.size
+    width = min(_largest(bodies.radius, 0, n) + _largest(bodies.radius, n, m), reach)
+    if not width > 0:
+        return 0.0
+    for k in range(d):
+        lo1, hi1 = _range(bodies.x, 0, n, k)
+        lo2, hi2 = _range(bodies.x, n, m, k)
+        cells.corner[k] = max(lo1, lo2) - width
+        # The length, for now; so written, NaN means that there are none.
+        length = min(hi1, hi2) + width - cells.corner[k]
+        if not 0 <= length < inf:
+            return 0.0
+        cells.length[k] = length
+    room = cells.start.size - 1
+    while True:
+        total = 1.0
+        for k in range(3):
+            along = np.floor(cells.length[k] / width) + 1 if k < d else 1.0
+            total *= along
+            if total > room:
+                break
+            cells.count[k] = int(along)
+        if total <= room:
+            return width
+        width *= 2.0
+
+
+@kernel
+def _find_cells(d, bodies, cells, width):
+    """The cell of every point, and those of the second body sorted by it, stably."""
+    n, m = bodies.first2, bodies.mass.size
+    used = cells.count[0] * cells.count[1] * cells.count[2]
+    cells.start[: used + 1] = 0
+    for i in range(m):
+        number = 0
+        for k in range(d):
+            a = bodies.x[i, k] - cells.corner[k]
+            if not 0 <= a <= cells.length[k]:
+                number = -1
+                break
+            number = number * cells.count[k] + min(int(a / width), cells.count[k] - 1)
+        cells.cell[i] = number
+        if i >= n and number >= 0:
+            cells.start[number + 1] += 1
+    for c in range(used):
+        cells.start[c + 1] += cells.start[c]
+    # start[c] moves on to the end of cell c, which is where cell c + 1 begins.
+    for j in range(n, m):
+        c = cells.cell[j]
+        if c >= 0:
+            cells.order[cells.start[c]] = j
+            cells.start[c] += 1
+
+
+@kernel
+def _touch(law, kin, bodies, reach, dt, i, j, total):
+    """The force between two points, if they touch; whether they do."""
+    x, f = bodies.x, bodies.force
+    dx = subtract(vector_at(kin, x, j), vector_at(kin, x, i))
+    squared = 0.0
+    for k in range(dimension(kin)):
+        if not abs(dx[k]) < reach:
+            return 0
+        squared += dx[k] * dx[k]
+    both = bodies.radius[i] + bodies.radius[j]
+    if not 0 < squared < both * both:
+        return 0
+    dv = subtract(vector_at(kin, bodies.v, j), vector_at(kin, bodies.v, i))
+    force = force_between(
+        law, kin, dx, sqrt(squared), bodies.radius[i], bodies.radius[j],
+        bodies.mass[i], bodies.mass[j], dv, dt,
+    )  # fmt: skip
+    for k in range(dimension(kin)):
+        f[i, k] += force[k]
+        f[j, k] -= force[k]
+        total[k] += force[k]
+    return 1
+
+
+@kernel
+def push_apart(law, kin, bodies, cells, reach, dt, total):
+    """Add the forces of all pairs that touch; returns their number.
+
+    Two points touch when they are closer than the sum of their radii, and closer than `reach` in
+    every direction. `total` (3,) takes the force on the first body.
+    """
+    d = dimension(kin)
+    total[:] = 0.0
+    touching = 0
+    width = _lay_cells(d, bodies, cells, reach)
+    if not width > 0:
+        return touching
+    _find_cells(d, bodies, cells, width)
+    nx, ny, nz = cells.count[0], cells.count[1], cells.count[2]
+    for i in range(bodies.first2):
+        c = cells.cell[i]
+        if c < 0:
+            continue
+        cx, cy, cz = c // (ny * nz), c // nz % ny, c % nz
+        for a in range(max(cx - 1, 0), min(cx + 2, nx)):
+            for b in range(max(cy - 1, 0), min(cy + 2, ny)):
+                # Cells along the last direction follow each other, and so do their points.
+                first = (a * ny + b) * nz + max(cz - 1, 0)
+                last = (a * ny + b) * nz + min(cz + 1, nz - 1)
+                begin = cells.start[first - 1] if first > 0 else 0
+                for q in range(begin, cells.start[last]):
+                    touching += _touch(law, kin, bodies, reach, dt, i, cells.order[q], total)
+    return touching

@@ -1,0 +1,83 @@
+"""Forces between two points of different bodies. The laws are tags; bodies touch as spheres do."""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+from typing import NamedTuple
+
+from karamelo_py.compile import point_function
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, dimension
+from karamelo_py.tensors import add_scaled, scale
+
+
+class Hertz(NamedTuple):
+    """Spheres (in the plane, disks) that are pressed together elastically."""
+
+    modulus: float  # E* with 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2
+
+
+class MinimizePenetration(NamedTuple):
+    """The force that undoes the penetration of two free points within a step, with friction."""
+
+    friction: float  # coefficient of Coulomb friction
+
+
+@point_function()
+def radius(kin, volume, x):
+    """Radius of the point's body: half the side of a cube of its volume."""
+
+
+@radius.on(Line)
+def _(kin, volume, x):
+    return 0.5 * volume
+
+
+@radius.on(PlaneStrain)
+def _(kin, volume, x):
+    return 0.5 * sqrt(volume)
+
+
+@radius.on(Axisymmetric)
+def _(kin, volume, x):
+    # The volume is that of one radian of a ring.
+    return 0.5 * sqrt(volume / x[0]) if x[0] > 0 else 0.0
+
+
+@radius.on(Space)
+def _(kin, volume, x):
+    return 0.5 * volume ** (1.0 / 3.0)
+
+
+@point_function()
+def force_between(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt):
+    """Force on point 1 from point 2, at dx = x2 - x1 with |dx| = r below the sum of the radii."""
+
+
+@force_between.on(Hertz)
+def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt):
+    p = radius1 + radius2 - r
+    round_ = radius1 * radius2 / (radius1 + radius2)
+    stiffness = 4.0 / 3.0 if dimension(kin) == 3 else pi / 4.0
+    return scale(-stiffness * law.modulus * sqrt(round_ * p * p * p) / r, dx)
+
+
+@force_between.on(MinimizePenetration)
+def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt):
+    reduced = mass1 * mass2 / (mass1 + mass2)
+    p = radius1 + radius2 - r
+    push = reduced * p / (dt * dt)
+    force = scale(-push / r, dx)
+    if law.friction > 0:
+        along = 0.0
+        for k in range(dimension(kin)):
+            along += dv[k] * dx[k]
+        slide = add_scaled(dv, -along / (r * r), dx)
+        slip = 0.0
+        for k in range(dimension(kin)):
+            slip += slide[k] * slide[k]
+        slip = sqrt(slip)
+        if slip > 0:
+            # Friction stops the slip of two free points at most: it does not turn it around.
+            rub = min(law.friction * push, reduced * slip / dt)
+            force = add_scaled(force, rub / slip, slide)
+    return force
