@@ -45,11 +45,16 @@ def dimension(kinematics: str) -> int:
     return {"line": 1, "plane": 2, "axisymmetric": 2, "space": 3}[kinematics]
 
 
-def refused(kind: str, basis: str, transfer: str, scheme: str) -> bool:
-    """Whether the combination is refused: D vanishes at nodes and points move through them."""
-    inverts = transfer in ("APIC", "AFLIP", "ASFLIP", "MLS")
-    unsteady = basis in ("linear", "Bernstein-quadratic") and kind in ("ulmpm", "ulmpm/contacts")
-    return inverts and unsteady and scheme != "musl"
+def refused(kind: str, basis: str, option: str, transfer: str, scheme: str) -> str:
+    """What the message says where the combination is refused; empty where it runs."""
+    moves = kind in ("ulmpm", "ulmpm/contacts")
+    # D vanishes at nodes, or with a domain that vanishes, and points move through the grid.
+    unsteady = moves and (basis in ("linear", "Bernstein-quadratic") or option == "diagonal")
+    if transfer in ("APIC", "AFLIP", "ASFLIP", "MLS") and unsteady and scheme != "musl":
+        return "is unstable"
+    if transfer == "ASFLIP" and kind == "ulcpdi" and option in ("Q4", "H8", "T3", "Tet4"):
+        return "moves points faster than the grid"
+    return ""
 
 
 def scene(
@@ -72,8 +77,10 @@ def scene(
     centre = LO + SIDE / 2
     velocities = []
     for k, axis in enumerate("xyz"[:d]):
-        u = 0.0 if kinematics == "axisymmetric" and k == 0 else SPEED[k]
-        velocities.append(f"{u} + 0.5*({axis}0 - {centre})")
+        if kinematics == "axisymmetric":  # masses grow with the radius
+            velocities.append(("0.5*x0", str(SPEED[1]))[k])
+        else:
+            velocities.append(f"{SPEED[k]} + 0.5*({axis}0 - {centre})")
     box = ", ".join(f"{LO}, {end_}" for end_ in hi)
     lines = [
         f"method({kind}, {TRANSFERS[transfer].format(basis=basis)}{end})",

@@ -271,7 +271,9 @@ SHORT = "ulcpdi, FLIP, linear, 1, R4"
 ])  # fmt: skip
 def test_momentum_is_kept(run_interpreted, method, scheme):
     """A block that flies and deforms: the sum is that of before to round-off."""
-    log = run_interpreted(block(method, f"scheme({scheme})", *TWIST, "dt_factor(0.3)", "run(6)")).log
+    log = run_interpreted(
+        block(method, f"scheme({scheme})", *TWIST, "dt_factor(0.3)", "run(6)")
+    ).log
     assert log.u_x[-1] == pytest.approx(log.u_x[0], rel=1e-9)  # ten digits in the log
     assert log.u_y[-1] == pytest.approx(log.u_y[0], rel=1e-9)
 
