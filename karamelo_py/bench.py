@@ -29,12 +29,12 @@ from karamelo_py.simulation import Simulation
 
 DISKS = """
 h = 1/N
-method(ulmpm, FLIP, linear, 1)
+method(kind, transfer, basis, option)
 scheme(style)
 dimension(2, -0.5, 0.5, -0.5, 0.5, h)
 region(lower, cylinder, -0.3, -0.3, 0.2)
 region(upper, cylinder, 0.3, 0.3, 0.2)
-material(rubber, linear, 1000, 1000, 0.3)
+material(rubber, law, 1000, 1000, 0.3)
 solid(disk1, region, lower, 2, rubber, h, 0)
 solid(disk2, region, upper, 2, rubber, h, 0)
 group(disk1, particles, region, lower, solid, disk1)
@@ -50,14 +50,25 @@ fix(load, body_force, all, 1e-3*sin(x0)*cos(time), 1e-3*y0*time)
 
 BLOCK = """
 h = 1/N
-method(ulmpm, FLIP, linear, 1)
+method(kind, transfer, basis, option)
 scheme(style)
 dimension(3, 0, 2, 0, 2, 0, 2, h)
 region(cube, block, 0.5, 1.5, 0.5, 1.5, 0.5, 1.5)
-material(rubber, linear, 1000, 1000, 0.3)
+material(rubber, law, 1000, 1000, 0.3)
 solid(cube, region, cube, 2, rubber, h, 0)
 fix(v, initial_velocity_particles, all, 0.1*y0, 0.1*z0, 0.1*x0)
 set_dt(0.02*h)
+"""
+# The bar of Taylor's test (radius 3.8, length 25.4, cells of 0.25, one point a cell).
+BAR = """
+method(kind, transfer, basis, option)
+scheme(style)
+dimension(3, -10, 10, -10, 10, -1, 30, 0.25)
+region(bar, cylinder, z, 0, 0, 3.8, 0, 25.4)
+material(copper, law, 8.94e-6, 115, 0.31)
+solid(bar, region, bar, 1, copper, 0.25, 0)
+fix(v, initial_velocity_particles, all, 0, 0, -0.19*z0/25.4)
+set_dt(1e-5)
 """
 MOST_STEPS = 2500  # in these scenes nothing leaves the domain before
 
@@ -70,15 +81,52 @@ class Workload(NamedTuple):
     variables: dict[str, str]
 
 
+# FLIP with linear functions and musl, unless a workload says otherwise.
+USUAL = {
+    "kind": "ulmpm", "transfer": "FLIP", "basis": "linear", "option": "1", "style": "musl",
+    "law": "linear",
+}  # fmt: skip
+# The single pass of the fastest rivals.
+SINGLE_PASS = {
+    "transfer": "MLS", "basis": "quadratic-spline", "option": "mechanical", "style": "usl",
+    "law": "neo-hookean",
+}  # fmt: skip
+
+
+def _workload(title: str, script: str, **variables: str) -> Workload:
+    return Workload(title, script, {**USUAL, **variables})
+
+
 WORKLOADS = {
-    "disks-20": Workload("two disks, 20 cells a side", DISKS, {"N": "20", "style": "musl"}),
-    "disks-80": Workload("two disks, 80 cells a side", DISKS, {"N": "80", "style": "musl"}),
-    "disks-320": Workload("two disks, 320 cells a side", DISKS, {"N": "320", "style": "musl"}),
-    "disks-320-usl": Workload("the same with usl", DISKS, {"N": "320", "style": "usl"}),
-    "disks-80-formula": Workload(
-        "two disks with a body force by formula", DISKS + FORMULA, {"N": "80", "style": "musl"}
+    "disks-20": _workload("two disks, 20 cells a side", DISKS, N="20"),
+    "disks-80": _workload("two disks, 80 cells a side", DISKS, N="80"),
+    "disks-320": _workload("two disks, 320 cells a side", DISKS, N="320"),
+    "disks-320-usl": _workload("the same with usl", DISKS, N="320", style="usl"),
+    "disks-320-quadratic": _workload(
+        "the same with quadratic splines", DISKS, N="320", basis="quadratic-spline"
     ),
-    "block-3d": Workload("cube in 3D, 23 cells a side", BLOCK, {"N": "23", "style": "musl"}),
+    "disks-320-cubic": _workload(
+        "the same with cubic splines", DISKS, N="320", basis="cubic-spline"
+    ),
+    "disks-320-q4": _workload(
+        "the same with CPDI-Q4", DISKS, N="320", kind="ulcpdi", transfer="PIC", option="Q4"
+    ),
+    "disks-320-mls": _workload("the same with MLS, single pass", DISKS, N="320", **SINGLE_PASS),
+    "disks-320-mls-single": _workload(
+        "the same in single precision", "precision(single)\n" + DISKS, N="320", **SINGLE_PASS
+    ),
+    "disks-80-formula": _workload(
+        "two disks with a body force by formula", DISKS + FORMULA, N="80"
+    ),
+    "block-3d": _workload("cube in 3D, 23 cells a side", BLOCK, N="23"),
+    "block-3d-quadratic": _workload(
+        "the same with quadratic splines", BLOCK, N="23", basis="quadratic-spline"
+    ),
+    "block-3d-mls": _workload("the same with MLS, single pass", BLOCK, N="23", **SINGLE_PASS),
+    "block-3d-mls-single": _workload(
+        "the same in single precision", "precision(single)\n" + BLOCK, N="23", **SINGLE_PASS
+    ),
+    "bar-3d-tl": _workload("Taylor's bar, total Lagrangian", BAR, kind="tlmpm"),
 }
 
 
