@@ -36,7 +36,8 @@ from karamelo_py.points.basis.product import along
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
 from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.points.grid import inside
-from karamelo_py.points.kinematics import Axisymmetric, Line
+from karamelo_py.points.kinematics import Axisymmetric, Line, diagonal
+from karamelo_py.tensors import scale
 
 H = 0.15
 LO = (0.0, 0.5, -2.0)  # a radius starts at 0
@@ -424,3 +425,31 @@ def test_box_between_carried_corners(kin, fraction, size):
     assert new[:d] == old[:d]
     expected = box_of(kin, old) * (1 + np.diag(gradient))
     assert box_of(kin, new) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("kin", ALL_KINEMATICS[2:], ids=lambda kin: type(kin).__name__)
+@pytest.mark.parametrize("basis", VARIANTS, ids=lambda basis: basis.__name__)
+def test_boxes_stay_single(basis, kin):
+    """The compiled functions keep the types of a place, and give what plain Python gives."""
+    real = np.float32
+    _, grid = made(basis, kin, SIZES[0], real)
+    x = position(kin, SIZES[0], (0.5, 0.4, 0.6))
+    place = tuple(real(a) for a in place_of(basis, kin, x, (0.25, 0.2, 0.1)))
+    dl = tuple(real(0.01 * (k + 1)) for k in range(kin.tensor_size))
+    compiled = njit(after_box)
+    found = compiled(basis(), kin, grid, place, dl)
+    assert found == pytest.approx(after_box(basis(), kin, grid, place, dl), rel=1e-5)
+    if compiled is not after_box:
+        assert "float64" not in str(compiled.nopython_signatures[0].return_type)
+
+
+def after_box(basis, kin, grid, place, dl):
+    new = deformed(basis, kin, place, dl)
+    if carried(basis, kin) > 0:
+        stencil = locate(basis, kin, grid, place)
+        for corner in range(carried(basis, kin)):
+            for j in range(carriers(basis, kin)):
+                _, weight = carrier(basis, kin, grid, stencil, corner, j)
+                u = scale(weight, diagonal(kin, dl))
+                new = carry(basis, kin, new, place, corner, u)
+    return new
