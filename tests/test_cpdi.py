@@ -271,7 +271,9 @@ SHORT = "ulcpdi, FLIP, linear, 1, R4"
 ])  # fmt: skip
 def test_momentum_is_kept(run_interpreted, method, scheme):
     """A block that flies and deforms: the sum is that of before to round-off."""
-    log = run_interpreted(block(method, f"scheme({scheme})", *TWIST, "dt_factor(0.3)", "run(6)")).log
+    log = run_interpreted(
+        block(method, f"scheme({scheme})", *TWIST, "dt_factor(0.3)", "run(6)")
+    ).log
     assert log.u_x[-1] == pytest.approx(log.u_x[0], rel=1e-9)  # ten digits in the log
     assert log.u_y[-1] == pytest.approx(log.u_y[0], rel=1e-9)
 
@@ -302,15 +304,15 @@ def test_one_dimension(run_interpreted):
     assert "cpgimp" in run_interpreted(script, status=1).err
 
 
-# A body of 4 x 4 points that is torn apart almost freely: domains come to reach three cells.
+# A body of 20 x 4 points that is torn apart almost freely: domains come to reach five cells.
 TORN = """
 method(ulcpdi, FLIP, linear, 1, {})
-dimension(2, 0, 6, 0, 2, 0.1)
-region(box, block, 2.8, 3.2, 0.8, 1.2)
+dimension(2, 0, 16, 0, 2, 0.1)
+region(box, block, 7, 9, 0.8, 1.2)
 material(putty, linear, 1, 1e-3, 0.3)
 solid(body, region, box, 1, putty, 0.1, 0)
-fix(v, initial_velocity_particles, all, 8*(x0-3), 0.3*sin(9*x0))
-dt_factor(0.3)
+fix(v, initial_velocity_particles, all, 8*(x0-8), 0.3*sin(9*x0))
+dt_factor(0.9)
 set_output(1000)
 """
 
@@ -328,15 +330,15 @@ def test_tiles_grow_with_domains(tmp_path, monkeypatch):
         state = final_state(path, threads)
         return final_hub(path, threads).simulation.tiles, state
 
-    tiles, whole = run(1, "run(45)")
+    tiles, whole = run(1, "run(50)")
     assert tiles.size == 16  # 8 at first
     reach = np.abs(whole["x"][:, 2::2] - whole["x"][:, :1]).max() / 0.1
-    assert 2.5 < reach < 4
-    assert same_bits(whole, run(2, "run(45)")[1])
-    assert same_bits(whole, run(1, "run(20)", "run(25)")[1])
+    assert reach > 2.5
+    assert same_bits(whole, run(2, "run(50)")[1])
+    assert same_bits(whole, run(1, "run(25)", "run(25)")[1])
 
 
 def test_torn_apart_in_any_way(state_interpreted):
     """The same with edges instead of corners, interpreted: in pieces and whole."""
-    whole = state_interpreted(TORN.format("R4") + "run(45)")
-    assert same_bits(whole, state_interpreted(TORN.format("R4") + "run(20)\nrun(25)"))
+    whole = state_interpreted(TORN.format("R4") + "run(50)")
+    assert same_bits(whole, state_interpreted(TORN.format("R4") + "run(25)\nrun(25)"))
