@@ -278,6 +278,15 @@ def test_momentum_is_kept(run_interpreted, method, scheme):
     assert log.u_y[-1] == pytest.approx(log.u_y[0], rel=1e-9)
 
 
+def test_angular_momentum_is_kept(run_interpreted):
+    """APIC with parallelograms, whose centre is the point: constant to the digits of the log."""
+    spin = "fix(v, initial_velocity_particles, all, 0.4*sin(9*x0*y0)-y0, x0)"
+    lines = (spin, *TWIST[2:3], "log_modify(custom, step, L_z)", "dt_factor(0.3)", "run(8)")
+    log = run_interpreted(block("ulcpdi, APIC, linear, R4", *lines)).log
+    assert abs(log.L_z[0]) > 1e-3
+    assert log.L_z[-1] == pytest.approx(log.L_z[0], rel=1e-9)
+
+
 def test_a_tangled_domain_ends_the_run(run_interpreted):
     """The message names the point, what happened, and what to do."""
     wild = "fix(v, initial_velocity_particles, all, 3*sin(17*y0), 3*sin(13*x0))"
