@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from textwrap import dedent
+
+import meshio
 import numpy as np
 import pytest
 from hypothesis import given
@@ -311,6 +314,49 @@ def test_what_does_not_go_together(run_interpreted, method, message):
 def test_one_dimension(run_interpreted):
     script = block(SHORT, "run(1)", size="0.3, 0.6").replace("(2, 0, 1.2,", "(1,")
     assert "cpgimp" in run_interpreted(script, status=1).err
+
+
+@pytest.fixture
+def meshes(tmp_path):
+    """A square of two triangles and one quadrilateral in it; a cube of five tetrahedra."""
+    square = np.array([(0.3, 0.3, 0), (0.5, 0.3, 0), (0.5, 0.5, 0), (0.3, 0.5, 0)])
+    cube = np.array([(x, y, z) for x in (0.3, 0.5) for y in (0.3, 0.5) for z in (0.3, 0.5)])
+    # Some of them the wrong way round, as meshes come.
+    cells = {
+        "triangle": (square, [(0, 1, 2), (0, 3, 2)]),
+        "quad": (square, [(3, 2, 1, 0)]),
+        "tetra": (cube, [(0, 4, 2, 1), (6, 2, 4, 7), (5, 7, 4, 1), (3, 1, 2, 7), (1, 2, 4, 7)]),
+    }
+    for name, (points, elements) in cells.items():
+        mesh = meshio.Mesh(points, [(name, np.array(elements))])
+        meshio.write(tmp_path / f"{name}.vtk", mesh)
+    return tmp_path
+
+
+@pytest.mark.parametrize("variant, element, d", [
+    ("T3", "triangle", 2), ("Q4", "quad", 2), ("Tet4", "tetra", 3), ("R4", "quad", 2),
+    ("Q4", "triangle", 2),
+])  # fmt: skip
+def test_domains_of_a_mesh(run_interpreted, state_interpreted, meshes, variant, element, d):
+    """Elements become domains whichever way round they are; others are refused with the right."""
+    domain = ", ".join(["0, 1.2"] * d)
+    velocity = ", ".join(["0.9+sin(4*x0)", "0.5", "cos(y0)"][:d])
+    script = f"""
+        method(ulcpdi, FLIP, linear, 1, {variant})
+        dimension({d}, {domain}, 0.1)
+        material(rubber, linear, 2, 100, 0.3)
+        solid(body, mesh, {meshes / element}.vtk, rubber, 0.1, 0)
+        fix(v, initial_velocity_particles, all, {velocity})
+    """
+    right = {"triangle": "T3", "quad": "Q4", "tetra": "Tet4"}[element]
+    if variant != right:
+        result = run_interpreted(script + "    run(1)\n", status=1)
+        assert f"{right} in the place of {variant}" in result.err
+        return
+    masses = {"T3": [1, 1], "Q4": [1], "Tet4": [1, 1, 1, 1, 2]}[variant]
+    before, after = (state_interpreted(dedent(script) + f"run({n})\n") for n in (0, 3))
+    assert masses @ after["v"] == pytest.approx(masses @ before["v"], rel=1e-13)
+    assert (after["x"] != before["x"]).all()
 
 
 # A body of 20 x 4 points that is torn apart almost freely: domains come to reach five cells.
