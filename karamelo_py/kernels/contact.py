@@ -19,7 +19,6 @@ from karamelo_py.kernels.arrays import DT
 from karamelo_py.kernels.step import touch, touch_velocity
 from karamelo_py.points.kinematics import dimension
 
-
 APART, SLIDES, STICKS = range(3)
 
 

@@ -39,6 +39,7 @@ class ULMPMContacts(Method):
     they push each other along their common normal, and separate freely again. Contact is
     frictionless unless fix contact/friction says otherwise for a pair of solids. It is felt as
     soon as two solids have mass at one node: with linear functions at a distance below two cells.
+    That brakes bodies that roll: with 16 cells in the radius of a disk by a fifth.
 
     Example
     -------
