@@ -81,7 +81,7 @@ CACHE_FOLDER = _use_cache_folder()
 
 # The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in registers
 # and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
-llvm.set_option("", "--unroll-threshold=2000")
+llvm.set_option("", "--unroll-threshold=4000")
 
 # Threads that wait for each other spin a little, then sleep (GNU OpenMP). Where another program
 # takes a core, waiting at full speed makes two threads twenty times slower than one; sleeping at
