@@ -62,6 +62,8 @@ from karamelo_py.points.transfers import (
     add_momentum,
     displacing_velocity,
     gradient_weight,
+    kept_gradient,
+    straining,
     updated_velocity,
     zero_moment,
 )
@@ -249,7 +251,8 @@ def _(gather, w, x):
 @empty.on(VelocityAndGradient)
 def _(gather, w, x):
     zero = subtract(x, x)
-    return zero, zero, zero_moment(w.transfer, w.kin, x[0]), zero_tensor(w.kin, x[0])
+    strain = straining(w.transfer, w.kin, zero_tensor(w.kin, x[0]))
+    return zero, zero, zero_moment(w.transfer, w.kin, x[0]), strain
 
 
 @empty.on(AveragedVelocityAndGradient)
@@ -277,12 +280,13 @@ def _(gather, w, stencil, k, total):
 @shared
 def _velocity(w, stencil, k, total):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
+    g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
     v = row(w.nodes.update, i, 0, total[0])
     dv = row(w.nodes.update, i, len(v), v)
     return (
         add_scaled(total[0], weight, v),
         add_scaled(total[1], weight, dv),
-        add_moment(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, gradient, v, total[2]),
+        add_moment(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, g, v, total[2]),
     )
 
 
@@ -291,6 +295,18 @@ def _gradient(w, stencil, k, total):
     i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
     return add_outer(w.kin, total, vector_at(w.kin, w.nodes.velocity, i), g)
+
+
+def add_gradient(w, stencil, k, total):
+    """`_gradient`, where it is gathered at all."""
+    return _gradient(w, stencil, k, total) if len(total) else total
+
+
+@overload(add_gradient)
+def _add_gradient(w, stencil, k, total):
+    if len(total) == 0:
+        return lambda w, stencil, k, total: total
+    return lambda w, stencil, k, total: _gradient(w, stencil, k, total)
 
 
 @shared
@@ -323,7 +339,7 @@ def _(gather, w, stencil, k, total):
 @gathered.on(VelocityAndGradient)
 def _(gather, w, stencil, k, total):
     moved = _velocity(w, stencil, k, total[:3])
-    return moved + (_gradient(w, stencil, k, total[3]),)
+    return moved + (add_gradient(w, stencil, k, total[3]),)
 
 
 @gathered.on(AveragedVelocityAndGradient)
@@ -394,7 +410,7 @@ def _(gather, w, stencil, p, dt, total, fastest):
 @settled.on(VelocityAndGradient)
 def _(gather, w, stencil, p, dt, total, fastest):
     moved = _move(w, stencil, p, dt, total)
-    dl = scale(dt, total[3])
+    dl = scale(dt, kept_gradient(w.transfer, w.kin, total[2], total[3]))
     grown, fastest = _strain(w, w.places.x, p, dt, dl, fastest)
     return moved + grown, fastest
 

@@ -78,6 +78,26 @@ def _(transfer, basis, kin, grid, stencil, k, gradient):
     return gradient
 
 
+@point_function(tags=2)
+def straining(transfer, kin, gradient):
+    """What a gather of velocity and gradient sums up for the strain: `gradient`, or nothing."""
+
+
+@straining.otherwise
+def _(transfer, kin, gradient):
+    return gradient
+
+
+@point_function(tags=2)
+def kept_gradient(transfer, kin, moment, gradient):
+    """The gradient of velocity, from what the point keeps and what `straining` let be gathered."""
+
+
+@kept_gradient.otherwise
+def _(transfer, kin, moment, gradient):
+    return gradient
+
+
 @point_function()
 def terms(transfer):
     """Number of terms of the series that XPIC sums on the nodes; 1 is none beyond the first."""

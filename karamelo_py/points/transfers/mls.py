@@ -7,15 +7,22 @@ from typing import NamedTuple
 from karamelo_py.compile import point_function
 from karamelo_py.points.basis import affine_weight
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.transfers import affine, gradient_weight, updated_velocity
+from karamelo_py.points.transfers import (
+    gradient_weight,
+    kept_gradient,
+    straining,
+    taylor,
+    updated_velocity,
+)
 
 
 class MLS(NamedTuple):
     """APIC; N_I D^-1 (X_I - x), a moving least squares fit, stands for the gradient everywhere.
 
-    The velocity gradient of a point is then B D^-1, which it keeps anyway, and its force on a node
-    is -V sigma N_I D^-1 (X_I - x) (Hu et al. 2018, "A moving least squares material point method",
-    eqs. 16 to 18).
+    The point keeps the velocity gradient C = B D^-1, and its force on a node is
+    -V sigma N_I D^-1 (X_I - x) (Hu et al. 2018, "A moving least squares material point method",
+    eqs. 16 to 18). Angular momentum is conserved to round-off where D is constant: with splines,
+    more than a cell away from the walls.
 
     Example
     -------
@@ -53,4 +60,20 @@ def _(kin, planar, gradient):
     return planar + gradient[2:]
 
 
-affine.register(MLS)
+# The velocity gradient is what the point keeps: gathered once where both come from v*. Axisymmetric,
+# the hoop part is missing in it.
+@straining.on(MLS, Line)
+@straining.on(MLS, PlaneStrain)
+@straining.on(MLS, Space)
+def _(transfer, kin, gradient):
+    return ()
+
+
+@kept_gradient.on(MLS, Line)
+@kept_gradient.on(MLS, PlaneStrain)
+@kept_gradient.on(MLS, Space)
+def _(transfer, kin, moment, gradient):
+    return moment
+
+
+taylor.register(MLS)
