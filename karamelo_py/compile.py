@@ -79,8 +79,8 @@ def _use_cache_folder() -> Path:
 
 CACHE_FOLDER = _use_cache_folder()
 
-# The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in registers
-# and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
+# The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in
+# registers and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
 llvm.set_option("", "--unroll-threshold=4000")
 
 # Threads that wait for each other spin a little, then sleep (GNU OpenMP). Where another program

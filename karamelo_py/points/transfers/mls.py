@@ -60,8 +60,8 @@ def _(kin, planar, gradient):
     return planar + gradient[2:]
 
 
-# The velocity gradient is what the point keeps: gathered once where both come from v*. Axisymmetric,
-# the hoop part is missing in it.
+# The velocity gradient is what the point keeps: gathered once where both come from v*.
+# Axisymmetric, the hoop part is missing in it.
 @straining.on(MLS, Line)
 @straining.on(MLS, PlaneStrain)
 @straining.on(MLS, Space)
