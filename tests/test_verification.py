@@ -26,6 +26,7 @@ from verification import (
     TOTAL_CUBIC,
     UGIMP,
     errors_on,
+    frequency,
     last_dump,
     order,
     run_scene,
@@ -205,13 +206,6 @@ def test_column_on_finer_grids(run_script, way):
 
 
 # --- Vibrating bar ------------------------------------------------------------------------------
-
-
-def frequency(time, v):
-    """omega from the falls of a velocity through zero, linear in between."""
-    falls = np.flatnonzero((v[:-1] > 0) & (v[1:] <= 0))
-    crossings = time[falls] + (time[falls + 1] - time[falls]) * v[falls] / (v[falls] - v[falls + 1])
-    return 2 * pi * (len(crossings) - 1) / (crossings[-1] - crossings[0])
 
 
 @pytest.mark.parametrize(
