@@ -51,6 +51,8 @@ class Fix:
         "s" and "" when a style does not say.
     first_step_only
         Whether it acts in the first step after its definition and is idle thereafter.
+    for_method
+        Whether it has no hooks because the method reads it.
     holds_nodes
         Whether it prescribes velocities of the nodes of its group in ``post_update_grid_state``,
         in the directions in which it has a formula: contact does not move them.
@@ -64,6 +66,7 @@ class Fix:
     formulas: tuple = ()
     published: tuple[str, ...] = SUFFIXES
     first_step_only = False
+    for_method = False
     holds_nodes = False
     puts_force_on_points = False
     id: str = ""

@@ -91,7 +91,7 @@ def test_every_style_is_documented(family, name):
         assert title in ("Example", "Notes", "See Also", "Raises"), title
 
 
-def _scene(dimension, folder):
+def _scene(dimension, folder, method="ulmpm"):
     """A scene in `dimension` dimensions that is only tried: it runs and writes nothing."""
     hub = Hub()
     hub.console.quiet = True
@@ -100,7 +100,7 @@ def _scene(dimension, folder):
     interpreter = Interpreter(hub)
     domain, disk, wall = STAGES[dimension]
     interpreter.run_text(
-        f"method(ulmpm, FLIP, linear, 1)\ndimension({domain})\nregion(disk, {disk})\n"
+        f"method({method}, FLIP, linear, 1)\ndimension({domain})\nregion(disk, {disk})\n"
         f"region(wall, {wall})\nmaterial(steel, linear, 1000, 1000, 0.3)\n"
         f"solid(s1, region, disk, 2, steel, {domain.split()[-1]}, 0)"
     )
@@ -128,6 +128,13 @@ def _tried(lines, dimension, folder):
     interpreter = _scene(dimension, folder)
     for line in lines:
         words = re.findall(r"\w+", line)
+        if words[2] == "contact":
+            interpreter = _scene(dimension, folder, "ulmpm/contacts")
+            h = STAGES[dimension][0].split()[-1]
+            for solid in words[4:6]:
+                interpreter.run_text(f"solid({solid}, region, disk, 2, steel, {h}, 0)")
+            interpreter.run_text(line)
+            continue
         kind = "nodes" if words[2] in ("body_force",) or "_nodes" in words[2] else "particles"
         if words[0] in ("fix", "compute") and words[3] != "all":
             interpreter.run_text(f"group({words[3]}, {kind}, region, wall, all)")

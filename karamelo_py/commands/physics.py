@@ -203,7 +203,7 @@ def _warn_if_idle(hub: Hub, style: str, item: Fix) -> None:
     from karamelo_py.kernels.hooks import STAGES
     from karamelo_py.modify import Fix
 
-    if item.hooks() or type(item).refresh is not Fix.refresh:
+    if item.for_method or item.hooks() or type(item).refresh is not Fix.refresh:
         return
     own = [name for name in dir(item) if not hasattr(Fix, name) and callable(getattr(item, name))]
     found = next(((name, hook) for name in own if (hook := nearest(name, STAGES))), None)

@@ -40,6 +40,7 @@ class ContactFriction(Fix):
     """
 
     published = ("x", "y", "z")
+    for_method = True
 
     def __init__(
         self,

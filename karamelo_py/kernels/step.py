@@ -324,7 +324,7 @@ def _(contact, s):
 
 @point_function()
 def touch_velocity(contact, s):
-    """The same for the velocity that deforms the points, where it has been mapped on its own."""
+    """See that the velocity that deforms the points agrees with contact, where it is not v*."""
 
 
 @touch_velocity.otherwise

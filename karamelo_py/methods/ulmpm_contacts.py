@@ -39,6 +39,7 @@ class ULMPMContacts(Method):
     they push each other along their common normal, and separate freely again. Contact is
     frictionless unless fix contact/friction says otherwise for a pair of solids. It is felt as
     soon as two solids have mass at one node: with linear functions at a distance below two cells.
+    That brakes bodies that roll: with 16 cells in the radius of a disk by a fifth.
 
     Example
     -------
@@ -50,8 +51,9 @@ class ULMPMContacts(Method):
     ContactForce_ID_z, with the solid's ID: the sum of m dv/dt over its nodes. Solids that are
     glued together share a field and its force.
 
-    The normal at a node is that of the difference of the sums of m grad N of the two solids, so
-    both get the same impulse and momentum is kept. Where more than two solids meet at a node, the
+    The normal at a node is one for both solids, so that they get opposite impulses and momentum is
+    kept: from the sums of m grad N of the two, that of the solid that is held, else mostly the
+    larger one. Where more than two solids meet at a node, the
     pairs push each other one after the other, in the order in which the solids were defined. Nodes
     that fix velocity_nodes holds are not moved by contact; what they would have taken is added to
     the reaction that the fix publishes. Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster
@@ -103,6 +105,7 @@ class ULMPMContacts(Method):
             pair=np.full((count, count), -1, np.int64),
             slot=np.array([first[k] for k in range(count)], np.int64),
             copies=np.array(copies, np.int64).reshape(-1, 2),
+            touching=np.zeros(nodes, np.uint8),
             held=np.zeros((nodes, hub.domain.dimension), np.int32),
         )
 
