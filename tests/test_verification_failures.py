@@ -21,10 +21,10 @@ CROSSING = """
     region(right, block, 6, 10)
     material(heavy, linear, 1e12, 1e-6, 0)
     solid(left, region, left, 2, heavy, 1, 0)
-    solid(right, region, right, 3, heavy, 1, 0)
+    solid(right, region, right, 3, heavy, 1, 0, points=regular)
     fix(v, initial_velocity_particles, all, 1)
     fix(s, initial_stress, all, 3, NULL, NULL, NULL, NULL, NULL)
-    set_dt(0.02)
+    set_dt(0.0201)
     dump(g, all, grid, 1, grid.*.LAMMPS, x, fx)
     run(50)
 """
@@ -58,10 +58,19 @@ def test_boxes_that_tile_the_bar_have_no_false_forces(run_interpreted, basis):
 
 @pytest.mark.parametrize(("basis", "most"), [("quadratic-spline", 0.1), ("cubic-spline", 0.02)])
 def test_splines_have_small_false_forces_without_jumps(run_interpreted, basis, most):
-    """The gradient is continuous: from place to place, 0.02 cells on, it changes by little."""
+    """The gradient is continuous: from place to place, 0.02 cells on, it changes by little.
+
+    Found: 0.052 and 0.012 of the stress, changing by 0.013 and 0.0016.
+    """
     forces = crossing_forces(run_interpreted, basis + ", 1")
-    assert 1e-6 * SIGMA < np.abs(forces).max() < most * SIGMA
-    assert np.abs(np.diff(forces, axis=0)).max() < 0.05 * SIGMA
+    assert 1e-3 * SIGMA < np.abs(forces).max() < most * SIGMA
+    assert np.abs(np.diff(forces, axis=0)).max() < 0.3 * np.abs(forces).max()
+
+
+def test_bernstein_functions_jump_like_hats(run_interpreted):
+    """Smooth within a cell, with a kink at its faces."""
+    forces = crossing_forces(run_interpreted, "Bernstein-quadratic, 1")
+    assert np.abs(np.diff(forces, axis=0)).max() > SIGMA
 
 
 # --- Noise that the grid does not see -----------------------------------------------------------
@@ -103,7 +112,6 @@ def test_flip_keeps_a_sawtooth_pic_and_xpic_take_it_away(run_interpreted):
     for transfer in ("PIC, linear", "XPIC, linear, 2", "XPIC, linear, 5"):
         assert abs(kept(run_interpreted, transfer, SAWTOOTH, 1)) < 1e-9
         modes.append(kept(run_interpreted, transfer, MODE, 100))
-    print(modes)
     assert modes[0] < 0.85
     assert modes[0] < modes[1] < modes[2] < 1
     assert modes[2] > 0.98
