@@ -143,8 +143,9 @@ def check_energy(run_script, periods):
 def test_a_node_with_next_to_no_mass_does_no_harm(run_interpreted, scheme):
     """One point under stress, a millionth of a cell beyond a face.
 
-    The node ahead has a millionth of its mass and all of its force: f dt / m is 5e4, and USL without
-    limit would take 1e5 times the stress from that in a step. Forces add to zero: momentum is kept.
+    The node ahead has a millionth of its mass and all of its force: f dt / m is 5e4, and USL
+    without limit would take 1e5 times the stress from that in a step. Forces add to zero: momentum
+    is kept.
     """
     result = run_interpreted(f"""
         method(ulmpm, FLIP, linear, 1)
