@@ -240,7 +240,7 @@ def _plastic_strain(simulation: Any) -> np.ndarray:
     for block in s.blocks:
         if plastic_strain.defined(type(block.laws)):
             rows = np.zeros(len(block.id))
-            export_plastic_strain(s.kin, s.basis.h, block.points, block.laws, rows)
+            export_plastic_strain(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
             out[block.id] = rows
     return out
 

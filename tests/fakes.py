@@ -40,6 +40,7 @@ class FakeFields:
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         self.nodes = {name: nodes[:, i] for i, name in enumerate("xyz")}
         self.nodes["mass"] = np.where(nodes[:, 0] > 0, 1.0, 0.0)
+        self.nodes["type"] = np.ones(len(nodes), np.int64)
         self.node_count = len(nodes)
 
     def absent_at_points(self):
@@ -52,7 +53,7 @@ class FakeFields:
         return self.points[name].copy()
 
     def node_names(self):
-        return list(self.nodes)
+        return [name for name in self.nodes if name != "type"]
 
     def node(self, name):
         return self.nodes[name].copy()
@@ -77,6 +78,7 @@ class FakeHub:
         self.console = Console(io.StringIO(), io.StringIO())
         self.fields = FakeFields(self, count)
         self.dumps = {}
+        self.fixes = {}
         self.refreshed = []
         self.output = Output(self)
 

@@ -161,7 +161,7 @@ def test_single_precision_arrays(tmp_path, monkeypatch):
     path = tmp_path / "in.script"
     path.write_text(crossing(2, "run(1)", precision="single"), encoding="utf-8")
     setup = final_hub(path).simulation.setup
-    assert {array.dtype for array in setup.nodes} == {np.dtype(np.float32)}
+    assert {a.dtype for a in setup.nodes if a is not None} == {np.dtype(np.float32)}
     for b in setup.blocks:
         fields = [b.x, b.points.v, b.points.mass, b.points.state, *b.laws]
         assert {array.dtype for array in fields} == {np.dtype(np.float32)}

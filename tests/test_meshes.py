@@ -262,7 +262,7 @@ def test_a_boundary_holds_the_nodes_on_it(tmp_path):
     meshio.write(tmp_path / "m.msh", mesh, file_format="gmsh22", binary=False)
     hub = FakeHub(2, 0, 1, 0.1)
     edge = MeshRegion(hub, tmp_path / "m.msh", 7)
-    nodes = hub.domain.node_positions()[:, :2]
+    nodes = hub.lattices[0].positions()[:, :2]
     want = (nodes[:, 1] == 0) | np.isclose(nodes[:, 0], 1)
     np.testing.assert_array_equal(edge.inside(nodes), want)
     with pytest.raises(ScriptError, match="no physical group '8'") as caught:

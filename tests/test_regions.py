@@ -154,8 +154,13 @@ def test_axisymmetric():
     hub = FakeHub()
     commands.axisymmetric(hub, False)
     assert not hub.domain.axisymmetric
-    with pytest.raises(ScriptError, match="not there yet"):
+    with pytest.raises(ScriptError, match="x is a radius"):
         commands.axisymmetric(hub, True)
+    hub = FakeHub(2, 0, 1, 0.1)
+    commands.axisymmetric(hub, True)
+    assert hub.domain.axisymmetric
+    with pytest.raises(ScriptError, match="two dimensions"):
+        commands.axisymmetric(FakeHub(3, 0, 1, 0.1), True)
 
 
 def test_regions_need_a_domain():

@@ -29,7 +29,7 @@ def test_a_cube(stl):
     """Nodes on its faces belong to it; the body fills exactly its volume."""
     hub = FakeHub(3, -0.5, 1.5, 0.1)
     region = STL(hub, stl(*cube_surface(0.1, 0.9)))
-    nodes = hub.domain.node_positions()
+    nodes = hub.lattices[0].positions()
     want = ((nodes > 0.1 - 1e-6) & (nodes < 0.9 + 1e-6)).all(axis=1)
     np.testing.assert_array_equal(region.inside(nodes), want)
     assert math.isclose(hub.solid("s", region).volume0.sum(), 0.8**3, rel_tol=1e-12)

@@ -384,27 +384,21 @@ def _(gather):
 
 
 @point_function()
-def strain_by(averaging, s, mode, gather, scatter, dt):
-    """Strain the points; whether all went well."""
+def strain(averaging, s, mode, gather, scatter, dt):
+    """Gather and settle, the gradient among it; whether all went well."""
 
 
-@strain_by.on(PointByPoint)
+@strain.on(PointByPoint)
 def _(averaging, s, mode, gather, scatter, dt):
     return sweep(s, mode, gather, scatter, dt)
 
 
-@strain_by.on(FBar)
+@strain.on(FBar)
 def _(averaging, s, mode, gather, scatter, dt):
     sweep_nodes(mode, ClearGrowth(), s.kin, s.nodes, s.spans, dt)
     _sweep_blocks_here(s, mode, Trial(), Growth(), dt)
     sweep_nodes(mode, AverageGrowth(), s.kin, s.nodes, s.spans, dt)
     return sweep(s, mode, averaged(gather), scatter, dt)
-
-
-@shared
-def strain(s, mode, gather, scatter, dt):
-    """Gather and settle, the gradient among it; whether all went well."""
-    return strain_by(s.averaging, s, mode, gather, scatter, dt)
 
 
 @shared

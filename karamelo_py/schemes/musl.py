@@ -78,9 +78,9 @@ def _(scheme, visits, mode, s, hooks, more):
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
     touch_velocity(s.contact, s)
     if not more:
-        return strain(s, mode, Gradient(), Nothing(), dt)
+        return strain(s.averaging, s, mode, Gradient(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    return strain(s, mode, Gradient(), Everything(), dt)
+    return strain(s.averaging, s, mode, Gradient(), Everything(), dt)
 
 
 @begin.on(MUSL, Staged)
@@ -102,7 +102,7 @@ def _(scheme, visits, mode, s, hooks, more):
     sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
     touch_velocity(s.contact, s)
-    if not strain(s, mode, Gradient(), Nothing(), dt):
+    if not strain(s.averaging, s, mode, Gradient(), Nothing(), dt):
         return False
     at_points(hooks, FINAL_INTEGRATE, 1, s)
     return True

@@ -88,7 +88,7 @@ def _half_first(s, mode, hooks, half):
     sweep_nodes(mode, SumsToVelocity(), s.kin, s.nodes, s.spans, half)
     at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_VELOCITY, s)
     touch_velocity(s.contact, s)
-    if not strain(s, mode, Gradient(), Force(), half):
+    if not strain(s.averaging, s, mode, Gradient(), Force(), half):
         return False
     update_nodes(s, mode, hooks)
     sweep_nodes(mode, ClearVelocity(), s.kin, s.nodes, s.spans, half)
@@ -112,9 +112,9 @@ def _(scheme, visits, mode, s, hooks, more):
         return False
     _remap(s, mode, hooks, half)
     if not more:
-        return strain(s, mode, SecondGradient(), Nothing(), half)
+        return strain(s.averaging, s, mode, SecondGradient(), Nothing(), half)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    return strain(s, mode, SecondGradient(), MassMomentum(), half)
+    return strain(s.averaging, s, mode, SecondGradient(), MassMomentum(), half)
 
 
 @begin.on(USAVG, Staged)
@@ -135,7 +135,7 @@ def _(scheme, visits, mode, s, hooks, more):
         return False
     sweep_here(s, mode, Nothing(), Momentum(), dt)
     _remap(s, mode, hooks, half)
-    if not strain(s, mode, SecondGradient(), Nothing(), half):
+    if not strain(s.averaging, s, mode, SecondGradient(), Nothing(), half):
         return False
     at_points(hooks, FINAL_INTEGRATE, 1, s)
     return True

@@ -64,9 +64,9 @@ def _(scheme, visits, mode, s, hooks, more):
     sweep_nodes(mode, UpdateToVelocity(light_node(s)), s.kin, s.nodes, s.spans, dt)
     sum_series(s.transfer, s, mode)
     if not more:
-        return strain(s, mode, VelocityAndGradient(), Nothing(), dt)
+        return strain(s.averaging, s, mode, VelocityAndGradient(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    return strain(s, mode, VelocityAndGradient(), Everything(), dt)
+    return strain(s.averaging, s, mode, VelocityAndGradient(), Everything(), dt)
 
 
 @begin.on(USL, Staged)
@@ -85,7 +85,7 @@ def _(scheme, visits, mode, s, hooks, more):
     sum_series(s.transfer, s, mode)
     if not move_points(s, mode, hooks):
         return False
-    if not strain(s, mode, Gradient(), Nothing(), dt):
+    if not strain(s.averaging, s, mode, Gradient(), Nothing(), dt):
         return False
     at_points(hooks, FINAL_INTEGRATE, 1, s)
     return True
