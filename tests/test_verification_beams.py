@@ -153,8 +153,25 @@ def bar_witness():
     return fem.vertical_bar()
 
 
+def check_bar(run_script, bar_witness, way, refine):
+    log = run_scene(run_script, "vertical_bar", way, refine=refine).log
+    time, tip = bar_witness
+    moment, depth = exact.minimum(time, tip)
+    found_moment, found = lowest(log, 0.15)
+    assert found == pytest.approx(depth, rel=0.02)
+    assert found_moment == pytest.approx(moment, rel=0.05)
+
+
+@pytest.mark.parametrize(("way",), table((TOTAL,)))
+def test_vertical_bar_holds_together(run_script, bar_witness, way):
+    """Eight cells: 1.645 m at 0.0931 s, of finite elements 1.662 m at 0.0890 s.
+
+    With four cells 1.577 m: the point then lies h/4 from the corner.
+    """
+    check_bar(run_script, bar_witness, way, 2)
+
+
 HOLD = [
-    (TOTAL,),
     (TOTAL_CUBIC,),
     (TOTAL_BERNSTEIN,),
     (replace(CPDI_R, domains="R8"),),
@@ -163,15 +180,10 @@ HOLD = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("way",), table(*HOLD))
-def test_vertical_bar_holds_together(run_script, bar_witness, way):
-    """Depth and moment of the first minimum within 5 % of finite elements: four cells."""
-    log = run_scene(run_script, "vertical_bar", way).log
-    time, tip = bar_witness
-    moment, depth = exact.minimum(time, tip)
-    found_moment, found = lowest(log, 0.15)
-    assert found == pytest.approx(depth, rel=0.05)
-    assert found_moment == pytest.approx(moment, rel=0.05)
+def test_vertical_bar_holds_together_by_other_methods(run_script, bar_witness, way):
+    check_bar(run_script, bar_witness, way, 2)
 
 
 @pytest.mark.parametrize(("way",), table((LINEAR,), (UGIMP,)))
