@@ -42,7 +42,8 @@ def main() -> None:
         left.loglog(h, numbers(four or two), "o-", ms=3, label=name)
     slope(left, h, 4e-3)
     left.set(title="in.axis_aligned, G = 0.1", xlabel="cell", ylabel="relative error")
-    left.legend(fontsize=6)
+    left.set_ylim(top=50)
+    left.legend(fontsize=6, loc="upper left", ncols=2)
     for name, *errors in rows("| cells | 1 | 2"):
         found = [(1 / 2**k, float(e)) for k, e in enumerate(errors) if e]
         right.loglog(*zip(*found, strict=True), "o-", ms=3, label=name)

@@ -228,15 +228,15 @@ FOOTING = needs(("command", "anti_volumetric_locking"), ("material", "eos-streng
 
 @FOOTING
 def test_footing_reaches_the_limit_load(run_script):
-    """Prandtl's 5.14 within 10 %: the edge of the footing is known to half a cell in four."""
+    """Prandtl's 5.1416 within 5 %. Found: 5.13 with 20 cells, 5.02 with 40."""
     log = run_scene(run_script, "footing", LINEAR, alpha=0.99).log
-    late = log.Time > 0.4
-    assert log.load[late].mean() == pytest.approx(exact.prandtl_load(1), rel=0.1)
+    late = (log.Time > 0.7) & (log.Time < 0.99)
+    assert log.load[late].mean() == pytest.approx(exact.prandtl_load(1), rel=0.05)
 
 
 @FOOTING
 def test_footing_locks_without_mean_volumes(run_script):
-    """The load passes the limit and goes on rising."""
+    """The load passes the limit and goes on rising: 6.2 on average, 6.3 at the end."""
     log = run_scene(run_script, "footing", LINEAR, alpha=0.99, bar="false").log
-    late = log.Time > 0.4
-    assert log.load[late].mean() > 1.1 * exact.prandtl_load(1)
+    late = (log.Time > 0.7) & (log.Time < 0.99)
+    assert log.load[late].mean() > 1.15 * exact.prandtl_load(1)
