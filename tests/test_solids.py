@@ -11,7 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from karamelo_py.commands import solids as commands
+from karamelo_py.methods.base import Method
+from karamelo_py.methods.ulcpdi import ULCPDI
 from karamelo_py.placement import cell_pattern
+from karamelo_py.points.basis.cpdi.parallel import R4
+from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.regions.block import Block
 from karamelo_py.regions.cylinder import Cylinder
 from karamelo_py.regions.sphere import Sphere
@@ -220,6 +224,15 @@ def test_three_points_are_those_of_karamelo_unless_said_otherwise():
     np.testing.assert_allclose(solid.volume0, 1 / 3)
     regular = hub.solid("t", whole(hub, "w2"), ppc=3, points="regular")
     np.testing.assert_allclose(regular.x0[:, 0], [1 / 6, 1 / 2, 5 / 6])
+
+
+@pytest.mark.parametrize("method", [Method(None, UGIMP()), ULCPDI(None, R4())])
+def test_three_points_with_domains_stand_so_that_these_tile_the_cell(method):
+    hub = FakeHub(2, 0, 1, 1)
+    hub.update.method = method
+    solid = hub.solid("s", whole(hub), ppc=3)
+    np.testing.assert_allclose(np.unique(solid.x0), [1 / 6, 1 / 2, 5 / 6])
+    np.testing.assert_allclose(solid.half_size, 1 / 6)
 
 
 def test_domains_of_points_are_boxes():

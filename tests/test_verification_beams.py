@@ -47,29 +47,31 @@ def cantilever_witness():
 # (way, published minimum, its time); Wyser et al. 2020, section 4.2.
 PUBLISHED = [(CPDI_Q, -3.310, 1.070), (STRETCH, -3.319, 1.065)]
 # Without published numbers, finite elements count.
-SWING_BACK = [(CPDI_R,), (CPDI_Q,), (STRETCH,), (TOTAL,), (TOTAL_CUBIC,), (TOTAL_BERNSTEIN,)]
+# (way, root of the mean square of the distance from the curve in m)
+SWING_BACK = [(CPDI_R, 0.25), (CPDI_Q, 0.25), (STRETCH, 0.25), (TOTAL, 0.1), (TOTAL_CPDI, 0.1)]
 
 
 @pytest.mark.parametrize(("way", "depth", "moment"), table(*PUBLISHED))
 def test_cantilever_sinks_as_published(run_script, way, depth, moment):
-    """Within 1 %: the law (neo-Hookean or Jaumann) alone moves the minimum by as much."""
-    log = run_scene(run_script, "cantilever", way, T=1.4).log
-    time, tip = lowest(log, 1.4)
-    assert tip == pytest.approx(depth, rel=0.01)
-    assert time == pytest.approx(moment, rel=0.01)
+    """Within 0.2 %, with the law in rate form: the neo-Hookean beam is 1 % stiffer.
 
-
-@pytest.mark.parametrize(("way",), table(*SWING_BACK))
-def test_cantilever_swings_back(run_script, cantilever_witness, way):
-    """The curve of finite elements within 0.25 m (root of the mean square) of a swing of 3.3 m.
-
-    Four cells over the height are a coarse beam: the corner moves at up to 6 m/s, and a period
-    that is 2 % longer is 0.05 s late at the end.
+    Found: -3.3098 m at 1.0695 s, and -3.3155 m at 1.0655 s; neo-Hookean: -3.276 m and -3.283 m.
     """
-    log = run_scene(run_script, "cantilever", way, CFL=0.3).log
+    log = run_scene(run_script, "cantilever", way, T=1.4, law="linear").log
+    time, tip = lowest(log, 1.4)
+    assert tip == pytest.approx(depth, rel=0.002)
+    assert time == pytest.approx(moment, rel=0.002)
+
+
+@pytest.mark.parametrize(("way", "most"), table(*SWING_BACK))
+def test_cantilever_swings_back(run_script, cantilever_witness, way, most):
+    """The curve of finite elements; of the swing of 3.3 m four cells over the height are a coarse
+    beam. Found: 0.22 to 0.23 m in updated, 0.03 to 0.07 m in total Lagrangian methods.
+    """
+    log = run_scene(run_script, "cantilever", way).log
     time, tip = cantilever_witness
     expected = np.interp(log.Time, time, tip)
-    assert np.sqrt(((log.tip_s - np.abs(expected)) ** 2).mean()) < 0.25
+    assert np.sqrt(((log.tip_s - np.abs(expected)) ** 2).mean()) < most
     assert log.tip_s[log.Time > 2].min() < 0.15
 
 
@@ -151,8 +153,25 @@ def bar_witness():
     return fem.vertical_bar()
 
 
+def check_bar(run_script, bar_witness, way, refine):
+    log = run_scene(run_script, "vertical_bar", way, refine=refine).log
+    time, tip = bar_witness
+    moment, depth = exact.minimum(time, tip)
+    found_moment, found = lowest(log, 0.15)
+    assert found == pytest.approx(depth, rel=0.02)
+    assert found_moment == pytest.approx(moment, rel=0.05)
+
+
+@pytest.mark.parametrize(("way",), table((TOTAL,)))
+def test_vertical_bar_holds_together(run_script, bar_witness, way):
+    """Eight cells: 1.645 m at 0.0931 s, of finite elements 1.662 m at 0.0890 s.
+
+    With four cells 1.577 m: the point then lies h/4 from the corner.
+    """
+    check_bar(run_script, bar_witness, way, 2)
+
+
 HOLD = [
-    (TOTAL,),
     (TOTAL_CUBIC,),
     (TOTAL_BERNSTEIN,),
     (replace(CPDI_R, domains="R8"),),
@@ -161,15 +180,10 @@ HOLD = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("way",), table(*HOLD))
-def test_vertical_bar_holds_together(run_script, bar_witness, way):
-    """Depth and moment of the first minimum within 5 % of finite elements: four cells."""
-    log = run_scene(run_script, "vertical_bar", way).log
-    time, tip = bar_witness
-    moment, depth = exact.minimum(time, tip)
-    found_moment, found = lowest(log, 0.15)
-    assert found == pytest.approx(depth, rel=0.05)
-    assert found_moment == pytest.approx(moment, rel=0.05)
+def test_vertical_bar_holds_together_by_other_methods(run_script, bar_witness, way):
+    check_bar(run_script, bar_witness, way, 2)
 
 
 @pytest.mark.parametrize(("way",), table((LINEAR,), (UGIMP,)))
@@ -183,17 +197,28 @@ def test_vertical_bar_breaks(run_script, way):
 # --- Incline ------------------------------------------------------------------------------------
 
 
-@needs(("method", "ulmpm/contacts"), ("material", "rigid"))
-@pytest.mark.parametrize(("angle", "friction"), [(30, 0.5), (45, 0.1), (30, 0.0)])
-def test_disk_on_an_incline(run_script, angle, friction):
-    """Rolls (0.5), slides (0.1, 0): the acceleration within 5 %; the disk is 12 cells wide."""
-    log = run_scene(run_script, "incline", None, angle=angle, mu=friction).log
-    rolls = angle <= degrees(exact.incline_limit(friction))
-    assert rolls == (friction == 0.5)
+@pytest.mark.parametrize(("angle", "friction"), [(45, 0.1), (30, 0.0)])
+def test_disk_slides_down_an_incline(run_script, angle, friction):
+    """g (sin - mu cos) within 0.1 %; the disk is 12 cells wide."""
     expected = exact.incline_acceleration(radians(angle), friction, 10)
+    assert acceleration(run_script, angle, friction) == pytest.approx(expected, rel=1e-3)
+
+
+def test_disk_rolls_down_an_incline(run_script):
+    """(2/3) g sin, not smoothly: what comes near the base meets it a cell too early.
+
+    From 0.2 s on 13 % are missing with 12 cells across the disk, and 0.5 % with 24.
+    """
+    expected = exact.incline_acceleration(radians(30), 0.5, 10)
+    assert degrees(exact.incline_limit(0.5)) >= 30
+    assert acceleration(run_script, 30, 0.5) == pytest.approx(expected, rel=0.2)
+    assert acceleration(run_script, 30, 0.5, refine=2) == pytest.approx(expected, rel=0.05)
+
+
+def acceleration(run_script, angle, friction, **variables):
+    log = run_scene(run_script, "incline", None, angle=angle, mu=friction, **variables).log
     late = log.Time > 0.2
-    found = np.polyfit(log.Time[late], log.v_x[late], 1)[0]
-    assert found == pytest.approx(expected, rel=0.05)
+    return np.polyfit(log.Time[late], log.v_x[late], 1)[0]
 
 
 # --- Footing ------------------------------------------------------------------------------------
@@ -203,15 +228,15 @@ FOOTING = needs(("command", "anti_volumetric_locking"), ("material", "eos-streng
 
 @FOOTING
 def test_footing_reaches_the_limit_load(run_script):
-    """Prandtl's 5.14 within 10 %: the edge of the footing is known to half a cell in four."""
+    """Prandtl's 5.1416 within 5 %. Found: 5.13 with 20 cells, 5.02 with 40."""
     log = run_scene(run_script, "footing", LINEAR, alpha=0.99).log
-    late = log.Time > 0.4
-    assert log.load[late].mean() == pytest.approx(exact.prandtl_load(1), rel=0.1)
+    late = (log.Time > 0.7) & (log.Time < 0.99)
+    assert log.load[late].mean() == pytest.approx(exact.prandtl_load(1), rel=0.05)
 
 
 @FOOTING
 def test_footing_locks_without_mean_volumes(run_script):
-    """The load passes the limit and goes on rising."""
+    """The load passes the limit and goes on rising: 6.2 on average, 6.3 at the end."""
     log = run_scene(run_script, "footing", LINEAR, alpha=0.99, bar="false").log
-    late = log.Time > 0.4
-    assert log.load[late].mean() > 1.1 * exact.prandtl_load(1)
+    late = (log.Time > 0.7) & (log.Time < 0.99)
+    assert log.load[late].mean() > 1.15 * exact.prandtl_load(1)

@@ -8,6 +8,7 @@ soon as they are.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -98,9 +99,13 @@ def needs(*styles: tuple[str, str]):
 def run_scene(
     run_script, scene: str, way: Way | None = LINEAR, status: int = 0, **variables: Any
 ) -> Result:
-    """Run inputs/in.`scene` with a way and more variables, in a folder of its own."""
+    """Run inputs/in.`scene` with a way and more variables, in a folder of its own.
+
+    On one thread: the numbers are the same, and nothing is compiled a second time.
+    """
     words = {**(way.variables if way else {}), **variables}
-    options = [part for name, value in words.items() for part in ("-var", name, str(value))]
+    options = ["--threads", "1"]
+    options += [part for name, value in words.items() for part in ("-var", name, str(value))]
     folder = "_".join([scene, *(str(value) for value in words.values())]).replace("/", "-")
     return run_script(INPUTS / f"in.{scene}", *options, status=status, folder=folder)
 
@@ -122,3 +127,10 @@ def errors_on(run_script, scene: str, way: Way, grids, column="error_z", **varia
         float(run_scene(run_script, scene, way, refine=grid, **variables).log[column][-1])
         for grid in grids
     ]
+
+
+def frequency(time, v):
+    """omega from the falls of a velocity through zero, linear in between."""
+    falls = np.flatnonzero((v[:-1] > 0) & (v[1:] <= 0))
+    crossings = time[falls] + (time[falls + 1] - time[falls]) * v[falls] / (v[falls] - v[falls + 1])
+    return 2 * pi * (len(crossings) - 1) / (crossings[-1] - crossings[0])

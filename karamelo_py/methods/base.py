@@ -45,6 +45,11 @@ class Method:
     def __init__(self, hub: Hub, basis: NamedTuple):
         self.basis = basis
 
+    @property
+    def regular_points(self) -> bool:
+        """Whether points of a cell stand at equal distances, so that their domains tile it."""
+        return hasattr(type(self.basis), "shapes")
+
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """How solids with velocity fields of their own touch: a tag with what that takes."""
         return NoContact()

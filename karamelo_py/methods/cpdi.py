@@ -29,12 +29,9 @@ class Convected(Method):
     ----------
     variants
         The families of domains by name.
-    regular_points
-        Points of a cell are spaced evenly, so that their domains tile it, for any number of them.
     """
 
     variants: ClassVar[dict[str, type]] = VARIANTS
-    regular_points: ClassVar[bool] = True
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
         """What the basis keeps of the domains of a solid's points, (n, s)."""

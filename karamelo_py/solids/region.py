@@ -37,7 +37,9 @@ class RegionSolid(Solid):
     points
         ``regular``: at equal distances. ``gauss``: at the Gauss points of the cell, whose weights
         share out the volume. Left out: at equal distances with equal volumes, but for ``ppc`` 3,
-        where the points stand at the Gauss points (as Karamelo has it, with equal volumes).
+        where the points stand at the Gauss points (as Karamelo has it, with equal volumes). With
+        domains around the points (ugimp, cpgimp, cpdi) those of 3 are at equal distances, too:
+        domains tile the cell.
     GlueToSolid
         A solid that came before, whose velocity field this one shares, in methods where each
         solid has its own.
@@ -76,6 +78,8 @@ class RegionSolid(Solid):
         self.region = region
         self.ppc = ppc
         lattice = lattice_of(region, domain, self.h, own=own_grids(hub))
+        if points is None and getattr(hub.update.method, "regular_points", False):
+            points = "regular"
         placement = fill(region, domain, lattice, ppc, points)
         self.put(hub, placement, may_be_empty=region.unknown)
 
