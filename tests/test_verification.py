@@ -283,7 +283,12 @@ def test_flip_loses_little_angular_momentum_and_pic_nearly_all(run_script):
 
 
 @pytest.mark.parametrize(
-    ("transfer", "momentum_lost"), [("APIC", 1e-8), ("AFLIP", 0.02), ("ASFLIP", 0.02)]
+    ("transfer", "momentum_lost"),
+    [
+        ("APIC", 1e-8),
+        pytest.param("AFLIP", 0.02, marks=pytest.mark.full),
+        pytest.param("ASFLIP", 0.02, marks=pytest.mark.full),
+    ],
 )
 def test_transfers_with_quadratic_splines(run_script, transfer, momentum_lost):
     """Found: APIC 0 and 3 % of the energy; AFLIP and ASFLIP win 1.5 %, and keep the energy."""

@@ -24,7 +24,6 @@ from verification import (
     TOTAL_CPDI,
     TOTAL_CUBIC,
     UGIMP,
-    needs,
     run_scene,
     table,
 )
@@ -121,7 +120,6 @@ def test_geometry_of_the_beam_gives_tetrahedra_of_its_volume(beam_mesh):
     assert volumes.sum() == pytest.approx(4, rel=1e-9)
 
 
-@needs(("method", "ulcpdi"))
 def test_cantilever_of_tetrahedra(run_script, beam_mesh, cantilever_witness):
     """The elements near the lower edge sink as finite elements do, within 6 %.
 
@@ -134,7 +132,6 @@ def test_cantilever_of_tetrahedra(run_script, beam_mesh, cantilever_witness):
 
 
 @pytest.mark.full
-@needs(("method", "ulcpdi"))
 @pytest.mark.parametrize("refine", [1, 2, 4])
 def test_cantilever_of_1041_tetrahedra(run_script, cantilever_witness, refine):
     """The mesh and the three grids of Sinaie et al. 2017."""
@@ -223,10 +220,7 @@ def acceleration(run_script, angle, friction, **variables):
 
 # --- Footing ------------------------------------------------------------------------------------
 
-FOOTING = needs(("command", "anti_volumetric_locking"), ("material", "eos-strength"))
 
-
-@FOOTING
 def test_footing_reaches_the_limit_load(run_script):
     """Prandtl's 5.1416 within 5 %. Found: 5.13 with 20 cells, 5.02 with 40."""
     log = run_scene(run_script, "footing", LINEAR, alpha=0.99).log
@@ -234,7 +228,6 @@ def test_footing_reaches_the_limit_load(run_script):
     assert log.load[late].mean() == pytest.approx(exact.prandtl_load(1), rel=0.05)
 
 
-@FOOTING
 def test_footing_locks_without_mean_volumes(run_script):
     """The load passes the limit and goes on rising: 6.2 on average, 6.3 at the end."""
     log = run_scene(run_script, "footing", LINEAR, alpha=0.99, bar="false").log

@@ -1,8 +1,7 @@
 """Help for the tests that run the scenes of inputs/ with many methods and on many grids.
 
 A `Way` is a method as a script of inputs/ takes it from the command line. A table of ways becomes
-the parameters of a test; a way whose styles are not installed is skipped, and runs by itself as
-soon as they are.
+the parameters of a test.
 """
 
 from __future__ import annotations
@@ -14,8 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import INPUTS, Result, Table, read_dump
-
-from karamelo_py import registry
 
 # Transfers that take a share of FLIP.
 BLENDS = ("FLIP", "AFLIP", "ASFLIP")
@@ -36,12 +33,6 @@ class Way:
         """Name of the test."""
         words = [self.kind, self.basis, self.transfer]
         return "-".join(words if self.domains == "mechanical" else [*words, self.domains])
-
-    @property
-    def available(self) -> bool:
-        """Whether all styles of this way are installed."""
-        needed = [("method", self.kind), ("basis", self.basis), ("transfer", self.transfer)]
-        return all(registry.knows(family, style) for family, style in needed)
 
     @property
     def variables(self) -> dict[str, Any]:
@@ -70,16 +61,17 @@ TOTAL_BERNSTEIN = Way(kind="tlmpm", basis="Bernstein-quadratic")
 TOTAL_CPDI = Way(kind="tlcpdi", domains="R4")
 
 
+# Each way takes most of a minute to compile: these run always, the others with ``-m full``.
+ALWAYS = (LINEAR, QUADRATIC, CPDI_Q, TOTAL)
+
+
 def table(*rows: tuple, marks: tuple = ()) -> list:
-    """Parameters from rows (way, ...): named by the way, skipped where it is not installed."""
+    """Parameters from rows (way, ...), named by the way; rare ways are marked ``full``."""
     return [
         pytest.param(
             *row,
             id=row[0].name,
-            marks=[
-                pytest.mark.skipif(not row[0].available, reason=f"{row[0].name}: not there yet"),
-                *marks,
-            ],
+            marks=[*marks] if row[0] in ALWAYS else [pytest.mark.full, *marks],
         )
         for row in rows
     ]
@@ -88,12 +80,6 @@ def table(*rows: tuple, marks: tuple = ()) -> list:
 def transfers(*names: str) -> list[Way]:
     """Linear ULMPM with these transfers."""
     return [replace(LINEAR, transfer=name) for name in names]
-
-
-def needs(*styles: tuple[str, str]):
-    """Mark: skip unless the registry knows every (family, style)."""
-    missing = [f"{family} {style}" for family, style in styles if not registry.knows(family, style)]
-    return pytest.mark.skipif(bool(missing), reason=f"{', '.join(missing)}: not there yet")
 
 
 def run_scene(
