@@ -114,7 +114,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         spans=tiles.empty_spans(),
         control=control,
     )
-    control.real[POINT_MASS] = max(float(b.points.mass.max()) for b in setup.blocks)
+    control.real[POINT_MASS] = min(float(b.points.mass.min()) for b in setup.blocks)
     return setup, tiles
 
 

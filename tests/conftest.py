@@ -24,7 +24,7 @@ INPUTS = TESTS.parent / "inputs"
 REFERENCE = TESTS / "data"
 
 # No test asserts a time, and a failure is the same in every run.
-settings.register_profile("tests", deadline=None, derandomize=True)
+settings.register_profile("tests", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("tests")
 
 

@@ -326,6 +326,7 @@ def numbers_along(b, kin, grid, place):
     return (r,) + weights + gradients + affine
 
 
+@pytest.mark.full
 @every_basis
 @every_kinematics
 def test_compiled_is_the_same(basis, kin):
@@ -339,6 +340,7 @@ def test_compiled_is_the_same(basis, kin):
         assert compiled(basis(), kin, grid, place) == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.full
 @every_basis
 def test_single_precision_stays_single(basis):
     """To 6 digits the same, and no number of it is double: a bare literal would make it so."""
@@ -427,6 +429,7 @@ def test_box_between_carried_corners(kin, fraction, size):
     assert box_of(kin, new) == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kin", ALL_KINEMATICS[2:], ids=lambda kin: type(kin).__name__)
 @pytest.mark.parametrize("basis", VARIANTS, ids=lambda basis: basis.__name__)
 def test_boxes_stay_single(basis, kin):

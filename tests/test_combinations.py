@@ -112,7 +112,7 @@ def test_pairwise(case, state_interpreted, tmp_path):
     assert dimension(case[0]) >= 1
 
 
-SELECTION = COMPILED[:: max(1, len(COMPILED) // 4)]
+SELECTION = COMPILED[:: max(1, len(COMPILED) // 2)]
 
 
 @pytest.mark.parametrize("case", SELECTION)

@@ -188,6 +188,7 @@ def test_disk_slides_down_an_incline(run_script, mu, share):
     assert log.ContactForce_disk_y[late].mean() == pytest.approx(weight, rel=0.03)
 
 
+@pytest.mark.full
 def test_disk_rolls_down_an_incline(run_script):
     """(2/3) g sin in the limit. Contact is felt before surfaces meet, which brakes the rolling.
 

@@ -182,6 +182,7 @@ def sliding(mu: float) -> str:
     """
 
 
+@pytest.mark.full
 def test_sliding_block_slows_down(run_script):
     """Friction brakes by mu g, and balls that ride over balls by some more, without friction too.
 

@@ -129,6 +129,7 @@ def test_any_way_through_a_compiled_run(state):
     assert same_bits(whole, state(crossing(2, "dump(d, all, particle, 7, d.*.txt, x)", "run(100)")))
 
 
+@pytest.mark.full
 def test_compiled_stages(state):
     """Fused and staged, each compiled into one piece, give the same bits."""
     stages = [line.replace("1.1, 1.15", "2.1, 2.15") for line in STAGES]

@@ -63,6 +63,7 @@ def test_axis_aligned_is_of_second_order_at_small_amplitude(run_script, way):
     assert errors[-1] < 0.015
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("way",), table((LINEAR,), (QUADRATIC,), (STRETCH,), (TOTAL,)))
 def test_axis_aligned_in_one_dimension(run_script, way):
     errors = errors_on(run_script, "axis_aligned_1d", way, GRIDS, G=SMALL)
@@ -83,6 +84,7 @@ CURES = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("way", "ppc"), table(*CURES))
 def test_cures_of_cell_crossing_keep_second_order(run_script, way, ppc):
     """Points cross up to three cells; the body stretches by 31 %. Slopes found: 1.96 to 2.15."""
@@ -154,6 +156,7 @@ def test_vortex_converges_at_small_angle(run_script, way):
     assert errors[-1] < 0.12
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("factor", [-1, 2])
 def test_vortex_does_not_converge_with_a_wrong_source(run_script, factor):
     """The shear of the tangential source with another factor: the error stays above one half."""
@@ -195,6 +198,7 @@ def test_linear_basis_has_one_stress_a_cell_while_points_stay(run_script):
     assert log.base_y[-1] == pytest.approx(80 * 0.0981 * 10 * 10 / 16, rel=0.02)
 
 
+@pytest.mark.full
 def test_linear_basis_does_not_converge_on_the_column(run_script):
     """Points cross cells, and each has a stress of its own: 4 to 16 cells bring no order."""
     errors = [column_error(run_script, LINEAR, grid) for grid in (0.25, 0.5, 1)]
@@ -273,6 +277,7 @@ def test_apic_keeps_angular_momentum(run_script):
     assert 0.9 < energy < 1.001
 
 
+@pytest.mark.full
 def test_flip_loses_little_angular_momentum_and_pic_nearly_all(run_script):
     momentum, energy = disk(run_script, LINEAR)
     assert 0.95 < momentum < 1.001
@@ -282,6 +287,7 @@ def test_flip_loses_little_angular_momentum_and_pic_nearly_all(run_script):
     assert energy < 0.25
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("transfer", "momentum_lost"),
     [

@@ -62,6 +62,7 @@ def test_cantilever_sinks_as_published(run_script, way, depth, moment):
     assert time == pytest.approx(moment, rel=0.002)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("way", "most"), table(*SWING_BACK))
 def test_cantilever_swings_back(run_script, cantilever_witness, way, most):
     """The curve of finite elements; of the swing of 3.3 m four cells over the height are a coarse
@@ -74,6 +75,7 @@ def test_cantilever_swings_back(run_script, cantilever_witness, way, most):
     assert log.tip_s[log.Time > 2].min() < 0.15
 
 
+@pytest.mark.full
 def test_cantilever_with_the_linear_basis_does_not_swing_back(run_script, cantilever_witness):
     """It sinks about as deep as it should and then stays down by more than a metre (CFL 0.1).
 
@@ -120,6 +122,7 @@ def test_geometry_of_the_beam_gives_tetrahedra_of_its_volume(beam_mesh):
     assert volumes.sum() == pytest.approx(4, rel=1e-9)
 
 
+@pytest.mark.full
 def test_cantilever_of_tetrahedra(run_script, beam_mesh, cantilever_witness):
     """The elements near the lower edge sink as finite elements do, within 6 %.
 
@@ -159,6 +162,7 @@ def check_bar(run_script, bar_witness, way, refine):
     assert found_moment == pytest.approx(moment, rel=0.05)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("way",), table((TOTAL,)))
 def test_vertical_bar_holds_together(run_script, bar_witness, way):
     """Eight cells: 1.645 m at 0.0931 s, of finite elements 1.662 m at 0.0890 s.
@@ -183,6 +187,7 @@ def test_vertical_bar_holds_together_by_other_methods(run_script, bar_witness, w
     check_bar(run_script, bar_witness, way, 2)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("way",), table((LINEAR,), (UGIMP,)))
 def test_vertical_bar_breaks(run_script, way):
     """Points farther apart than a function reaches lose sight of each other and fall freely."""
@@ -201,6 +206,7 @@ def test_disk_slides_down_an_incline(run_script, angle, friction):
     assert acceleration(run_script, angle, friction) == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.full
 def test_disk_rolls_down_an_incline(run_script):
     """(2/3) g sin, not smoothly: what comes near the base meets it a cell too early.
 
@@ -228,6 +234,7 @@ def test_footing_reaches_the_limit_load(run_script):
     assert log.load[late].mean() == pytest.approx(exact.prandtl_load(1), rel=0.05)
 
 
+@pytest.mark.full
 def test_footing_locks_without_mean_volumes(run_script):
     """The load passes the limit and goes on rising: 6.2 on average, 6.3 at the end."""
     log = run_scene(run_script, "footing", LINEAR, alpha=0.99, bar="false").log

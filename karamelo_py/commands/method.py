@@ -57,15 +57,22 @@ def method(hub: Hub, kind: str, transfer: str, basis: str, *options: Argument) -
         _parameter(hub, transfer_class, name, words, f"method({kind}, {transfer}, {basis}")
         for name in transfer_class._fields
     ]
+    variants = _variants(method_class, registry.find("basis", basis))
     basis_class, chosen = _basis(kind, method_class, basis, words)
     for argument in words:
         word = argument.word() or argument.text
         if word == "thermo-mechanical":
-            raise ScriptError("temperature is not there yet", place=argument.place)
+            raise ScriptError(
+                "temperature is not there yet", place=argument.place, hint="mechanical"
+            )
+        if chosen is not None and argument is not chosen and word in variants:
+            raise ScriptError(
+                f"'{chosen.text}' was chosen already", place=argument.place, expected="one of them"
+            )
         if word == "gradient-enhanced":
             transfer_class = _enhanced(transfer_class, argument)
         elif argument is not chosen and word not in OPTIONS:
-            known = [*OPTIONS, *_variants(method_class, basis_class)]
+            known = [*(o for o in OPTIONS if o != "thermo-mechanical"), *variants]
             close = nearest(word, known)
             raise ScriptError(
                 f"'{argument.text}' is not an option of method({kind}, {transfer}, {basis})",
@@ -154,7 +161,7 @@ def _parameter(hub: Hub, transfer: type, name: str, words: list[Argument], call:
             raise ScriptError(f"{name} is {words[0].text}", place=words[0].place, expected=wanted)
         raise ScriptError(
             f"{transfer.__name__} needs a number {name} after the basis",
-            expected=f"{call}, {name}) with {name} {wanted.removeprefix('a ')}",
+            expected=f"{call}, {name}) with {name} {wanted}",
         )
     argument = words.pop(0)
     in_range = 1 <= value <= 20 and value == int(value) if whole else 0 <= value <= 1

@@ -100,7 +100,25 @@ populate_cylindrical_coordinates.syntax = (
 
 
 def _refuse_chosen(hub: Hub, solid: Solid) -> None:
-    """Groups know their points by number, and the numbers from here on change."""
+    """Groups and contact know points by number, and the numbers from here on change.
+
+    So do those of nodes, where solids have grids of their own.
+    """
+    own_grids = getattr(hub.update.method, "own_grids", False)
+    for group in hub.groups.values():
+        if own_grids and group.kind == "nodes" and not group.all and len(group):
+            raise ScriptError(
+                f"group '{group.id}' was chosen from nodes of grids that would change",
+                argument="solid",
+                expected=f"group({group.id}, ...) after populate_cylindrical_coordinates",
+            )
+    for fix in hub.fixes.values():
+        if fix.puts_force_on_points:
+            raise ScriptError(
+                f"fix '{fix.id}' was made for points that would be replaced or renumbered",
+                argument="solid",
+                expected=f"fix({fix.id}, ...) after populate_cylindrical_coordinates",
+            )
     for group in hub.groups.values():
         if isinstance(group, ParticleGroup) and len(group) and group.ids[-1] >= solid.first_id:
             raise ScriptError(

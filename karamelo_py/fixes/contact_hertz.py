@@ -55,6 +55,11 @@ class ContactHertz(PairContact):
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, solid1, solid2)
+        if hub.domain.axisymmetric:
+            raise ScriptError(
+                "the force of Hertz is one of balls, and axisymmetric points are rings",
+                expected="fix contact/minimize_penetration, or a scene in 3D",
+            )
         moduli = (plane_modulus(solid1, "solid1"), plane_modulus(solid2, "solid2"))
         self.modulus = 1 / sum(1 / modulus for modulus in moduli)
 

@@ -113,7 +113,7 @@ class Control(NamedTuple):
 TIME, TIMESTEP, DT = 0, 1, 2
 # Control.real
 FIXED_DT, DT_FACTOR, END_TIME, RATE, NEW_RATE, MOVE, DRIFT, DRIFT_LIMIT, SPACING = range(9)
-POINT_MASS = 9  # mass of the heaviest point
+POINT_MASS = 9  # mass of the lightest point
 NEW_MOVE = 10
 # Control.whole
 NOW, WRONG, OVER_LIMIT, WATCH_LIMIT = range(4)

@@ -279,9 +279,12 @@ def _(hooks, stage, then, s):
 
 @shared
 def light_node(s):
-    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 point masses."""
+    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 point masses.
+
+    Less than one: inside a body with one point a cell all is well.
+    """
     courant = s.control.real[RATE] * s.control.values[DT] / s.control.real[SPACING]
-    masses = dimension(s.kin) * courant * courant
+    masses = min(dimension(s.kin) * courant * courant, 0.9)
     return real(masses * s.control.real[POINT_MASS], s.nodes.sums[0, 0])
 
 
