@@ -137,6 +137,7 @@ def test_flip_nearly_conserves_angular_momentum_and_pic_loses_it(run_interpreted
     assert pic[-1] < 0.3 * pic[0]
 
 
+@pytest.mark.full
 def test_order_of_the_schemes(run_script):
     """After the rebound of the two disks USF has the most energy, USL the least (Bardenhagen 2002).
 

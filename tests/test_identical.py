@@ -111,7 +111,7 @@ def state(tmp_path, monkeypatch):
     [
         (2, "FLIP", "musl", ("linear", "neo-hookean")),
         (2, "PIC", "usl", ("linear",)),
-        (3, "APIC", "usf", ("neo-hookean",)),
+        pytest.param(3, "APIC", "usf", ("neo-hookean",), marks=pytest.mark.full),
     ],
 )
 def test_one_thread_or_two(state, d, transfer, scheme, laws):

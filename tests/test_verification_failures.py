@@ -232,6 +232,7 @@ def test_hoop_strain_is_the_radial_one_up_to_the_axis(run_interpreted, basis):
 # --- Points per cell ----------------------------------------------------------------------------
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("way", "most"), table((LINEAR, 0.1), (QUADRATIC, 0.1), (TOTAL, 0.1)))
 def test_points_per_cell(run_script, way, most):
     """The same scene with 1, 2 and 3 points a direction: all see the solution."""
