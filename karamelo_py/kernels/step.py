@@ -279,12 +279,9 @@ def _(hooks, stage, then, s):
 
 @shared
 def light_node(s):
-    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 point masses.
-
-    Less than one: inside a body with one point a cell all is well.
-    """
+    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of the lightest point."""
     courant = s.control.real[RATE] * s.control.values[DT] / s.control.real[SPACING]
-    masses = min(dimension(s.kin) * courant * courant, 0.9)
+    masses = dimension(s.kin) * courant * courant
     return real(masses * s.control.real[POINT_MASS], s.nodes.sums[0, 0])
 
 

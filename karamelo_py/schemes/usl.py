@@ -38,8 +38,8 @@ class USL(NamedTuple):
 
     One visit of the points a step: the fastest scheme. It dissipates a little. A node with next to
     no mass gets a large velocity, which would show in the gradient: there, and there only, the
-    gradient takes the change of velocity by the share of the mass, below d (c dt / h)^2 times (at
-    most 0.9 times) the mass of the lightest point of the scene. Momentum is kept. In two and three
+    gradient takes the change of velocity by the share of the mass, below d (c dt / h)^2 times
+    the mass of the lightest point of the scene. Momentum is kept. In two and three
     dimensions with linear functions, take dt_factor(0.8) or less.
 
     Example
