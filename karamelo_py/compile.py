@@ -6,6 +6,7 @@ is named by a hash of every source that can end up in a kernel: this package's a
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 import re
@@ -20,10 +21,22 @@ import numba
 from llvmlite import binding as llvm
 from llvmlite import ir
 from numba import cfunc, config, njit
+from numba.core import event
 from numba.extending import intrinsic, overload
 
+import karamelo_py.melting  # noqa: F401  (has to be there before anything is compiled)
+
 _KEPT_CACHES = 6
-_COMPILED_PARTS = ("compile.py", "tensors.py", "points", "kernels", "state", "schemes", "fixes")
+_COMPILED_PARTS = (
+    "compile.py",
+    "melting.py",
+    "tensors.py",
+    "points",
+    "kernels",
+    "state",
+    "schemes",
+    "fixes",
+)
 
 
 def _source_folders() -> list[Path]:
@@ -83,6 +96,24 @@ CACHE_FOLDER = _use_cache_folder()
 # registers and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
 llvm.set_option("", "--unroll-threshold=4000")
 
+
+class _NoCollections(event.Listener):
+    """While Numba compiles, Python's collector of cycles would walk its many objects in vain."""
+
+    depth = 0
+
+    def on_start(self, event: Any) -> None:
+        self.depth += 1
+        gc.disable()
+
+    def on_end(self, event: Any) -> None:
+        self.depth -= 1
+        if self.depth == 0:
+            gc.enable()
+
+
+event.register("numba:compile", _NoCollections())
+
 # Threads that wait for each other spin a little, then sleep (GNU OpenMP). Where another program
 # takes a core, waiting at full speed makes two threads twenty times slower than one; sleeping at
 # once costs a fifth where none does.
@@ -90,7 +121,7 @@ os.environ.setdefault("GOMP_SPINCOUNT", "500")
 
 
 # Point functions must melt into the loops that call them, however large they get.
-_INLINED = {"forceinline": True}
+_INLINED = {"forceinline": True, "no_cfunc_wrapper": True}
 
 
 def kernel(function: Callable | None = None, **options: Any) -> Callable:
@@ -102,12 +133,18 @@ def kernel(function: Callable | None = None, **options: Any) -> Callable:
     """
     if function is None:
         return lambda f: kernel(f, **options)
+    options = {"forceinline": False, "no_cfunc_wrapper": True} | options
     return njit(cache=True, nogil=True, error_model="numpy", _nrt=False, **options)(function)
+
+
+def by_type(function: Callable) -> Callable:
+    """Decorate the chooser of what `function` is in a kernel, from the types of its arguments."""
+    return overload(function, _INLINED, strict=False)
 
 
 def shared(function: Callable) -> Callable:
     """Mark a helper of point functions that needs no choice by type: kernels may call it."""
-    overload(function, _INLINED, strict=False)(lambda *arguments: function)
+    by_type(function)(lambda *arguments: function)
     return function
 
 
@@ -151,7 +188,7 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
         def choose(*arguments: Any) -> Callable | None:
             return find(tuple(tag_class(a) for a in arguments[:tags]))
 
-        overload(dispatch, _INLINED, strict=False)(choose)
+        by_type(dispatch)(choose)
 
         def on(*classes: type) -> Callable[[Callable], Callable]:
             def register(implementation: Callable) -> Callable:
@@ -181,7 +218,7 @@ def real(value: float, like: Any) -> Any:
     return type(like)(value)
 
 
-@overload(real, inline="always")
+@by_type(real)
 def _real(value, like):
     if like is numba.types.float32:
         return lambda value, like: numba.float32(value)
@@ -201,7 +238,7 @@ def _fused(typing_context, a, b, c):
     return a(a, b, c), codegen
 
 
-@overload(fma, inline="always")
+@by_type(fma)
 def _fma(a, b, c):
     if a == b == c and isinstance(a, numba.types.Float):
         return lambda a, b, c: _fused(a, b, c)
@@ -216,7 +253,7 @@ def index(i: int) -> int:
     return i
 
 
-@overload(index, inline="always")
+@by_type(index)
 def _index(i):
     return lambda i: numba.uint64(i)
 
@@ -240,7 +277,7 @@ def over_blocks(per_block: Callable) -> Callable:
         lines = [f"per_block(setup.blocks[{k}], setup{names})" for k in range(count)]
         return define(f"setup{names}", *lines, per_block=per_block)
 
-    overload(loop, strict=False)(written_out)
+    by_type(loop)(written_out)
     return loop
 
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from numba import types
-from numba.extending import overload
 
-from karamelo_py.compile import define, fma
+from karamelo_py.compile import by_type, define, fma
 
 
 def spell(parameters: str, term: str, length: int) -> Callable:
@@ -25,7 +24,7 @@ def add(a, b):
     return tuple(x + y for x, y in zip(a, b, strict=True))
 
 
-@overload(add)
+@by_type(add)
 def _add(a, b):
     return spell("a, b", "a[k] + b[k]", len(a))
 
@@ -35,7 +34,7 @@ def subtract(a, b):
     return tuple(x - y for x, y in zip(a, b, strict=True))
 
 
-@overload(subtract)
+@by_type(subtract)
 def _subtract(a, b):
     return spell("a, b", "a[k] - b[k]", len(a))
 
@@ -45,7 +44,7 @@ def scale(factor, a):
     return tuple(factor * x for x in a)
 
 
-@overload(scale)
+@by_type(scale)
 def _scale(factor, a):
     return spell("factor, a", "factor * a[k]", len(a))
 
@@ -55,7 +54,7 @@ def add_scaled(a, factor, b):
     return tuple(fma(factor, y, x) for x, y in zip(a, b, strict=True))
 
 
-@overload(add_scaled)
+@by_type(add_scaled)
 def _add_scaled(a, factor, b):
     return spell("a, factor, b", "fma(factor, b[k], a[k])", len(a))
 
@@ -66,7 +65,7 @@ def put_at(array, i, first, values):
         array[i, first + k] = value
 
 
-@overload(put_at)
+@by_type(put_at)
 def _put_at(array, i, first, values):
     lines = [f"array[i, first + {k}] = values[{k}]" for k in range(len(values))]
     return define("array, i, first, values", *lines)
@@ -77,7 +76,7 @@ def row(array, i, first, like):
     return tuple(array[i, first + k] for k in range(len(like)))
 
 
-@overload(row)
+@by_type(row)
 def _row(array, i, first, like):
     items = "".join(f"array[i, first + {k}], " for k in range(len(like)))
     return define("array, i, first, like", f"return ({items})")
@@ -91,7 +90,7 @@ def record(table, i):
     return type(table)(*(record(c, i) if isinstance(c, tuple) else c[i] for c in table))
 
 
-@overload(record)
+@by_type(record)
 def _record(table, i):
     terms = [
         f"record(table[{k}], i)" if isinstance(column, types.BaseNamedTuple) else f"table[{k}][i]"
@@ -106,7 +105,7 @@ def optional_row(array, i, like):
     return () if array is None else row(array, i, 0, like)
 
 
-@overload(optional_row)
+@by_type(optional_row)
 def _optional_row(array, i, like):
     if isinstance(array, types.NoneType):
         return lambda array, i, like: ()
@@ -119,7 +118,7 @@ def put_optional(array, i, values):
         put_at(array, i, 0, values)
 
 
-@overload(put_optional)
+@by_type(put_optional)
 def _put_optional(array, i, values):
     if isinstance(array, types.NoneType):
         return lambda array, i, values: None
@@ -131,7 +130,7 @@ def add_optional(a, factor, b):
     return add_scaled(a, factor, b) if len(b) else a
 
 
-@overload(add_optional)
+@by_type(add_optional)
 def _add_optional(a, factor, b):
     if len(b) == 0:
         return lambda a, factor, b: a
@@ -148,7 +147,7 @@ def add_to_optional(array, i, factor, values):
             array[i, k] += factor * values[k]
 
 
-@overload(add_to_optional)
+@by_type(add_to_optional)
 def _add_to_optional(array, i, factor, values):
     if isinstance(array, types.NoneType):
         return lambda array, i, factor, values: None
@@ -166,7 +165,7 @@ def clear_optional(array, i):
         array[i, :] = 0
 
 
-@overload(clear_optional)
+@by_type(clear_optional)
 def _clear_optional(array, i):
     if isinstance(array, types.NoneType):
         return lambda array, i: None
@@ -184,7 +183,7 @@ def put_from(array, i, first, values):
         array[i, k] = values[k]
 
 
-@overload(put_from)
+@by_type(put_from)
 def _put_from(array, i, first, values):
     def put(array, i, first, values):
         for k in range(first, len(values)):
@@ -198,7 +197,7 @@ def add_row(a, first, b):
     return tuple(x + (b[k - first] if first <= k < first + len(b) else 0) for k, x in enumerate(a))
 
 
-@overload(add_row)
+@by_type(add_row)
 def _add_row(a, first, b):
     items = []
     for k in range(len(a)):

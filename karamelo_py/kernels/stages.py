@@ -13,9 +13,8 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from numba import types
-from numba.extending import overload
 
-from karamelo_py.compile import fma, index, point_function, real, shared
+from karamelo_py.compile import by_type, fma, index, point_function, real, shared
 from karamelo_py.points.basis import (
     blank,
     carried,
@@ -302,7 +301,7 @@ def add_gradient(w, stencil, k, total):
     return _gradient(w, stencil, k, total) if len(total) else total
 
 
-@overload(add_gradient)
+@by_type(add_gradient)
 def _add_gradient(w, stencil, k, total):
     if len(total) == 0:
         return lambda w, stencil, k, total: total
@@ -482,7 +481,7 @@ def deformation_at(array, kin, law, state, p):
     return row(array, p, 0, zero_tensor(kin, array[p, 0]))
 
 
-@overload(deformation_at)
+@by_type(deformation_at)
 def _deformation_at(array, kin, law, state, p):
     if isinstance(array, types.NoneType):
         return lambda array, kin, law, state, p: deformation(law, kin, state)
@@ -495,7 +494,7 @@ def advance_deformation(array, kin, p, increment, f):
         put_at(array, p, 0, deform(kin, increment, f))
 
 
-@overload(advance_deformation)
+@by_type(advance_deformation)
 def _advance_deformation(array, kin, p, increment, f):
     if isinstance(array, types.NoneType):
         return lambda array, kin, p, increment, f: None
