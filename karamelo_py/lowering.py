@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.arrays import (
+    COURANT,
     DRIFT,
-    POINT_MASS,
+    LIGHTEST,
     SPACING,
     Block,
     Control,
@@ -80,6 +81,13 @@ def thread_count(hub: Hub, points: int) -> int:
     return usable if points > SERIAL_UP_TO else 1
 
 
+def stable_courant(hub: Hub) -> float:
+    """The stable step as a share of cell size over wave speed, by the scheme and the points."""
+    two, one = hub.update.scheme.courant
+    sparse = any(2 * np.max(solid.half_size) > 0.75 * solid.h for solid in hub.solids.values())
+    return one if sparse else two
+
+
 def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     """Make the arrays of a run from the scene, taking over the state of points that exist."""
     check_scene(hub)
@@ -91,8 +99,9 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     basis = type(method.basis)(*(real(x) for x in method.basis))
     tiles = Tiles(lattices, basis)
     contact = method.contact_between(hub, lattices)
-    control = Control(hub.values.array, np.zeros(11), np.zeros(4, np.int64))
+    control = Control(hub.values.array, np.zeros(12), np.zeros(4, np.int64))
     control.real[SPACING] = min(lattice.h for lattice in lattices)
+    control.real[COURANT] = stable_courant(hub)
     control.real[DRIFT] = np.inf  # the points are not sorted yet
     needs = Needs(
         moment=transfer.keeps_moment,
@@ -114,7 +123,8 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         spans=tiles.empty_spans(),
         control=control,
     )
-    control.real[POINT_MASS] = min(float(b.points.mass.min()) for b in setup.blocks)
+    if basis.gradient_jumps:
+        control.real[LIGHTEST] = min(float(b.points.mass.min()) for b in setup.blocks)
     return setup, tiles
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from karamelo_py.kernels.arrays import (
+    COURANT,
     DRIFT,
     DRIFT_LIMIT,
     DT,
@@ -265,9 +266,11 @@ class Simulation:
 
     @property
     def limit(self) -> float:
-        """The stable step of the present state: cell size over the fastest point's rate."""
+        """The stable step of the present state."""
         control = self.setup.control.real
-        return control[SPACING] / control[RATE] if control[RATE] > 0 else np.inf
+        if control[RATE] == 0:
+            return np.inf
+        return control[COURANT] * control[SPACING] / control[RATE]
 
     def above_limit(self) -> bool:
         """Whether the chosen step is above the stable limit already."""

@@ -10,6 +10,8 @@ import pytest
 from conftest import read_dump
 from verification import LINEAR, QUADRATIC, TOTAL, errors_on, frequency, run_scene, table
 
+from karamelo_py.schemes.usl import USL
+
 SIGMA = 3.0
 
 # --- Cell crossing ------------------------------------------------------------------------------
@@ -165,6 +167,40 @@ def test_a_node_with_next_to_no_mass_does_no_harm(run_interpreted, scheme):
     """)
     assert result.log.v_x == pytest.approx(np.full(11, 0.1), rel=1e-9)
     assert result.log.Es.max() < 2 * 0.5 / 100
+
+
+def shaken(run_interpreted, scheme, ppc, factor):
+    """Energy of a small free body, shaken a little, after 250 steps over the one at the start."""
+    result = run_interpreted(f"""
+        method(tlmpm, FLIP, linear, 1)
+        scheme({scheme})
+        dimension(2, -1, 3, -1, 3, 1)
+        region(box, block, 0, 3, 0, 2)
+        material(rubber, neo-hookean, 1, 100, 0.3)
+        solid(box, region, box, {ppc}, rubber, 1, 0)
+        fix(v, initial_velocity_particles, all, 1e-6*sin(37*x + 11*y), 1e-6*sin(29*x*x + 17*y))
+        compute(Ek, kinetic_energy, all)
+        compute(Es, strain_energy, all)
+        dt_factor({factor})
+        set_output(1000)
+        log_modify(custom, step, Ek, Es)
+        run(250)
+    """, folder=f"{scheme}{ppc}{factor}")  # fmt: skip
+    total = result.log.Ek + result.log.Es
+    return total[-1] / total[0]
+
+
+@pytest.mark.parametrize("ppc", [1, 2])
+def test_usl_has_a_stable_step_of_its_own(run_interpreted, ppc):
+    """Benchmark C11. Strain that points average away follows e <- (1 - (w dt)^2) e with usl.
+
+    That is stable for w dt < sqrt(2), where the other schemes have 2. One point a cell: w^2 h^2 is
+    at most 4 (2 lambda + 2 mu) / rho in the plane, stable below 0.59 h/c at nu = 0.3.
+    """
+    assert shaken(run_interpreted, "usl", ppc, 0.99) < 1.5
+    above = (0.9 if ppc == 2 else 0.75) / USL.courant[ppc == 1]
+    assert shaken(run_interpreted, "usl", ppc, above) > 5
+    assert shaken(run_interpreted, "musl", ppc, 0.99) < 1.5
 
 
 # --- Hourglass ----------------------------------------------------------------------------------

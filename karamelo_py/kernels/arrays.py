@@ -106,15 +106,16 @@ class Control(NamedTuple):
     """What the compiled loop reads and writes beside the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
-    real: np.ndarray  # (11,) float64, see the names below
+    real: np.ndarray  # (12,) float64, see the names below
     whole: np.ndarray  # (4,) int64, see the names below
 
 
 TIME, TIMESTEP, DT = 0, 1, 2
 # Control.real
 FIXED_DT, DT_FACTOR, END_TIME, RATE, NEW_RATE, MOVE, DRIFT, DRIFT_LIMIT, SPACING = range(9)
-POINT_MASS = 9  # mass of the lightest point
+LIGHTEST = 9  # mass of the lightest point, where the gradient of the basis jumps
 NEW_MOVE = 10
+COURANT = 11  # stable step as a share of cell size over the fastest point's rate
 # Control.whole
 NOW, WRONG, OVER_LIMIT, WATCH_LIMIT = range(4)
 

@@ -12,18 +12,19 @@ from typing import NamedTuple
 
 from karamelo_py.compile import kernel, over_blocks, point_function, real, shared
 from karamelo_py.kernels.arrays import (
+    COURANT,
     DRIFT,
     DRIFT_LIMIT,
     DT,
     DT_FACTOR,
     END_TIME,
     FIXED_DT,
+    LIGHTEST,
     MOVE,
     NEW_MOVE,
     NEW_RATE,
     NOW,
     OVER_LIMIT,
-    POINT_MASS,
     POST_ADVANCE_PARTICLES,
     POST_GRID_TO_POINT,
     POST_PARTICLES_TO_GRID,
@@ -205,7 +206,7 @@ def step_size(s):
 def choose_dt(control):
     """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end."""
     real_, whole = control.real, control.whole
-    limit = real_[SPACING] / real_[RATE] if real_[RATE] > 0 else inf
+    limit = real_[COURANT] * real_[SPACING] / real_[RATE] if real_[RATE] > 0 else inf
     fixed = real_[FIXED_DT]
     dt = fixed if fixed > 0 else real_[DT_FACTOR] * limit
     whole[OVER_LIMIT] = whole[OVER_LIMIT] + 1 if dt > limit else 0
@@ -279,10 +280,14 @@ def _(hooks, stage, then, s):
 
 @shared
 def light_node(s):
-    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of the lightest point."""
+    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of the lightest point.
+
+    Less than one: a share below m / m_p would be less than what comes back to the node through the
+    points' velocities, and the strain of the node would run ahead of its stress.
+    """
     courant = s.control.real[RATE] * s.control.values[DT] / s.control.real[SPACING]
-    masses = dimension(s.kin) * courant * courant
-    return real(masses * s.control.real[POINT_MASS], s.nodes.sums[0, 0])
+    masses = min(dimension(s.kin) * courant * courant, 1.0)
+    return real(masses * s.control.real[LIGHTEST], s.nodes.sums[0, 0])
 
 
 # --- stages that schemes share ----------------------------------------------------------------

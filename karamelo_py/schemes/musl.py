@@ -51,6 +51,7 @@ class MUSL(NamedTuple):
     """
 
     maps_velocity_again = True
+    courant = (1.0, 1.0)
     stages = (
         (
             "p2g and stress in one visit of the points",

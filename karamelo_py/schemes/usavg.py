@@ -55,6 +55,7 @@ class USAVG(NamedTuple):
     scheme(usavg)
     """
 
+    courant = (1.0, 1.0)
     stages = (
         (
             "nodal velocity",

@@ -48,6 +48,7 @@ class USF(NamedTuple):
     scheme(usf)
     """
 
+    courant = (1.0, 1.0)
     stages = (
         (
             "nodal velocity",

@@ -21,7 +21,9 @@ nodes_per_cell
 least_nodes
     the smallest number of nodes a direction of the grid must have;
 steady_moment
-    whether D of the affine transfers stays away from zero everywhere.
+    whether D of the affine transfers stays away from zero everywhere;
+gradient_jumps
+    whether a weight that vanishes may have a gradient that does not: |grad N|^2 / N without bound.
 """
 
 from karamelo_py.compile import point_function

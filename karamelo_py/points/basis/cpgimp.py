@@ -56,6 +56,7 @@ class CPGIMPDet(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = True
+    gradient_jumps = False
 
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
@@ -77,6 +78,7 @@ class CPGIMPDiagonal(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = False  # D of the affine transfers all but vanishes with the box
+    gradient_jumps = False
 
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
@@ -99,6 +101,7 @@ class CPGIMPStretch(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = True
+    gradient_jumps = False
 
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
@@ -123,6 +126,7 @@ class CPGIMPCorners(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = True
+    gradient_jumps = False
 
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
@@ -152,6 +156,7 @@ class CPGIMP(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = True
+    gradient_jumps = False
 
     variants = MappingProxyType(
         {

@@ -26,6 +26,7 @@ class Linear(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = False  # D of the affine transfers vanishes at the nodes
+    gradient_jumps = True
 
 
 @along.on(Linear)

@@ -26,6 +26,7 @@ class T3(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
+    gradient_jumps = False
     element = "triangle"  # of a mesh
 
     @staticmethod
@@ -52,6 +53,7 @@ class Tet4(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
+    gradient_jumps = False
     element = "tetra"  # of a mesh
 
     @staticmethod
