@@ -55,9 +55,7 @@ class Runner:
         self._check_condition()
         if hub.rehearsing:
             return
-        if not hub.rehearsed:
-            hub.rehearsed = True
-            hub.interpreter.rehearse(hub.rehearsal())
+        hub.rehearse()
         simulation = hub.simulation
         if hub.checking:
             from karamelo_py.report import report
