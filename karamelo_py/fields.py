@@ -151,7 +151,15 @@ class Fields:
         return [name for name in ABSENT_AT_POINTS if name not in present]
 
     def particle(self, name: str) -> np.ndarray:
-        """A field of all points, (N,). What the scene does not have is zero, as in Karamelo."""
+        """A field of the points that there are, (n,), by id.
+
+        What the scene does not have is zero, as in Karamelo. Deleted points are left out.
+        """
+        values = self._particle(name)
+        present = self._simulation.present
+        return values if present.all() else values[present]
+
+    def _particle(self, name: str) -> np.ndarray:
         simulation = self._simulation
         if name == "id":
             return np.arange(1, simulation.count + 1)
