@@ -50,7 +50,11 @@ ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "
 
 
 class Fields:
-    """Named fields of the running scene; arrays are copies that are safe to keep."""
+    """Named fields of the running scene; arrays are copies that are safe to keep.
+
+    N counts all points there have ever been: deleted ones (boundary delete) have zeros. `members`
+    and `particle` leave them out.
+    """
 
     def __init__(self, hub: Hub):
         self.hub = hub
