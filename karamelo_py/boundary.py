@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +20,10 @@ def check(hub: Hub) -> None:
     if update.boundary == "error":
         return
     if not update.method.frame.moves:
+        name = type(update.method).__name__.lower()
         raise ScriptError(
-            f"boundary({update.boundary}) has no meaning here: the grids of {_name(update.method)} "
-            "belong to the solids and go with them, so that no point can leave one",
+            f"boundary({update.boundary}) has no meaning here: the grids of {name} belong to "
+            "the solids and go with them, so that no point can leave one",
             place=update.boundary_place,
             hint="leave boundary out, or method(ulmpm, ...)",
         )
@@ -37,15 +38,11 @@ def check(hub: Hub) -> None:
             )
     elif carried(update.method.basis, update.method.kinematics(hub)) > 0:
         raise ScriptError(
-            f"boundary(reflect) cannot mirror domains of the shape {_name(update.method.basis)}, "
+            f"boundary(reflect) cannot mirror {type(update.method.basis).__name__} domains, "
             "whose corners go with the grid",
             place=update.boundary_place,
             hint="boundary(delete), or domains that do not carry corners, such as R4 and R8",
         )
-
-
-def _name(style: Any) -> str:
-    return getattr(style, "style", type(style).__name__.lower())
 
 
 def leaving(simulation: Simulation) -> np.ndarray:

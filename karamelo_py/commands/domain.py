@@ -163,7 +163,7 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
     A deleted point is gone from the step in which it would have left. Dumps leave it out; the ids
     of the others stay. Each time the program goes back to the last state that it keeps, by a
     hundred steps at most, and takes these steps again: a run in which points leave in every step
-    takes about six times as long.
+    takes about six times as long. Hooks in Python are called for these steps again, too.
 
     A reflected point keeps its stress and the velocity along the edge. The velocity that turns is
     that of the point: neighbours that still press outwards may bring it back to the edge, and a

@@ -219,11 +219,11 @@ def _stresses(point: Point, path: LoadPath) -> list[tuple[str, float]]:
 
 
 def _check_name(ID: str) -> None:
-    if not ID.replace("-", "_").replace(".", "_").isidentifier():
+    if not ID.isidentifier():
         raise ScriptError(
             f"'{ID}' cannot be part of a file name and of names of values",
             argument="ID",
-            expected="letters, digits and _",
+            expected="letters, digits and _, beginning with a letter",
         )
 
 
