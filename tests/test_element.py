@@ -7,6 +7,15 @@ import pandas
 import pytest
 from conftest import INPUTS, read_log
 
+from karamelo_py.compile import point_function
+from karamelo_py.element.point import Point
+from karamelo_py.element.response import Response
+from karamelo_py.points import materials
+from karamelo_py.points.kinematics import Space
+from karamelo_py.points.materials.eos.linear import LinearPressure
+from karamelo_py.points.materials.eos_strength import EosStrength
+from karamelo_py.points.materials.strength.plastic import Plastic
+
 K, G, Y = 160e9, 80e9, 400e6
 E = 9 * K * G / (3 * K + G)
 NU = (3 * K - 2 * G) / (2 * (3 * K + G))
@@ -140,6 +149,17 @@ def test_pure_and_simple_shear_differ_by_a_turn(answer):
     assert t.sxx[-1] == pytest.approx(0.49)
     assert t.syy[-1] == pytest.approx(0, abs=1e-12)
     assert t.exy[-1] == pytest.approx(0.35)
+
+
+def test_what_a_law_offers_is_a_column(monkeypatch):
+    """Scalars that only some laws have: there where the law has them, else not."""
+    damage = point_function()(lambda law, kin, state: None)
+    monkeypatch.setattr(materials, "damage", damage, raising=False)
+    point = Point(EosStrength(LinearPressure(1.0, K), Plastic(G, Y)), Space())
+    assert "damage" not in Response(point).names
+    damage.on(EosStrength)(lambda law, kin, state: 0.25)
+    assert Response(point).last()["damage"] == 0.25
+    assert Response(point).last()["ep"] == 0
 
 
 def test_rate_of_the_path(answer):

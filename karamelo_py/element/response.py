@@ -98,9 +98,10 @@ class Response:
         largest = max(float(np.abs(table[name]).max()) for name in stresses)
         figure = blank_figure(9.6, 4.0)
         left, right = figure.subplots(1, 2)
-        for name in stresses:
+        # Dashes let a curve show that lies under another.
+        for name, dashes in zip(stresses, ("-", "--", ":") * 2, strict=False):
             if np.abs(table[name]).max() > 1e-6 * largest:
-                left.plot(table[driven], table[name], label=name, linewidth=1.4)
+                left.plot(table[driven], table[name], dashes, label=name, linewidth=1.4)
         left.set_xlabel(driven)
         left.set_ylabel("Cauchy stress")
         right.plot(table["p"], table["q"], linewidth=1.4)
