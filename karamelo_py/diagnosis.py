@@ -108,8 +108,8 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return (
             f"{name} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
-            "make the domain larger, hold the point back with fix velocity_nodes at the wall, "
-            f"or, if it should not have got there, {smaller}",
+            "make the domain larger, hold the point back with fix velocity_nodes at the wall, let "
+            f"it go with boundary(delete), or, if it should not have got there, {smaller}",
         )
     move = float(np.abs(new - old).max()) / hub.lattices[block.grid[p]].h
     if move > 1:

@@ -50,7 +50,11 @@ ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "
 
 
 class Fields:
-    """Named fields of the running scene; arrays are copies that are safe to keep."""
+    """Named fields of the running scene; arrays are copies that are safe to keep.
+
+    N counts all points there have ever been: deleted ones (boundary delete) have zeros. `members`
+    and `particle` leave them out.
+    """
 
     def __init__(self, hub: Hub):
         self.hub = hub
@@ -151,7 +155,15 @@ class Fields:
         return [name for name in ABSENT_AT_POINTS if name not in present]
 
     def particle(self, name: str) -> np.ndarray:
-        """A field of all points, (N,). What the scene does not have is zero, as in Karamelo."""
+        """A field of the points that there are, (n,), by id.
+
+        What the scene does not have is zero, as in Karamelo. Deleted points are left out.
+        """
+        values = self._particle(name)
+        present = self._simulation.present
+        return values if present.all() else values[present]
+
+    def _particle(self, name: str) -> np.ndarray:
         simulation = self._simulation
         if name == "id":
             return np.arange(1, simulation.count + 1)

@@ -71,7 +71,7 @@ class Hub:
     ----------
     domain
         The domain, or None before ``dimension``.
-    regions, eos, strengths, materials, solids, groups, fixes, computes, dumps
+    regions, eos, strengths, materials, load_paths, elements, solids, groups, fixes, computes, dumps
         Catalogues of what the script has named.
     values
         Numbers that fixes and computes publish, and time, timestep, dt.
@@ -98,6 +98,8 @@ class Hub:
         self.eos = Catalogue("eos", self)
         self.strengths = Catalogue("strength", self)
         self.materials = Catalogue("material", self)
+        self.load_paths = Catalogue("load path", self)
+        self.elements = Catalogue("element", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
         self.fixes = Catalogue("fix", self)
@@ -149,13 +151,19 @@ class Hub:
             text = render_message("warning", message, place or self.place, expected, hint)
             self.console.warn(text)
 
+    def rehearse(self) -> None:
+        """Try the rest of the script, once, before the first work that takes time."""
+        if not self.rehearsed:
+            self.rehearsed = True
+            self.interpreter.rehearse(self.rehearsal())
+
     def rehearsal(self) -> Hub:
         """A copy on which the rest of the script can be tried without consequences."""
         other = copy.copy(self)
         other.rehearsing = True
         for name in (
-            "regions", "eos", "strengths", "materials", "solids", "groups", "fixes", "computes",
-            "dumps",
+            "regions", "eos", "strengths", "materials", "load_paths", "elements", "solids",
+            "groups", "fixes", "computes", "dumps",
         ):  # fmt: skip
             catalogue = Catalogue(getattr(self, name).kind, other)
             catalogue.update(getattr(self, name))

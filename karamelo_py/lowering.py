@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from karamelo_py import boundary
 from karamelo_py.kernels.arrays import (
     COURANT,
     DRIFT,
@@ -26,6 +27,7 @@ from karamelo_py.kernels.step import FBar
 from karamelo_py.lattice import table
 from karamelo_py.laws import law_in, law_kind, law_table
 from karamelo_py.methods.base import NoContact
+from karamelo_py.points.boundary import ReflectingGrid
 from karamelo_py.points.kinematics import identity, planar
 from karamelo_py.points.materials import deformation, initial_state
 from karamelo_py.points.transfers import terms
@@ -48,6 +50,8 @@ class State(NamedTuple):
     laws: dict[tuple, np.ndarray]  # (N, s) state for each kind of law
     moment: np.ndarray | None  # (N, t) what the transfer keeps
     deformation: np.ndarray | None  # (N, t) F, where it has an array of its own
+    present: np.ndarray  # (N,) bool, False for points that were deleted
+    bounces: np.ndarray | None  # (N, d) reflections, where they are counted
 
 
 def check_scene(hub: Hub) -> None:
@@ -66,6 +70,7 @@ def check_scene(hub: Hub) -> None:
             hint="put solid(ID, region, regionID, points per cell, material, h, T0) before run",
         )
     hub.update.method.check(hub)
+    boundary.check(hub)
 
 
 def thread_count(hub: Hub, points: int) -> int:
@@ -109,7 +114,9 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         growth=isinstance(method.averaging(hub), FBar),
         series=terms(transfer) > 1,
         normal=not isinstance(contact, NoContact),
+        bounces=hub.update.boundary == "reflect",
     )
+    grids = table(lattices, real)
     setup = Setup(
         frame=method.frame,
         kin=kin,
@@ -117,14 +124,15 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         transfer=transfer,
         averaging=method.averaging(hub),
         contact=contact,
-        grids=table(lattices, real),
+        grids=ReflectingGrid(*grids) if needs.bounces else grids,
         nodes=lower_nodes(sum(lattice.node_count for lattice in lattices), kin, needs, real),
         blocks=lower_blocks(hub, kin, needs, tiles, real, previous),
         spans=tiles.empty_spans(),
         control=control,
     )
     if basis.gradient_jumps:
-        control.real[LIGHTEST] = min(float(b.points.mass.min()) for b in setup.blocks)
+        lightest = min(float(s.mass.astype(real).min()) for s in hub.solids.values())
+        control.real[LIGHTEST] = lightest
     return setup, tiles
 
 
@@ -136,6 +144,7 @@ class Needs(NamedTuple):
     growth: bool
     series: bool
     normal: bool
+    bounces: bool
 
 
 def lower_nodes(count: int, kin, needs: Needs, real: type) -> Nodes:
@@ -182,6 +191,8 @@ def lower_block(
     here = places if method.frame.moves else places[:, :d]
     x = np.stack([here, here])
     v = np.zeros((n, d), real)
+    bounces = np.zeros((n, d), real) if needs.bounces else None
+    present = np.ones(n, np.bool_)
     if previous is not None:
         old = ids < previous.count
         kept = previous.x.shape[1]
@@ -193,6 +204,9 @@ def lower_block(
             moment[old] = previous.moment[ids[old]]
         if f is not None and previous.deformation is not None:
             f[old] = previous.deformation[ids[old]]
+        if bounces is not None and previous.bounces is not None:
+            bounces[old] = previous.bounces[ids[old]]
+        present[old] = previous.present[ids[old]]
     points = Points(
         v=v,
         mass=np.concatenate([s.mass for s in solids]).astype(real),
@@ -205,8 +219,9 @@ def lower_block(
         force=np.zeros((n, d), real) if needs.force else None,
         growth=np.ones(n, real) if needs.growth else None,
         echo=np.zeros((n, d), real) if needs.series else None,
+        bounces=bounces,
     )
-    return Block(
+    block = Block(
         x=x,
         home=None if method.frame.moves else places,
         points=points,
@@ -216,4 +231,20 @@ def lower_block(
         grid=np.concatenate(
             [np.full(len(s.x0), method.lattice_of(hub, s), np.int32) for s in solids]
         ),
+    )
+    return block if present.all() else chosen(block, present)
+
+
+def chosen(block: Block, keep: np.ndarray) -> Block:
+    """The block with the points where `keep` (n,) is true; they are to be sorted anew."""
+    rows = {
+        name: None if field is None else field[keep]
+        for name, field in block.points._asdict().items()
+    }
+    return block._replace(
+        x=np.compress(keep, block.x, axis=1),  # contiguous: another layout would be compiled for
+        home=None if block.home is None else block.home[keep],
+        points=Points(**rows),
+        id=block.id[keep],
+        grid=block.grid[keep],
     )

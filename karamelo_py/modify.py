@@ -58,6 +58,8 @@ class Fix:
         in the directions in which it has a formula: contact does not move them.
     puts_force_on_points
         Whether it sets forces on points in ``initial_integrate``, so that they have a field for it.
+    needs_all_points
+        Whether no point may be deleted (boundary delete) while it acts.
     id
         Its ID in the script.
     """
@@ -69,6 +71,7 @@ class Fix:
     for_method = False
     holds_nodes = False
     puts_force_on_points = False
+    needs_all_points = False
     id: str = ""
     style: str = ""
     place: Place | None = None

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from karamelo_py.dumps.files import FORMATS, savefig
+from karamelo_py.figures import blank_figure, tidy
 from karamelo_py.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -67,16 +68,11 @@ class Plots:
         """Draw every curve that has points to the file; without file or points do nothing."""
         if self.file is None or not any(curve.points for curve in self):
             return
-        # Matplotlib takes a third of a second to import: only scenes with plots pay it.
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
         by_x: dict[str, list[Curve]] = {}
         for curve in self:
             if curve.points:
                 by_x.setdefault(curve.x.name, []).append(curve)
-        figure = Figure(figsize=(6.4, 3.8 * len(by_x)), dpi=150, layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = blank_figure(6.4, 3.8 * len(by_x))
         all_axes = figure.subplots(len(by_x), 1, squeeze=False)[:, 0]
         for axes, (x_name, curves) in zip(all_axes, by_x.items(), strict=True):
             for curve in curves:
@@ -85,7 +81,6 @@ class Plots:
             axes.set_xlabel(x_name)
             axes.set_ylabel(", ".join(dict.fromkeys(curve.y.name for curve in curves)))
             axes.margins(x=0.01)
-            axes.grid(True, color="0.9", linewidth=0.7)
-            axes.spines[["top", "right"]].set_visible(False)
+            tidy(axes)
             axes.legend(frameon=False)
         savefig(figure, self.hub.folder / self.file)

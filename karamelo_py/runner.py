@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
-from karamelo_py import diagnosis
+from karamelo_py import boundary, diagnosis
 from karamelo_py.kernels.step import DONE
 from karamelo_py.lowering import check_scene
 from karamelo_py.script.errors import Quit, ScriptError
@@ -55,9 +55,7 @@ class Runner:
         self._check_condition()
         if hub.rehearsing:
             return
-        if not hub.rehearsed:
-            hub.rehearsed = True
-            hub.interpreter.rehearse(hub.rehearsal())
+        hub.rehearse()
         simulation = hub.simulation
         if hub.checking:
             from karamelo_py.report import report
@@ -126,7 +124,11 @@ class Runner:
             elapsed = time.perf_counter() - begun - (self.spent["compilation"] - compiled)
             self.spent["steps"] += elapsed
             if status != DONE:
-                diagnosis.stop(hub, simulation, status, snapshot, self.place)
+                if not boundary.delete_leaving(hub, simulation, snapshot):
+                    diagnosis.stop(hub, simulation, status, snapshot, self.place)
+                snapshot, kept = simulation.snapshot(), simulation.step
+                continue
+            boundary.tell_of_bounces(hub, simulation)
             if compiled < self.spent["compilation"]:
                 # A rate that counts compilation would promise hours.
                 hub.console.end_run()
@@ -237,7 +239,7 @@ class Runner:
             "Run",
             {
                 "method": method,
-                "points": simulation.count,
+                "points": int(simulation.present.sum()),
                 "nodes": hub.fields.node_count,
                 "dt": simulation.dt,
                 "stable dt": simulation.limit,
@@ -257,6 +259,7 @@ class Runner:
                 "steps": steps,
                 "time": simulation.time,
                 "particle-steps/s": f"{rate:.3g}",
+                **boundary.counted(self.hub, simulation),
             },
             [(name, seconds) for name, seconds in stages if seconds > 0],
             title="Run interrupted" if self.interrupted else "Run finished",

@@ -45,7 +45,7 @@ from karamelo_py.kernels.step import (
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
 from karamelo_py.laws import law_kind
-from karamelo_py.lowering import State, lower, thread_count
+from karamelo_py.lowering import State, chosen, lower, thread_count
 from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
 from karamelo_py.state.hooks import lower_hooks
@@ -66,6 +66,7 @@ def scene_key(hub: Hub) -> tuple:
         update.transfer,
         type(update.transfer),
         update.anti_locking,
+        update.boundary,
         any(fix.puts_force_on_points for fix in hub.fixes.values()),
         hub.settings.precision,
         hub.settings.threads,
@@ -123,6 +124,9 @@ class Simulation:
         state = previous.state() if previous else None
         self.setup, self.tiles = lower(hub, state)
         self.count = sum(len(s.x0) for s in hub.solids.values())
+        self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
+        if state is not None:
+            self.present[: state.count] = state.present
         self.x0 = np.concatenate([s.x0 for s in hub.solids.values()])
         self.solid_of = np.concatenate(
             [np.full(len(s.x0), k, np.int32) for k, s in enumerate(hub.solids.values())]
@@ -147,7 +151,10 @@ class Simulation:
         return int(self.setup.control.whole[NOW])
 
     def by_id(self, field: Callable) -> np.ndarray:
-        """A field of all points in the order of their ids; `field` takes it from a block."""
+        """A field of all points in the order of their ids; `field` takes it from a block.
+
+        It is zero for points that were deleted.
+        """
         blocks = self.setup.blocks
         first = field(blocks[0])
         out = np.zeros((self.count, *first.shape[1:]), first.dtype)
@@ -156,8 +163,9 @@ class Simulation:
         return out
 
     def members(self, group: Any) -> np.ndarray:
-        """Ids (0-based) of a particle group."""
-        return np.arange(self.count) if group.all else group.ids
+        """Ids (0-based) of a particle group, without deleted points."""
+        ids = np.arange(self.count) if group.all else group.ids
+        return ids if self.present.all() else ids[self.present[ids]]
 
     @property
     def x(self) -> np.ndarray:
@@ -186,7 +194,11 @@ class Simulation:
         keeps = self.setup.blocks[0].points.moment is not None
         moment = self.by_id(lambda block: block.points.moment) if keeps else None
         places = self.by_id(lambda block: block.x[self.now])
-        return State(self.count, places, self.v, laws, moment, self._deformation())
+        counts = self.setup.blocks[0].points.bounces is not None
+        bounces = self.by_id(lambda block: block.points.bounces) if counts else None
+        return State(
+            self.count, places, self.v, laws, moment, self._deformation(), self.present, bounces
+        )
 
     def _deformation(self) -> np.ndarray | None:
         """F of all points, where a block has an array for it; others are left undeformed."""
@@ -218,6 +230,22 @@ class Simulation:
                 like = s.nodes.sums[0, 0]
                 impose_stress(s.kin, like, block.points, block.laws, part, flags, rows)
         self.version += 1
+
+    def remove(self, ids: np.ndarray) -> None:
+        """Take points out of the run; the ids of the others stay."""
+        self.present[ids] = False
+        blocks = tuple(chosen(block, self.present[block.id]) for block in self.setup.blocks)
+        self.setup = self.setup._replace(blocks=blocks)
+        self.setup.control.real[DRIFT] = np.inf
+        self.version += 1
+        # The rate of the last step stays: the same whether or not a run begins here.
+        self._measured = self.version
+
+    @property
+    def bounces(self) -> int:
+        """How often points were reflected at the edge of the domain."""
+        counts = [b.points.bounces for b in self.setup.blocks if b.points.bounces is not None]
+        return int(sum(float(count.sum()) for count in counts))
 
     def clear_forces(self) -> None:
         """Points bear no force of fixes, until these say so anew."""

@@ -59,6 +59,16 @@ def _add_scaled(a, factor, b):
     return spell("a, factor, b", "fma(factor, b[k], a[k])", len(a))
 
 
+def multiply_each(a, b):
+    """a b, component by component."""
+    return tuple(x * y for x, y in zip(a, b, strict=True))
+
+
+@by_type(multiply_each)
+def _multiply_each(a, b):
+    return spell("a, b", "a[k] * b[k]", len(a))
+
+
 def put_at(array, i, first, values):
     """array[i, first + k] = values[k]."""
     for k, value in enumerate(values):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from karamelo_py.schemes.musl import MUSL
 
 if TYPE_CHECKING:
+    from karamelo_py.script.errors import Place
     from karamelo_py.script.values import Values
 
 DEFAULT_DT_FACTOR = 0.9
@@ -29,6 +30,12 @@ class Update:
         The constant step of set_dt, or None: the step follows the fastest point.
     dt_factor
         Share of the stable step that is taken.
+    boundary
+        What happens to points that reach the edge of the domain: error, delete or reflect.
+    boundary_place
+        Where the script says so.
+    told_of_bounces
+        Whether the user knows that points were reflected.
     """
 
     def __init__(self, values: Values):
@@ -39,6 +46,9 @@ class Update:
         self.anti_locking = False
         self.fixed_dt: float | None = None
         self.dt_factor = DEFAULT_DT_FACTOR
+        self.boundary = "error"
+        self.boundary_place: Place | None = None
+        self.told_of_bounces = False
 
     @property
     def step(self) -> int:

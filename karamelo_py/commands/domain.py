@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from karamelo_py import registry, signature
 from karamelo_py.domain import Domain, require_domain
@@ -25,7 +25,8 @@ CREATE_DOMAIN_WITHOUT_H = Forms(
 def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     """Set the number of dimensions, the domain and the cell size of its grid.
 
-    The domain is a box that holds everything; points that leave it end the run. In 1D strain is
+    The domain is a box that holds everything; points that leave it end the
+    run, unless boundary says otherwise. In 1D strain is
     uniaxial, in 2D it is plane (unit thickness). The grid starts at the lower corner and covers
     the whole domain, whose sides need not be multiples of the cell size.
 
@@ -137,6 +138,45 @@ def axisymmetric(hub: Hub, active: bool) -> None:
             expected="axisymmetric(true) before the first solid",
         )
     domain.axisymmetric = active
+
+
+def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
+    """Say what happens to points that reach the edge of the domain.
+
+    Parameters
+    ----------
+    style
+        ``error`` (the default): the run ends, with an explanation. ``delete``: the point is taken
+        out of the run, with its mass and momentum. ``reflect``: the point is put back inside, as
+        far from the edge as it was beyond, and its velocity across the edge is turned round.
+
+    Example
+    -------
+    boundary(delete)
+
+    Notes
+    -----
+    Points at the edge, not nodes: a body that is to rest against a wall needs fix velocity_nodes
+    there. ``delete`` and ``reflect`` are for what splashes. The first point is told of in a
+    warning, and the end of a run says how many there were.
+
+    A deleted point is gone from the step in which it would have left. Dumps leave it out; the ids
+    of the others stay. Each time the program goes back to the last state that it keeps, by a
+    hundred steps at most, and takes these steps again: a run in which points leave in every step
+    takes about six times as long. Hooks in Python are called for these steps again, too.
+
+    A reflected point keeps its stress and the velocity along the edge. The velocity that turns is
+    that of the point: neighbours that still press outwards may bring it back to the edge, and a
+    body that meets the edge as a whole loses most of its motion across it.
+
+    Methods whose solids have grids of their own (tlmpm, tlcpdi) have no edge.
+
+    See Also
+    --------
+    dimension, fix velocity_nodes
+    """
+    hub.update.boundary = style
+    hub.update.boundary_place = hub.place
 
 
 def region(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:

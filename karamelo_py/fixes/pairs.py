@@ -32,6 +32,7 @@ class PairContact(Fix):
 
     published = ("x", "y", "z")
     puts_force_on_points = True
+    needs_all_points = True  # they are searched by ranges of ids
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, ParticleGroup(hub, everything=True))

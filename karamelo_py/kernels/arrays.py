@@ -33,6 +33,7 @@ class Points(NamedTuple):
     force: np.ndarray | None  # (n, d) force that fixes put on the point
     growth: np.ndarray | None  # (n,) ratio of volumes of the trial increment, for F-bar
     echo: np.ndarray | None  # (n, d) term of the series of XPIC
+    bounces: np.ndarray | None  # (n, d) how often the edge of the domain has reflected the point
 
 
 class Tiling(NamedTuple):

@@ -27,6 +27,7 @@ from karamelo_py.points.basis import (
     locate,
     mapped_again,
 )
+from karamelo_py.points.boundary import reflected
 from karamelo_py.points.frames import (
     Total,
     Updated,
@@ -449,11 +450,13 @@ def grown_by(basis, kin, grid, before, after):
 def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
     v = updated_velocity(w.transfer, vector_at(w.kin, w.points.v, p), total[0], total[1])
-    put_at(w.points.v, p, 0, v)
-    put_optional(w.points.moment, p, total[2])
     x = vector_at(w.kin, w.places.x, p)
     step = scale(dt, displacing_velocity(w.transfer, v, total[0]))
     y = add_scaled(x, real(1, dt), step)
+    y, v, moment, hits = reflected(w.grid, w.kin, y, v, total[2])
+    add_to_optional(w.points.bounces, p, real(1, dt), hits)
+    put_at(w.points.v, p, 0, v)
+    put_optional(w.points.moment, p, moment)
     put_at(w.places.y, p, 0, y)
     moved = largest_component(w.kin, step) * w.grid.inv_h
     if not follows(w.frame):

@@ -1,0 +1,103 @@
+"""The edge of a grid that reflects points (boundary reflect); other grids let them go."""
+
+from __future__ import annotations
+
+from karamelo_py.compile import by_type, define, point_function, real, shared
+from karamelo_py.points.grid import Grid, in_cells, pick
+from karamelo_py.tensors import multiply_each
+
+
+class ReflectingGrid(Grid):
+    """A grid that puts points back which have come beyond its edge."""
+
+    __slots__ = ()
+
+
+@point_function()
+def reflected(grid, kin, y, v, moment):
+    """Place, velocity and its moment after the edge, and 1 for each direction it was met in."""
+
+
+@reflected.otherwise
+def _(grid, kin, y, v, moment):
+    return y, v, moment, ()
+
+
+@reflected.on(ReflectingGrid)
+def _(grid, kin, y, v, moment):
+    signs = turns(grid, y, v)
+    return mirrored(grid, y), multiply_each(signs, v), rows_times(signs, moment), hits(grid, y)
+
+
+@shared
+def beyond(grid, direction, y):
+    """-1 below the lower edge, 1 above the upper one, else 0."""
+    a = in_cells(grid, direction, y)
+    end = pick(direction, grid.lx, grid.ly, grid.lz)
+    return real(-1, y) if a < 0 else (real(1, y) if a > end else real(0, y))
+
+
+@shared
+def turn(grid, direction, y, v):
+    """-1 where a point beyond the edge goes further out, else 1."""
+    return real(-1, y) if beyond(grid, direction, y) * v > 0 else real(1, y)
+
+
+@shared
+def hit(grid, direction, y):
+    """1 beyond the edge, else 0."""
+    return abs(beyond(grid, direction, y))
+
+
+@shared
+def mirror(grid, direction, y):
+    """`y` put back as far inside the edge as it is beyond."""
+    side = beyond(grid, direction, y)
+    edge = pick(direction, grid.x0, grid.y0, grid.z0)
+    if side > 0:
+        edge += pick(direction, grid.lx, grid.ly, grid.lz) * grid.h
+    return edge + (edge - y) if abs(side) > 0 else y
+
+
+def mirrored(grid, y):
+    """`mirror` in every direction."""
+    return tuple(mirror(grid, k, y[k]) for k in range(len(y)))
+
+
+@by_type(mirrored)
+def _mirrored(grid, y):
+    items = "".join(f"mirror(grid, {k}, y[{k}]), " for k in range(len(y)))
+    return define("grid, y", f"return ({items})", mirror=mirror)
+
+
+def hits(grid, y):
+    """`hit` in every direction."""
+    return tuple(hit(grid, k, y[k]) for k in range(len(y)))
+
+
+@by_type(hits)
+def _hits(grid, y):
+    items = "".join(f"hit(grid, {k}, y[{k}]), " for k in range(len(y)))
+    return define("grid, y", f"return ({items})", hit=hit)
+
+
+def turns(grid, y, v):
+    """`turn` in every direction."""
+    return tuple(turn(grid, k, y[k], v[k]) for k in range(len(y)))
+
+
+@by_type(turns)
+def _turns(grid, y, v):
+    items = "".join(f"turn(grid, {k}, y[{k}], v[{k}]), " for k in range(len(y)))
+    return define("grid, y, v", f"return ({items})", turn=turn)
+
+
+def rows_times(signs, moment):
+    """The rows of a square tensor (or none) times the signs: its velocities turn round."""
+    return tuple(signs[n // len(signs)] * m for n, m in enumerate(moment))
+
+
+@by_type(rows_times)
+def _rows_times(signs, moment):
+    items = "".join(f"signs[{n // len(signs)}] * moment[{n}], " for n in range(len(moment)))
+    return define("signs, moment", f"return ({items})")

@@ -1,0 +1,224 @@
+"""boundary: points that reach the edge of the domain end the run, are deleted, or come back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import read_dump, read_log
+from scenes import SCHEMES, TRANSFERS, block
+from states import final_state, same_bits
+
+MASS = {1: 2 * 0.3, 2: 2 * 0.3 * 0.2, 3: 2 * 0.3 * 0.2 * 0.1}
+COUNT = {1: 6, 2: 24, 3: 48}
+# In single steps of 0.001 no point comes to stand on a node.
+V = (9.7, 3.1, -2.1)
+WATCH = (
+    "dump(d, all, particle, 10, d.*.LAMMPS, x, y, z, vx, vy, vz, mass)",
+    "log_modify(custom, step, time)",
+    "set_output(1000)",
+    "set_dt(0.001)",
+)
+
+
+def thrown(d: int, how: str, *lines: str, **options) -> str:
+    """A soft block thrown at the edge x = 0.7: its points leave from step 13 to step 39."""
+    velocity = ", ".join(map(str, V[:d]))
+    fly = f"fix(v, initial_velocity_particles, all, {velocity})"
+    text = block(d, f"boundary({how})", fly, *WATCH, *lines, **{"law": "soft", **options})
+    return text.replace(f"dimension({d}, 0, 1.2", f"dimension({d}, 0, 0.7")
+
+
+def single(d: int, how: str, *lines: str, transfer: str = "FLIP") -> str:
+    """One point at 0.85 in each direction, which flies past the grid without any force."""
+    box = ", ".join(["0.8, 0.9"] * d)
+    domain = ", ".join(["0, 1.2"] * d)
+    velocity = ", ".join(map(str, V[:d]))
+    return "\n".join(
+        [
+            f"method(ulmpm, {TRANSFERS[transfer]})",
+            f"dimension({d}, {domain}, 0.1)",
+            f"boundary({how})",
+            f"region(box, block, {box})",
+            "material(rubber, linear, 2, 1, 0.3)",
+            "solid(body, region, box, 1, rubber, 0.1, 0)",
+            f"fix(v, initial_velocity_particles, all, {velocity})",
+            *WATCH,
+            *lines,
+        ]
+    )
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_error_is_the_default(run_interpreted, d):
+    said = run_interpreted(thrown(d, "error", "run(35)"), status=1).err
+    default = thrown(d, "error", "run(35)").replace("boundary(error)\n", "")
+    assert (
+        run_interpreted(default, status=1).err.replace(":12:", ":13:").splitlines()[0]
+        == (said.splitlines()[0])
+    )
+    assert "leaves the domain" in said and "boundary(delete)" in said
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_deleted_points_are_gone(run_interpreted, d):
+    """Dumps have the others under their own ids; the nodes carry the mass that is left."""
+    result = run_interpreted(
+        thrown(d, "delete", "dump(g, all, grid, 10, g.*.LAMMPS, x, mass)", "run(28)")
+    )
+    left = result.dump("d.28.LAMMPS")
+    before = result.dump("d.10.LAMMPS")
+    assert len(before.id) == COUNT[d]
+    assert 0 < len(left.id) < COUNT[d]
+    assert set(left.id) < set(before.id)
+    assert left.x.max() <= 0.7
+    assert (before.x[~np.isin(before.id, left.id)] > 0.55).all()
+    each = MASS[d] / COUNT[d]
+    assert left.mass == pytest.approx(np.full(len(left.id), each))
+    assert result.dump("g.28.LAMMPS").mass.sum() == pytest.approx(each * len(left.id), rel=1e-7)
+    assert result.err.count("warning:") == 1 and "is deleted" in result.err
+    assert f"deleted points    {COUNT[d] - len(left.id)}" in result.out
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("transfer", ["FLIP", "PIC", "APIC"])
+def test_a_reflected_point_is_a_mirror_image(run_interpreted, d, transfer):
+    """x = 1.2 - |0.85 + v t - 1.2|, and minus v across the edge, exactly; the rest as it was."""
+    last = run_interpreted(single(d, "reflect", "run(60)", transfer=transfer)).dump("d.60.LAMMPS")
+    free = [0.85 + v * 0.06 for v in V[:d]]
+    for k, name in enumerate("xyz"[:d]):
+        expected = 2.4 - free[k] if free[k] > 1.2 else free[k]
+        assert last[name] == pytest.approx([expected], abs=1e-8)
+        sign = -1 if free[k] > 1.2 else 1
+        assert last["v" + name] == pytest.approx([sign * V[k]], rel=1e-9)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_a_single_point_is_deleted_or_reflected_at_the_lower_edge(run_interpreted, d):
+    script = single(d, "reflect", "run(100)").replace("all, 9.7", "all, -9.7")
+    last = run_interpreted(script).dump("d.100.LAMMPS")
+    assert last.x == pytest.approx([0.12], abs=1e-8)
+    assert last.vx == pytest.approx([9.7], rel=1e-9)
+    said = run_interpreted(single(d, "delete", "run(100)"), status=1).err
+    assert "all points have left the domain" in said and "step 37," in said
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_a_reflected_drop(run_interpreted, d):
+    """Nothing is lost; momentum along the edge stays; no point is outside."""
+    result = run_interpreted(thrown(d, "reflect", "run(35)"))
+    last = result.dump("d.35.LAMMPS")
+    assert len(last.id) == COUNT[d]
+    assert last.mass.sum() == pytest.approx(MASS[d])
+    assert last.x.max() <= 0.7
+    for k, name in enumerate(("vx", "vy", "vz")[:d]):
+        momentum = last.mass @ last[name]
+        if k:
+            assert momentum == pytest.approx(V[k] * MASS[d], rel=1e-6)
+        else:
+            assert momentum < 0
+    assert result.err.count("warning:") == 1 and "were reflected" in result.err
+    assert "reflections" in result.out
+
+
+# What acts on points splits a step into its stages, also when it acts on no point.
+STAGES = (
+    "region(nowhere, block, 1.1, 1.15, 1.1, 1.15)",
+    "group(none, particles, region, nowhere, all)",
+    "fix(nothing, velocity_particles, none, 0, 0)",
+)
+
+
+@pytest.mark.parametrize("how", ["delete", "reflect"])
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_same_bits_in_pieces(state_interpreted, how, scheme):
+    """However a run is cut, and stage by stage, while points leave in several steps."""
+    options = {"scheme": scheme, "law": "linear"}
+    whole = state_interpreted(thrown(2, how, "run(28)", **options))
+    assert (how == "delete") == bool((whole["mass"] == 0).any())
+    cut = ("run(13)", "run(5)", "run(3)", "run(1)", "run(6)")
+    assert same_bits(whole, state_interpreted(thrown(2, how, *cut, **options)))
+    assert same_bits(whole, state_interpreted(thrown(2, how, *STAGES, "run(28)", **options)))
+    outputs = "dump(e, all, particle, 3, e.*.LAMMPS, x)"
+    assert same_bits(whole, state_interpreted(thrown(2, how, outputs, "run(28)", **options)))
+
+
+@pytest.mark.parametrize("how", ["delete", "reflect"])
+def test_the_same_bits_on_two_threads(tmp_path, monkeypatch, how):
+    monkeypatch.chdir(tmp_path)
+    script = tmp_path / "in.script"
+    # Wide enough for several tiles in each direction.
+    text = thrown(2, how, "run(28)", law="linear", size=(0.3, 0.6), ppc=3)
+    script.write_text(
+        text.replace("1.2, 0.1)", "1.2, 0.05)").replace("rubber, 0.1", "rubber, 0.05")
+    )
+    assert same_bits(final_state(script, threads=1), final_state(script, threads=2))
+
+
+def test_what_is_deleted_stays_so(run_interpreted):
+    """A further solid, for which the arrays are made anew, brings nothing back."""
+    lines = (
+        "run(25)",
+        "region(late, block, 0.1, 0.2, 0.1, 0.2)",
+        "solid(late, region, late, 2, rubber, 0.1, 0)",
+        "run(1)",
+    )
+    result = run_interpreted(thrown(2, "delete", *lines))
+    before, after = result.dump("d.25.LAMMPS"), result.dump("d.26.LAMMPS")
+    assert set(after.id) == set(before.id) | {25, 26, 27, 28}
+    assert list(after.type[-4:]) == [2] * 4
+
+
+def test_groups_and_computes_go_on_without_the_deleted(run_interpreted):
+    result = run_interpreted(
+        thrown(
+            2,
+            "delete",
+            "compute(v, average_velocity, all)",
+            "compute(far, max_position, all)",
+            "compute(Ek, kinetic_energy, all)",
+            "log_modify(custom, step, v_x, far_x, Ek)",
+            "set_output(10)",
+            "run(28)",
+        )
+    )
+    log, last = read_log(result.folder / "log.mpm"), result.dump("d.28.LAMMPS")
+    assert log.v_x[-1] == pytest.approx(last.vx.mean(), rel=1e-8)
+    assert log.far_x[-1] == pytest.approx(last.x.max(), rel=1e-8)
+    energy = 0.5 * last.mass @ (last.vx**2 + last.vy**2)
+    assert log.Ek[-1] == pytest.approx(energy, rel=1e-8)
+    assert len(read_dump(result.folder / "d.28.LAMMPS")) == 1
+
+
+def test_nan_is_no_edge(run_interpreted):
+    """A point without a place is not deleted: the run ends, as ever."""
+    lines = ("fix(g, body_force, all, sqrt(0.02-time), 0)", "run(200)")
+    assert "not a number" in run_interpreted(thrown(2, "delete", *lines), status=1).err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("method(ulmpm, FLIP, linear, 1)", "method(tlmpm, FLIP, linear, 1)", "no point can leave"),
+        (
+            "method(ulmpm, FLIP, linear, 1)",
+            "method(ulcpdi, FLIP, linear, 1, mechanical, Q4)",
+            "boundary(reflect) cannot mirror Q4 domains",
+        ),
+        ("boundary(reflect)", "boundary(bounce)", "must be one of error, delete, reflect"),
+    ],
+)
+def test_what_is_refused(run_interpreted, old, new, says):
+    script = thrown(2, "reflect", "run(10)").replace(old, new)
+    said = run_interpreted(script, status=1).err
+    assert says in said and "boundary(" in said.splitlines()[1]
+
+
+def test_contact_of_points_needs_all_of_them(run_interpreted):
+    lines = (
+        "region(two, block, 0.6, 0.7, 0.3, 0.4)",
+        "solid(two, region, two, 2, rubber, 0.1, 0)",
+        "fix(push, contact/hertz, body, two)",
+        "run(10)",
+    )
+    said = run_interpreted(thrown(2, "delete", *lines), status=1).err
+    assert "fix contact/hertz 'push' counts on all points" in said
