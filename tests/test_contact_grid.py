@@ -229,10 +229,23 @@ def test_friction_needs_fields_of_their_own(run_interpreted, method):
     assert "method(ulmpm/contacts, ...)" in run_interpreted(script, status=1).err
 
 
-def test_groups_before_solids_are_a_warning(run_interpreted):
-    script = bars(0).replace("solid(b,", "group(n, nodes, region, a, all)\nsolid(b,")
-    result = run_interpreted(script + "\nlog_modify(custom, step)\nrun(1)")
-    assert "group 'n' was made before" in result.err
+@pytest.mark.parametrize("method", ["ulmpm/contacts", "tlmpm"])
+def test_nodes_of_solids_that_come_later(run_interpreted, method):
+    """A force on a group of nodes pushes both bars, though b is made after the group."""
+    early = "region(all, block, 0, 2)\ngroup(n, nodes, region, all, all)\n"
+    script = bars(0, v=0, method=method).replace("solid(b,", early + "solid(b,")
+    lines = "\nfix(g, body_force, n, 1)\nlog_modify(custom, step, g_x, vb_x)\nset_dt(1e-3)\nrun(1)"
+    log = run_interpreted(script + lines).log
+    assert log.g_x[-1] == pytest.approx(0.8, rel=1e-12)
+    assert log.vb_x[-1] == pytest.approx(1e-3, rel=1e-12)
+
+
+def test_solids_that_bring_no_nodes_to_a_group(run_interpreted):
+    """The group waits for the solids; the run tells when none brings a node, once."""
+    early = "region(far, block, 1.9, 2)\ngroup(n, nodes, region, far, all)\nsolid(a,"
+    script = bars(0, method="tlmpm").replace("solid(a,", early)
+    err = run_interpreted(script + "\nlog_modify(custom, step)\nrun(1)\nrun(1)").err
+    assert err.count("group 'n' holds no nodes") == 1
 
 
 def test_glued_solids_share_a_field(run_interpreted):

@@ -79,15 +79,8 @@ class ULMPMContacts(Method):
         return fields(hub)[solid.index]
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
-        """Publish the contact force; say so where groups of nodes came too early."""
+        """Publish the contact force."""
         hub.values.publish_vector(force_on(solid), DIRECTIONS)
-        early = [g for g in hub.groups.values() if g.kind == "nodes" and not g.all]
-        if early and getattr(solid, "glued_to", None) is None and solid.index > 0:
-            hub.warn(
-                f"solid '{solid.id}' has nodes of its own, and group '{early[0].id}' was made "
-                "before: it has none of them",
-                hint="put group(..., nodes, ...) after the last solid",
-            )
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """Contact where the fields of two solids meet."""
