@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from karamelo_py.hub import Hub
+    from karamelo_py.solid import Solid
 
 __all__ = ["Compute", "Fix", "NodesView", "PointsView", "node_hook", "point_hook"]
 
@@ -58,6 +59,11 @@ class Fix:
         in the directions in which it has a formula: contact does not move them.
     puts_force_on_points
         Whether it sets forces on points in ``initial_integrate``, so that they have a field for it.
+    friction
+        Coefficient of friction between its two `solids`, for methods with contact on the grid; None
+        for fixes that say nothing about that.
+    solids
+        The solids it acts between, of fixes that have no group.
     id
         Its ID in the script.
     """
@@ -69,6 +75,8 @@ class Fix:
     for_method = False
     holds_nodes = False
     puts_force_on_points = False
+    friction: float | None = None
+    solids: tuple[Solid, ...] = ()
     id: str = ""
     style: str = ""
     place: Place | None = None

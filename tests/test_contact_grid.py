@@ -211,7 +211,11 @@ def test_one_thread_or_two(tmp_path, monkeypatch):
     assert same_bits(final_state(path, 1), final_state(path, 2))
 
 
+TWICE = "fix(f, contact/friction, a, b, 0.1)\nfix(g, contact/friction, {}, {}, 0.2)"
+
 MESSAGES = {
+    "pair twice": (TWICE.format("a", "b"), "that of fix 'f' (line 17) already"),
+    "pair turned around": (TWICE.format("b", "a"), "that of fix 'f' (line 17) already"),
     "named twice": ("fix(f, contact/friction, a, a, 0.1)", "'a' is named twice"),
     "negative": ("fix(f, contact/friction, a, b, -0.1)", "-0.1"),
     "unknown": ("fix(f, contact/friction, a, c, 0.1)", "unknown solid 'c'"),
@@ -221,6 +225,11 @@ MESSAGES = {
 @pytest.mark.parametrize("line, said", MESSAGES.values(), ids=MESSAGES)
 def test_messages(run_interpreted, line, said):
     assert said in run_interpreted(bars(0, line, "run(1)"), status=1).err
+
+
+def test_an_id_again_replaces_the_friction(run_interpreted):
+    lines = "fix(f, contact/friction, a, b, 0.1)", "fix(f, contact/friction, b, a, 0.2)"
+    assert not run_interpreted(bars(0, *lines, "log_modify(custom, step)", "run(1)")).err
 
 
 @pytest.mark.parametrize("method", ["ulmpm", "tlmpm"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,9 +10,11 @@ import numpy as np
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.lattice import Lattice, numbered
 from karamelo_py.methods.base import Method
+from karamelo_py.script.errors import ScriptError
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
+    from karamelo_py.modify import Fix
     from karamelo_py.solid import Solid
 
 DIRECTIONS = ("x", "y", "z")
@@ -106,13 +108,39 @@ class ULMPMContacts(Method):
         """Friction and held nodes as the fixes have them now."""
         contact.friction[:] = 0
         contact.pair[:] = -1
+        for (a, b), fix in self._rubbing(hub):
+            contact.friction[a, b] = contact.friction[b, a] = fix.friction
+            contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
+        self._hold(hub, contact.held)
+
+    def check(self, hub: Hub) -> None:
+        """Refuse two coefficients of friction for a pair of velocity fields."""
+        super().check(hub)
+        known: dict[frozenset, Fix] = {}
+        for pair, fix in self._rubbing(hub):
+            other = known.setdefault(frozenset(pair), fix)
+            if other is not fix:
+                first, second = (solid.id for solid in fix.solids)
+                line = f" (line {other.place.line})" if other.place else ""
+                error = ScriptError(
+                    f"the friction of solids '{first}' and '{second}' is that of fix "
+                    f"'{other.id}'{line} already",
+                    place=fix.place,
+                    expected="one fix contact/friction for each pair of solids (those that are "
+                    "glued together count as one)",
+                    hint=f"fix({other.id}, contact/friction, {first}, {second}, ...) replaces it",
+                )
+                error.command = f"fix {fix.style}"
+                raise error
+
+    @staticmethod
+    def _rubbing(hub: Hub) -> Iterator[tuple[tuple[int, int], Fix]]:
+        """Fixes that say how two solids rub, each with the fields of the two."""
         of = fields(hub)
         for fix in hub.fixes.values():
-            if hasattr(fix, "friction"):
-                a, b = (of[solid.index] for solid in fix.solids)
-                contact.friction[a, b] = contact.friction[b, a] = fix.friction
-                contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
-        self._hold(hub, contact.held)
+            if fix.friction is not None:
+                first, second = fix.solids
+                yield (of[first.index], of[second.index]), fix
 
     def _hold(self, hub: Hub, held: np.ndarray) -> None:
         """Note which nodes fixes hold, and where the reaction of each is published."""
