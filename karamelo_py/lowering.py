@@ -47,6 +47,7 @@ class State(NamedTuple):
     laws: dict[tuple, np.ndarray]  # (N, s) state for each kind of law
     moment: np.ndarray | None  # (N, t) what the transfer keeps
     deformation: np.ndarray | None  # (N, t) F, where it has an array of its own
+    contact: NamedTuple  # how solids touch, with what it remembers
 
 
 def check_scene(hub: Hub) -> None:
@@ -91,6 +92,8 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     basis = type(method.basis)(*(real(x) for x in method.basis))
     tiles = Tiles(lattices, basis)
     contact = method.contact_between(hub, lattices)
+    if previous is not None:
+        method.resume(contact, previous.contact)
     control = Control(hub.values.array, np.zeros(11), np.zeros(4, np.int64))
     control.real[SPACING] = min(lattice.h for lattice in lattices)
     control.real[DRIFT] = np.inf  # the points are not sorted yet

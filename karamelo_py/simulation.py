@@ -185,7 +185,8 @@ class Simulation:
         keeps = self.setup.blocks[0].points.moment is not None
         moment = self.by_id(lambda block: block.points.moment) if keeps else None
         places = self.by_id(lambda block: block.x[self.now])
-        return State(self.count, places, self.v, laws, moment, self._deformation())
+        f = self._deformation()
+        return State(self.count, places, self.v, laws, moment, f, self.setup.contact)
 
     def _deformation(self) -> np.ndarray | None:
         """F of all points, where a block has an array for it; others are left undeformed."""
@@ -370,6 +371,7 @@ class Simulation:
             arrays += [tiling.range[:used], tiling.grid[:used]]
             if block.home is not None:
                 arrays.append(block.home)
+        arrays += self.hub.update.method.remembered(s.contact, s.spans[1 : 1 + s.spans[0, 0]])
         return [(array, array.copy()) for array in arrays]
 
     def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:

@@ -323,12 +323,15 @@ def _(contact, s):
 
 
 @point_function()
-def touch_velocity(contact, s):
-    """See that the velocity that deforms the points agrees with contact, where it is not v*."""
+def touch_velocity(contact, s, steps):
+    """See that the velocity that deforms the points agrees with contact, where it is not v*.
+
+    `steps` is 1 when v* of this step is known, and 0 before: what touched in the last step counts.
+    """
 
 
 @touch_velocity.otherwise
-def _(contact, s):
+def _(contact, s, steps):
     return None
 
 

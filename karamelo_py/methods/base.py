@@ -57,6 +57,13 @@ class Method:
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
         """Before every run: bring what `contact_between` made up to date with the fixes."""
 
+    def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
+        """Views of what of `contact` the next step reads, in the ranges `spans` (k, 2) of nodes."""
+        return []
+
+    def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
+        """Take over what a step left in the contact `before` the scene was lowered anew."""
+
     def welcome(self, hub: Hub, solid: Solid) -> None:
         """A solid has been defined."""
 

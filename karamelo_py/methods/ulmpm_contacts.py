@@ -55,12 +55,13 @@ class ULMPMContacts(Method):
 
     The normal at a node is one for both solids, so that they get opposite impulses and momentum is
     kept: from the sums of m grad N of the two, that of the solid that is held, else mostly the
-    larger one. Where more than two solids meet at a node, the
-    pairs push each other one after the other, in the order in which the solids were defined. Nodes
-    that fix velocity_nodes holds are not moved by contact; what they would have taken is added to
-    the reaction that the fix publishes. Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster
-    2001, "An improved contact algorithm for the material point method and application to stress
-    propagation in granular material".
+    larger one. Where more than two solids meet at a node, every pair that approaches takes its
+    impulse from the same velocities, reduced where a solid is in several pairs, and what remains is
+    taken again, up to 16 times: the order in which solids are defined does not matter, and momentum
+    is kept. Nodes that fix velocity_nodes holds are not moved by contact; what they would have
+    taken is added to the reaction that the fix publishes. Bardenhagen, Guilkey, Roessig, Brackbill,
+    Witzel & Foster 2001, "An improved contact algorithm for the material point method and
+    application to stress propagation in granular material".
 
     See Also
     --------
@@ -86,7 +87,7 @@ class ULMPMContacts(Method):
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """Contact where the fields of two solids meet."""
-        count = len(lattices)
+        count, d = len(lattices), hub.domain.dimension
         nodes = sum(lattice.node_count for lattice in lattices)
         first: dict[int, int] = {}
         copies = []
@@ -100,8 +101,12 @@ class ULMPMContacts(Method):
             pair=np.full((count, count), -1, np.int64),
             slot=np.array([first[k] for k in range(count)], np.int64),
             copies=np.array(copies, np.int64).reshape(-1, 2),
-            touching=np.zeros(nodes, np.uint8),
-            held=np.zeros((nodes, hub.domain.dimension), np.int32),
+            # Pages that nothing is written to cost no memory.
+            touched=np.zeros((nodes, count), np.int32),
+            held=np.zeros((nodes, d), np.int32),
+            meeting=np.zeros(count, np.int64),
+            partners=np.zeros(count, np.int64),
+            change=np.zeros((count, d)),
         )
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
@@ -112,6 +117,17 @@ class ULMPMContacts(Method):
             contact.friction[a, b] = contact.friction[b, a] = fix.friction
             contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
         self._hold(hub, contact.held)
+
+    def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
+        """Which nodes touched last: usf and usavg ask for it at the start of a step."""
+        return [contact.touched[begin:end] for begin, end in spans]
+
+    def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
+        """Go on from the contact before; fields that came since are behind those."""
+        if contact.stride == before.stride:
+            fields = before.touched.shape[1]
+            touched = np.flatnonzero(before.touched.any(axis=1))
+            contact.touched[touched, :fields] = before.touched[touched]
 
     def check(self, hub: Hub) -> None:
         """Refuse two coefficients of friction for a pair of velocity fields."""
