@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from textwrap import dedent
+from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -34,6 +35,7 @@ from karamelo_py.points.basis.cpdi.quadrilateral import Q4
 from karamelo_py.points.basis.cpdi.quadrilateral import SIGNS as SQUARE
 from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
+from karamelo_py.views import PointsView
 
 LO, HI, H = (0.3, 0.5, 2.0), (1.35, 1.1, 2.6), 0.15
 FLAT = [(R4, PlaneStrain()), (Q4, PlaneStrain()), (T3, PlaneStrain())]
@@ -288,6 +290,41 @@ def test_angular_momentum_is_kept(run_interpreted):
     log = run_interpreted(block("ulcpdi, APIC, linear, R4", *lines)).log
     assert abs(log.L_z[0]) > 1e-3
     assert log.L_z[-1] == pytest.approx(log.L_z[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("variant", ["Q4", "R4"])
+def test_domains_go_with_prescribed_points(state_interpreted, variant):
+    """Points that are moved all alike take their domains with them, whatever the grid does."""
+    script = block(
+        f"ulcpdi, FLIP, linear, 1, {variant}",
+        "fix(grip, velocity_particles, all, 40*time, -20*time)", "set_dt(1e-3)", "run({})",
+    )  # fmt: skip
+    before, after = (state_interpreted(script.format(n))["x"] for n in (0, 6))
+    assert after[0, 0] - before[0, 0] == pytest.approx(40e-6 * 15, rel=1e-9)
+    if variant == "Q4":
+        before[:, 2:] -= np.tile(before[:, :2], 4)
+        after[:, 2:] -= np.tile(after[:, :2], 4)
+    assert after[:, 2:] == pytest.approx(before[:, 2:], abs=1e-13)
+
+
+@pytest.mark.parametrize("method, corners", [
+    ("ulcpdi, FLIP, linear, 1, Q4", 4), ("ulcpdi, FLIP, linear, 1, R4", 0),
+    ("tlcpdi, FLIP, linear, 1, Q4", 0),
+])  # fmt: skip
+def test_domains_go_with_points_moved_in_python(tmp_path, method, corners):
+    """Corners are moved as their point is; edges stay, and so do domains in the reference."""
+    path = tmp_path / "in.script"
+    path.write_text(block(method), encoding="utf-8")
+    simulation = final_hub(path).simulation
+    before = simulation.state().x
+    group = SimpleNamespace(all=False, ids=np.array([3, 5]))
+    view = PointsView(simulation, group, then=False)
+    view.position = view.position + [0.01, -0.02]
+    moved = simulation.state().x - before
+    assert view.moved and np.flatnonzero(moved.any(axis=1)).tolist() == [3, 5]
+    wanted = np.zeros(moved.shape[1])
+    wanted[: 2 + 2 * corners] = np.tile([0.01, -0.02], 1 + corners)
+    assert moved[[3, 5]] == pytest.approx(np.array([wanted, wanted]), abs=1e-15)
 
 
 def test_a_tangled_domain_ends_the_run(run_interpreted):

@@ -67,6 +67,7 @@ from karamelo_py.kernels.stages import (
     deformation_of,
 )
 from karamelo_py.kernels.sweep import sweep_nodes, sweep_tiles
+from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import Total, Updated, follows, thinning
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import dimension, largest_component, vector_at
@@ -250,11 +251,19 @@ def _(hooks, stage, target, s):
     node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, dt)
 
 
+@shared
+def corners_that_move(s):
+    """How many corners stand behind the position of a point, and move with it."""
+    return placed(s.basis, s.kin) if follows(s.frame) else 0
+
+
 def _point_hooks(block, s, hooks, stage, now, then):
     x = block.x[now]
     y = block.x[then]
     points, ids = block.points, block.id
-    point_hooks(stage, s.kin, points.v, points.mass, ids, hooks, s.control, step_size(s), x, y)
+    corners = corners_that_move(s)
+    dt = step_size(s)
+    point_hooks(stage, s.kin, points.v, points.mass, ids, hooks, s.control, dt, x, y, corners)
 
 
 hook_points = over_blocks(_point_hooks)
