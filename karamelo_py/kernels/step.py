@@ -204,7 +204,12 @@ def step_size(s):
 
 @kernel
 def choose_dt(control):
-    """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end."""
+    """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end.
+
+    The last two steps are shortened alike. Where velocities are mapped or prescribed, a step takes
+    impulses that do not vanish with its length: in a last step that is a small part of the others,
+    forces (impulses over dt) would be many times what they are before.
+    """
     real_, whole = control.real, control.whole
     limit = real_[SPACING] / real_[RATE] if real_[RATE] > 0 else inf
     fixed = real_[FIXED_DT]
@@ -214,6 +219,8 @@ def choose_dt(control):
     # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end.
     if 0 < remaining <= dt * (1 + 1e-9):
         dt = remaining
+    elif 0 < remaining < 2 * dt * (1 - 1e-9):
+        dt = 0.5 * remaining
     control.values[DT] = dt
 
 
