@@ -65,7 +65,13 @@ def check_scene(hub: Hub) -> None:
             "there is no solid to move",
             hint="put solid(ID, region, regionID, points per cell, material, h, T0) before run",
         )
-    hub.update.method.check(hub)
+    method = hub.update.method
+    try:
+        method.check(hub)
+    except ScriptError as error:
+        if error.place is None:
+            error.place, error.command = method.place, "method"
+        raise
 
 
 def thread_count(hub: Hub, points: int) -> int:

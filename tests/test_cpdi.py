@@ -348,6 +348,44 @@ def test_what_does_not_go_together(run_interpreted, method, message):
     assert message in result.err
 
 
+@pytest.mark.parametrize("d, typed, wanted", [
+    (2, "ulcpdi, FLIP, linear, 0.9", "method(ulcpdi, FLIP, linear, 0.9, R4)"),
+    (3, "ulcpdi, APIC, linear", "method(ulcpdi, APIC, linear, R8)"),
+    (3, "tlcpdi, XPIC, linear, 2, mechanical", "method(tlcpdi, XPIC, linear, 2, mechanical, R8)"),
+    (3, "ulcpdi, FLIP, R4, 0.5", "method(ulcpdi, FLIP, linear, 0.5, R8)"),
+    (2, "ulcpdi, PIC, Q4", "method(ulcpdi, PIC, linear, Q4)"),
+    (1, "ulcpdi, FLIP, linear, 0.9, R4", "method(ulmpm, FLIP, cpgimp, 0.9)"),
+])  # fmt: skip
+def test_hints_can_be_typed(run_interpreted, d, typed, wanted):
+    """What a message says to write instead goes with the rest of what was typed, and runs."""
+    script = "\n".join([
+        f"dimension({d}, {'0, 1, ' * d}0.25)", "method({})",
+        f"region(box, block, {', '.join(['0.25, 0.75'] * d)})", "material(m, linear, 2, 100, 0.3)",
+        "solid(body, region, box, 1, m, 0.25, 0)", "run(1)",
+    ])  # fmt: skip
+    assert wanted in run_interpreted(script.format(typed), status=1).err
+    run_interpreted(script.format(wanted[len("method(") : -1]))
+
+
+@pytest.mark.parametrize("d, shape, fit", [(2, "H8", "R4, Q4, T3"), (3, "Q4", "R8, H8, Tet4")])
+def test_shapes_for_another_dimension(run_interpreted, d, shape, fit):
+    """The word is marked where it is typed, and only what fits is offered, also for a wrong one."""
+    script = f"dimension({d}, {'0, 1, ' * d}0.25)\nmethod(ulcpdi, FLIP, linear, 1, {{}})\nrun(1)"
+    err = run_interpreted(script.format(shape), status=1).err
+    assert f"in.script:2:33: error: method: domains of the shape {shape}" in err
+    assert f"one of {fit}" in err
+    err = run_interpreted(script.format(f"{fit[:2]}, no-such"), status=1).err
+    assert f"gradient-enhanced, {fit}\n" in err
+
+
+def test_a_missing_share_of_flip(run_interpreted):
+    """The rest of what was typed stays in the example."""
+    err = run_interpreted("method(ulcpdi, FLIP, linear, 1)", status=1).err
+    assert "in 2D one of R4, Q4, T3; in 3D one of R8, H8, Tet4; at the end" in err
+    err = run_interpreted("method(ulcpdi, FLIP, linear, Q4)", status=1).err
+    assert "method(ulcpdi, FLIP, linear, alpha, Q4) with alpha" in err
+
+
 def test_one_dimension(run_interpreted):
     script = block(SHORT, "run(1)", size="0.3, 0.6").replace("(2, 0, 1.2,", "(1,")
     assert "cpgimp" in run_interpreted(script, status=1).err

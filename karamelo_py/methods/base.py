@@ -12,7 +12,7 @@ from karamelo_py.lattice import Lattice, numbered
 from karamelo_py.points.basis import blank
 from karamelo_py.points.frames import Updated
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Place, ScriptError
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -30,6 +30,8 @@ class Method:
     ----------
     basis
         The basis' tag.
+    place
+        Place of the command in the script, for messages.
     frame
         Whether weights belong to present or reference positions.
     own_grids
@@ -38,6 +40,7 @@ class Method:
         Whether every solid has a velocity field of its own on the grid of the domain.
     """
 
+    place: Place | None = None
     frame: NamedTuple = Updated()
     own_grids: ClassVar[bool] = False
     fields_per_solid: ClassVar[bool] = False

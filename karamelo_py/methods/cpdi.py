@@ -63,7 +63,7 @@ class Convected(Method):
             f"domains of the shape {basis.__name__} are for {basis.dimension} dimensions, and "
             f"this scene has {d}",
             hint=f"one of {', '.join(fit)} in its place" if fit
-            else "method(ulmpm, ..., cpgimp): in one dimension that is the same thing",
+            else "method ulmpm with the basis cpgimp: in one dimension that is the same thing",
         )  # fmt: skip
 
     def _check_solid(self, solid: Solid) -> None:
