@@ -25,6 +25,7 @@ from karamelo_py.kernels.step import FBar
 from karamelo_py.lattice import table
 from karamelo_py.laws import law_in, law_kind, law_table
 from karamelo_py.methods.base import NoContact
+from karamelo_py.modify import puts_force_on_points
 from karamelo_py.points.kinematics import identity, planar
 from karamelo_py.points.materials import deformation, initial_state
 from karamelo_py.points.transfers import terms
@@ -105,7 +106,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     control.real[DRIFT] = np.inf  # the points are not sorted yet
     needs = Needs(
         moment=transfer.keeps_moment,
-        force=any(fix.puts_force_on_points for fix in hub.fixes.values()),
+        force=puts_force_on_points(hub),
         growth=isinstance(method.averaging(hub), FBar),
         series=terms(transfer) > 1,
         normal=not isinstance(contact, NoContact),

@@ -120,6 +120,11 @@ class Fix:
         return call
 
 
+def puts_force_on_points(hub: Hub) -> bool:
+    """Whether points of the scene have a field for forces of fixes."""
+    return any(fix.puts_force_on_points for fix in hub.fixes.values())
+
+
 class Compute:
     """Base of all computes: measures its `group` of points when the log is written."""
 

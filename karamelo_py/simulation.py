@@ -45,6 +45,7 @@ from karamelo_py.kernels.step import (
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
 from karamelo_py.laws import law_kind
 from karamelo_py.lowering import State, lower, thread_count
+from karamelo_py.modify import puts_force_on_points
 from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
 from karamelo_py.state.hooks import lower_hooks
@@ -65,7 +66,7 @@ def scene_key(hub: Hub) -> tuple:
         update.transfer,
         type(update.transfer),
         update.anti_locking,
-        any(fix.puts_force_on_points for fix in hub.fixes.values()),
+        puts_force_on_points(hub),
         hub.settings.precision,
         hub.settings.threads,
     )

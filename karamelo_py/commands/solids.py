@@ -44,7 +44,7 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
     --------
     region, material, dimension, group
     """
-    if getattr(hub.update, "method", None) is None:
+    if hub.update.method is None:
         raise ScriptError(
             "there is no method yet",
             expected="method(...) before the first solid, such as method(ulmpm, FLIP, linear, 1)",

@@ -29,7 +29,7 @@ def fields(hub: Hub) -> list[int]:
     """The velocity field of each solid; a solid that is glued to another has the same."""
     found: dict[str, int] = {}
     for solid in hub.solids.values():
-        other = getattr(solid, "glued_to", None)
+        other = solid.glued_to
         found[solid.id] = max(found.values(), default=-1) + 1 if other is None else found[other.id]
     return list(found.values())
 
