@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
+from karamelo_py.group import NOTHING_THERE, NodeGroup
 from karamelo_py.kernels.step import ABOVE_LIMIT
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.script.errors import Place, ScriptError
@@ -32,6 +33,14 @@ def warn_about_precision(hub: Hub, simulation: Simulation) -> None:
             f"a spacing of {spacing:.2g}: motion will be lost to rounding",
             hint="precision(double), or a domain around the origin",
         )
+
+
+def warn_about_groups(hub: Hub) -> None:
+    """Say so, once, where the solids have brought no nodes to a group that waited for them."""
+    for group in hub.groups.values():
+        if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
+            group.awaits_solids = False
+            hub.warn(f"group '{group.id}' holds no nodes; {NOTHING_THERE}", place=group.place)
 
 
 def warn_about_step(hub: Hub, simulation: Simulation) -> None:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from karamelo_py.lattice import CHUNK, RELATIVE_TOLERANCE, Lattice, boxes
+from karamelo_py.lattice import CHUNK, RELATIVE_TOLERANCE, Lattice
 from karamelo_py.script.errors import ScriptError
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
-__all__ = ["CHUNK", "Domain", "boxes", "require_domain", "require_grid"]
+__all__ = ["CHUNK", "Domain", "require_domain", "require_grid"]
 
 
 class Domain:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -225,36 +226,31 @@ class Fields:
         return self._cached("exported", _exported_state)
 
 
-def _exported_state(simulation: Any) -> np.ndarray:
-    s = simulation.setup
-    out = np.zeros((simulation.count, EXPORTED))
-    # A kinematics fills its own components: in the plane the fourth is 12, as in space.
-    for block in s.blocks:
-        rows = np.zeros((len(block.id), EXPORTED))
-        export_state(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
-        out[block.id] = rows
-    return out
+def _told_by(
+    kernel: Callable, *columns: int, wanted: Callable = lambda law: True
+) -> Callable[[Any], np.ndarray]:
+    """A function of a simulation: what `kernel` says of its points, by id, (N, *columns).
+
+    Points are left at 0 where the class of their law is not `wanted`.
+    """
+
+    def collect(simulation: Any) -> np.ndarray:
+        s = simulation.setup
+        out = np.zeros((simulation.count, *columns))
+        for block in s.blocks:
+            if wanted(type(block.laws)):
+                rows = np.zeros((len(block.id), *columns))
+                kernel(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
+                out[block.id] = rows
+        return out
+
+    return collect
 
 
-def _stored_energy(simulation: Any) -> np.ndarray:
-    s = simulation.setup
-    out = np.zeros(simulation.count)
-    for block in s.blocks:
-        rows = np.zeros(len(block.id))
-        export_energy(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
-        out[block.id] = rows
-    return out
-
-
-def _plastic_strain(simulation: Any) -> np.ndarray:
-    s = simulation.setup
-    out = np.zeros(simulation.count)
-    for block in s.blocks:
-        if plastic_strain.defined(type(block.laws)):
-            rows = np.zeros(len(block.id))
-            export_plastic_strain(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
-            out[block.id] = rows
-    return out
+# A kinematics fills its own components: in the plane the fourth is 12, as in space.
+_exported_state = _told_by(export_state, EXPORTED)
+_stored_energy = _told_by(export_energy)
+_plastic_strain = _told_by(export_plastic_strain, wanted=plastic_strain.defined)
 
 
 def _column(field: np.ndarray, k: int) -> np.ndarray:

@@ -14,13 +14,15 @@ from karamelo_py.solid import Solid
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
+    from karamelo_py.lattice import Lattice
     from karamelo_py.signature import Argument
 
 ALL = "all"
+NOTHING_THERE = "what acts on this group does nothing there"
 
 
 class Group:
-    """What point groups and node groups share. Members are decided once, when they are added.
+    """What point groups and node groups share.
 
     Attributes
     ----------
@@ -37,7 +39,6 @@ class Group:
         self.all = everything
         if everything:
             self.id = ALL
-        self._members = np.empty(0, dtype=np.int64)
 
     def __len__(self) -> int:
         return len(self.members)
@@ -47,21 +48,26 @@ class Group:
         """Numbers (from 0) of the members, ascending: (n,) int64."""
         if self.all:
             return np.arange(self.total(), dtype=np.int64)
-        return self._members
+        return self.chosen()
 
     def total(self) -> int:
         """Number of points or nodes that there are."""
         raise NotImplementedError
 
-    def find(self, region: Region, solids: Sequence[Solid]) -> np.ndarray:
-        """Numbers, ascending, of what lies in `region` and belongs to `solids`: (n,) int64."""
+    def chosen(self) -> np.ndarray:
+        """Members of a group that is not the group of everything."""
         raise NotImplementedError
 
-    def add(self, region: Region, solids: Sequence[Solid]) -> int:
-        """Add what lies in `region`; returns how many were found."""
-        found = np.empty(0, np.int64) if region.unknown else self.find(region, solids)
-        self._members = np.union1d(self._members, found) if len(self._members) else found
-        return len(found)
+    def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
+        """Numbers, ascending, of what lies in `region` and belongs to `solids`: (n,) int64.
+
+        Without `solids`, to any. Of a region that is not known yet nothing is found.
+        """
+        raise NotImplementedError
+
+    def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
+        """Add what lies in `region`, see `find`; returns how many were found."""
+        raise NotImplementedError
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Group:
@@ -79,9 +85,10 @@ class Group:
 
 
 class ParticleGroup(Group):
-    """A set of points, by their reference positions."""
+    """A set of points, by their reference positions. Members are decided when they are added."""
 
     kind = "particles"
+    _members = np.empty(0, dtype=np.int64)
 
     @property
     def ids(self) -> np.ndarray:
@@ -92,9 +99,23 @@ class ParticleGroup(Group):
         """Number of points of all solids."""
         return sum(solid.count for solid in self.hub.solids.values())
 
-    def find(self, region: Region, solids: Sequence[Solid]) -> np.ndarray:
+    def chosen(self) -> np.ndarray:
+        """See `Group.chosen`."""
+        return self._members
+
+    def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
+        """See `Group.add`."""
+        found = self.find(region, solids)
+        self._members = np.union1d(self._members, found)
+        return len(found)
+
+    def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
         """Points of `solids` whose reference position lies in `region`."""
         found = [np.empty(0, dtype=np.int64)]
+        if region.unknown:
+            return found[0]
+        if solids is None:
+            solids = tuple(self.hub.solids.values())
         for solid in sorted(set(solids), key=lambda solid: solid.first_id):
             for start in range(0, solid.count, CHUNK):
                 inside = region.inside(solid.x0[start : start + CHUNK])
@@ -103,9 +124,24 @@ class ParticleGroup(Group):
 
 
 class NodeGroup(Group):
-    """A set of nodes, by their positions. Methods decide whether solids share them."""
+    """A set of nodes, by their positions. Methods decide whether solids share them.
+
+    The group is what was said of it, not a list of numbers: solids and methods that come later may
+    bring grids of their own, and what lies in the region there belongs to it, too.
+
+    Attributes
+    ----------
+    awaits_solids : bool
+        Whether solids that are made later may bring the first members.
+    """
 
     kind = "nodes"
+    awaits_solids = False
+
+    def __init__(self, hub: Hub, *, everything: bool = False):
+        super().__init__(hub, everything=everything)
+        self._parts: tuple[tuple[Region, Sequence[Solid] | None], ...] = ()
+        self._found: tuple[list[Lattice], np.ndarray] | None = None
 
     @property
     def nodes(self) -> np.ndarray:
@@ -117,11 +153,29 @@ class NodeGroup(Group):
         require_grid(self.hub)
         return sum(lattice.node_count for lattice in self.hub.lattices)
 
-    def find(self, region: Region, solids: Sequence[Solid]) -> np.ndarray:
+    def chosen(self) -> np.ndarray:
+        """See `Group.chosen`; looked for again where there are other grids than before."""
+        lattices = self.hub.lattices
+        if self._found is None or self._found[0] is not lattices:
+            members = np.empty(0, dtype=np.int64)
+            for part in self._parts:
+                members = np.union1d(members, self.find(*part))
+            self._found = lattices, members
+        return self._found[1]
+
+    def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
+        """See `Group.add`."""
+        self._parts = (*self._parts, (region, solids))
+        self._found = None
+        return len(self.find(region, solids))
+
+    def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
         """Nodes in `region`; where solids have nodes of their own, those of `solids`."""
+        if region.unknown:
+            return np.empty(0, dtype=np.int64)
         require_grid(self.hub)
         method, lattices = self.hub.update.method, self.hub.lattices
-        if method is not None and len(lattices) > 1:
+        if solids is not None and len(lattices) > 1:
             wanted = {method.lattice_of(self.hub, solid) for solid in solids}
             lattices = [lattices[k] for k in sorted(wanted)]
         found = [np.empty(0, dtype=np.int64)]

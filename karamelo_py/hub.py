@@ -110,6 +110,7 @@ class Hub:
         self.output = Output(self)
         self.fields = Fields(self)
         self._simulation: Simulation | None = None
+        self._lattices: tuple[tuple, list[Lattice]] | None = None
 
     @property
     def simulation(self) -> Simulation:
@@ -122,15 +123,24 @@ class Hub:
 
     @property
     def lattices(self) -> list[Lattice]:
-        """The grids of the scene: of the method, or that of the domain before there is one."""
-        if self.update.method is not None:
-            return self.update.method.lattices(self)
-        domain = self.domain
-        return [Lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
+        """The grids of the scene: of the method, or that of the domain before there is one.
+
+        The same list as long as they stay the same.
+        """
+        domain, method = self.domain, self.update.method
+        key = (domain, domain.h, method, *self.solids.values())
+        if self._lattices is None or self._lattices[0] != key:
+            if method is None:
+                lattices = [Lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
+            else:
+                lattices = method.lattices(self)
+            self._lattices = key, lattices
+        return self._lattices[1]
 
     def forget_simulation(self) -> None:
-        """The points of a solid were replaced: the arrays are made anew when next asked for."""
+        """The points of a solid were replaced: arrays and grids are made anew when asked for."""
         self._simulation = None
+        self._lattices = None
 
     def refresh_values(self) -> None:
         """Let computes and fixes measure the present state."""

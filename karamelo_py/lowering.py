@@ -27,6 +27,7 @@ from karamelo_py.kernels.step import FBar
 from karamelo_py.lattice import table
 from karamelo_py.laws import law_in, law_kind, law_table
 from karamelo_py.methods.base import NoContact
+from karamelo_py.modify import puts_force_on_points
 from karamelo_py.points.boundary import ReflectingGrid
 from karamelo_py.points.kinematics import identity, planar
 from karamelo_py.points.materials import deformation, initial_state
@@ -52,6 +53,7 @@ class State(NamedTuple):
     deformation: np.ndarray | None  # (N, t) F, where it has an array of its own
     present: np.ndarray  # (N,) bool, False for points that were deleted
     bounces: np.ndarray | None  # (N, d) reflections, where they are counted
+    contact: NamedTuple  # how solids touch, with what it remembers
 
 
 def check_scene(hub: Hub) -> None:
@@ -69,7 +71,13 @@ def check_scene(hub: Hub) -> None:
             "there is no solid to move",
             hint="put solid(ID, region, regionID, points per cell, material, h, T0) before run",
         )
-    hub.update.method.check(hub)
+    method = hub.update.method
+    try:
+        method.check(hub)
+    except ScriptError as error:
+        if error.place is None:
+            error.place, error.command = method.place, "method"
+        raise
     boundary.check(hub)
 
 
@@ -104,13 +112,15 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     basis = type(method.basis)(*(real(x) for x in method.basis))
     tiles = Tiles(lattices, basis)
     contact = method.contact_between(hub, lattices)
+    if previous is not None:
+        method.resume(contact, previous.contact)
     control = Control(hub.values.array, np.zeros(12), np.zeros(4, np.int64))
     control.real[SPACING] = min(lattice.h for lattice in lattices)
     control.real[COURANT] = stable_courant(hub)
     control.real[DRIFT] = np.inf  # the points are not sorted yet
     needs = Needs(
         moment=transfer.keeps_moment,
-        force=any(fix.puts_force_on_points for fix in hub.fixes.values()),
+        force=puts_force_on_points(hub),
         growth=isinstance(method.averaging(hub), FBar),
         series=terms(transfer) > 1,
         normal=not isinstance(contact, NoContact),

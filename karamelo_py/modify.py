@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from karamelo_py.hub import Hub
+    from karamelo_py.solid import Solid
 
 __all__ = ["Compute", "Fix", "NodesView", "PointsView", "node_hook", "point_hook"]
 
@@ -60,6 +61,11 @@ class Fix:
         Whether it sets forces on points in ``initial_integrate``, so that they have a field for it.
     needs_all_points
         Whether no point may be deleted (boundary delete) while it acts.
+    friction
+        Coefficient of friction between its two `solids`, for methods with contact on the grid; None
+        for fixes that say nothing about that.
+    solids
+        The solids it acts between, of fixes that have no group.
     id
         Its ID in the script.
     """
@@ -72,6 +78,8 @@ class Fix:
     holds_nodes = False
     puts_force_on_points = False
     needs_all_points = False
+    friction: float | None = None
+    solids: tuple[Solid, ...] = ()
     id: str = ""
     style: str = ""
     place: Place | None = None
@@ -113,6 +121,11 @@ class Fix:
                 hook(view)
 
         return call
+
+
+def puts_force_on_points(hub: Hub) -> bool:
+    """Whether points of the scene have a field for forces of fixes."""
+    return any(fix.puts_force_on_points for fix in hub.fixes.values())
 
 
 class Compute:

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.domain import RELATIVE_TOLERANCE, Domain, boxes
+from karamelo_py.domain import Domain
+from karamelo_py.lattice import Lattice, boxes
 from karamelo_py.regions.base import Region
 from karamelo_py.script.errors import ScriptError
 
@@ -48,24 +49,6 @@ class Placement(NamedTuple):
     corners: np.ndarray | None = None
 
 
-class Lattice(NamedTuple):
-    """Cells in which points are placed.
-
-    Attributes
-    ----------
-    origin : ndarray (d,)
-        Lower corner of the first cell.
-    h : float
-        Cell size.
-    cells : tuple of d int
-        Number of cells in each direction.
-    """
-
-    origin: np.ndarray
-    h: float
-    cells: tuple[int, ...]
-
-
 class CellPattern(NamedTuple):
     """The points of one cell of size 1.
 
@@ -87,14 +70,12 @@ def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattic
     Those of the grid of `domain`, or cells that begin at the lower corner of the box of the
     region (clipped to the domain) when the solid has a grid of its `own`.
     """
-    used = slice(0, domain.dimension)
+    d = domain.dimension
     if not own:
-        return Lattice(domain.lo[used], h, domain.cells[used])
+        return Lattice(d, domain.lo, domain.hi, h)
     if region.unknown:
-        return Lattice(domain.lo[used], h, (1,) * domain.dimension)
-    lo, hi = region.lo[used], region.hi[used]
-    cells = np.maximum(1, np.ceil((hi - lo) / h - RELATIVE_TOLERANCE))
-    return Lattice(lo, h, tuple(int(n) for n in cells))
+        return Lattice(d, domain.lo, domain.lo, h)
+    return Lattice(d, region.lo, region.hi, h)
 
 
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -156,8 +137,8 @@ def fill(
         hi=region.hi[used],
     )
     lo, hi = region.box_lo[used], region.box_hi[used]
-    corner = lattice.origin
-    last_cell = np.array(lattice.cells) - 1
+    corner = lattice.lo[used]
+    last_cell = np.array(lattice.cells[used]) - 1
     if region.unknown or (lo > hi).any():
         return placed
     # One cell more on either side: rounding must not lose a point that lies on a face.

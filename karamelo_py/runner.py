@@ -81,6 +81,7 @@ class Runner:
         hub = self.hub
         started = time.perf_counter()
         simulation.begin(self.end_time)
+        diagnosis.warn_about_groups(hub)
         diagnosis.warn_about_step(hub, simulation)
         diagnosis.warn_about_precision(hub, simulation)
         first_step = simulation.step

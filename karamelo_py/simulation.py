@@ -46,6 +46,7 @@ from karamelo_py.kernels.step import (
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
 from karamelo_py.laws import law_kind
 from karamelo_py.lowering import State, chosen, lower, thread_count
+from karamelo_py.modify import puts_force_on_points
 from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
 from karamelo_py.state.hooks import lower_hooks
@@ -67,7 +68,7 @@ def scene_key(hub: Hub) -> tuple:
         type(update.transfer),
         update.anti_locking,
         update.boundary,
-        any(fix.puts_force_on_points for fix in hub.fixes.values()),
+        puts_force_on_points(hub),
         hub.settings.precision,
         hub.settings.threads,
     )
@@ -196,9 +197,9 @@ class Simulation:
         places = self.by_id(lambda block: block.x[self.now])
         counts = self.setup.blocks[0].points.bounces is not None
         bounces = self.by_id(lambda block: block.points.bounces) if counts else None
-        return State(
-            self.count, places, self.v, laws, moment, self._deformation(), self.present, bounces
-        )
+        f = self._deformation()
+        contact = self.setup.contact
+        return State(self.count, places, self.v, laws, moment, f, self.present, bounces, contact)
 
     def _deformation(self) -> np.ndarray | None:
         """F of all points, where a block has an array for it; others are left undeformed."""
@@ -401,6 +402,7 @@ class Simulation:
             arrays += [tiling.range[:used], tiling.grid[:used]]
             if block.home is not None:
                 arrays.append(block.home)
+        arrays += self.hub.update.method.remembered(s.contact, s.spans[1 : 1 + s.spans[0, 0]])
         return [(array, array.copy()) for array in arrays]
 
     def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:

@@ -78,7 +78,7 @@ class Solid:
         self.material = material
         self.T0 = T0
         self.glued_to = glued_to
-        if glued_to is not None and not getattr(hub.update.method, "fields_per_solid", False):
+        if glued_to is not None and not hub.update.method.fields_per_solid:
             hub.warn(
                 "GlueToSolid has no effect: with this method all solids share one velocity field",
                 hint="leave it out",
@@ -157,7 +157,8 @@ class Solid:
 
 def own_grids(hub: Hub) -> bool:
     """Whether the method lays a grid of its own for each solid."""
-    return bool(getattr(hub.update.method, "own_grids", False))
+    method = hub.update.method
+    return method is not None and method.own_grids
 
 
 def _cell_size(hub: Hub, domain: Domain, h: float) -> float:

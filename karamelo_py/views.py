@@ -14,6 +14,7 @@ from karamelo_py.kernels.arrays import (
     POST_VELOCITIES_TO_GRID,
     TIME,
 )
+from karamelo_py.kernels.step import corners_that_move
 from karamelo_py.script.errors import nearest
 
 
@@ -161,18 +162,29 @@ class PointsView(_View):
         for block in self._simulation.setup.blocks:
             field(block)[...] = full[block.id]
 
-    def _place(self, block: Any) -> np.ndarray:
+    def _places(self, block: Any) -> np.ndarray:
         now = self._simulation.now
-        return block.x[1 - now if self._then else now][:, : self._simulation.setup.kin.dimension]
+        return block.x[1 - now if self._then else now]
+
+    def _place(self, block: Any) -> np.ndarray:
+        return self._places(block)[:, : self._simulation.setup.kin.dimension]
 
     @property
     def position(self) -> np.ndarray:
-        """(n, d) positions."""
+        """(n, d) positions; the corners of convected domains go with the points."""
         return self._gather(self._place)
 
     @position.setter
     def position(self, value: np.ndarray) -> None:
+        s = self._simulation.setup
+        before = self._simulation.by_id(self._place)
         self._scatter(self._place, value)
+        step = self._simulation.by_id(self._place) - before
+        d, corners = s.kin.dimension, corners_that_move(s)
+        for block in s.blocks:
+            if corners:
+                behind = self._places(block)[:, d : d + d * corners]
+                behind += np.tile(step[block.id], corners)
         self.moved = True
 
     @property

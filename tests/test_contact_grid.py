@@ -73,35 +73,40 @@ def test_collision(run_interpreted, scheme):
     assert energy[-1] == pytest.approx(energy[0], rel=0.05 if scheme != "usl" else 0.2)
 
 
+def three(order: str = "abc", scheme: str = "musl") -> str:
+    """Three bodies that meet at a node, defined in the given order."""
+    laws = {"a": "m", "b": "n", "c": "m"}
+    solids = "\n".join(f"solid({s}, region, {s}, 2, {laws[s]}, 0.1, 0)" for s in order)
+    return f"""
+method(ulmpm/contacts, FLIP, linear, 1)
+scheme({scheme})
+dimension(2, 0, 1, 0, 1, 0.1)
+region(a, block, 0.3, 0.5, 0.5, 0.7)
+region(b, block, 0.5, 0.7, 0.5, 0.7)
+region(c, block, 0.4, 0.6, 0.3, 0.5)
+material(m, neo-hookean, 1, 100, 0.3)
+material(n, linear, 3, 100, 0.3)
+{solids}
+group(a, particles, region, a, solid, a)
+group(b, particles, region, b, solid, b)
+group(c, particles, region, c, solid, c)
+fix(va, initial_velocity_particles, a, 0.5, -0.2)
+fix(vb, initial_velocity_particles, b, -0.5, -0.3)
+fix(vc, initial_velocity_particles, c, 0, 0.4)
+fix(ab, contact/friction, a, b, 0.3)
+fix(cb, contact/friction, c, b, no-slip)
+compute(a, average_velocity, a)
+compute(b, average_velocity, b)
+compute(c, average_velocity, c)
+log_modify(custom, step, a_x+3*b_x+c_x, a_y+3*b_y+c_y, ab_x, cb_x,
+           ContactForce_a_x, ContactForce_b_x, ContactForce_c_x, a_x, a_y, b_x, b_y, c_x, c_y)
+dt_factor(0.3)
+run(12)
+"""
+
+
 def test_three_solids_at_a_node_keep_momentum(run_interpreted):
-    script = """
-        method(ulmpm/contacts, FLIP, linear, 1)
-        dimension(2, 0, 1, 0, 1, 0.1)
-        region(a, block, 0.3, 0.5, 0.5, 0.7)
-        region(b, block, 0.5, 0.7, 0.5, 0.7)
-        region(c, block, 0.4, 0.6, 0.3, 0.5)
-        material(m, neo-hookean, 1, 100, 0.3)
-        material(n, linear, 3, 100, 0.3)
-        solid(a, region, a, 2, m, 0.1, 0)
-        solid(b, region, b, 2, n, 0.1, 0)
-        solid(c, region, c, 2, m, 0.1, 0)
-        group(a, particles, region, a, solid, a)
-        group(b, particles, region, b, solid, b)
-        group(c, particles, region, c, solid, c)
-        fix(va, initial_velocity_particles, a, 0.5, -0.2)
-        fix(vb, initial_velocity_particles, b, -0.5, -0.3)
-        fix(vc, initial_velocity_particles, c, 0, 0.4)
-        fix(ab, contact/friction, a, b, 0.3)
-        fix(cb, contact/friction, c, b, no-slip)
-        compute(a, average_velocity, a)
-        compute(b, average_velocity, b)
-        compute(c, average_velocity, c)
-        log_modify(custom, step, a_x+3*b_x+c_x, a_y+3*b_y+c_y, ab_x, cb_x,
-                   ContactForce_a_x, ContactForce_b_x, ContactForce_c_x)
-        dt_factor(0.3)
-        run(12)
-    """
-    log = run_interpreted(script).log
+    log = run_interpreted(three()).log
     px, py = list(log.values())[1:3]
     assert np.abs(px - px[0]).max() < 1e-9  # as the log is written
     assert np.abs(py - py[0]).max() < 1e-9
@@ -109,6 +114,53 @@ def test_three_solids_at_a_node_keep_momentum(run_interpreted):
     assert np.abs(total).max() < 1e-9
     assert np.abs(log.ab_x).max() > 0.01
     assert np.abs(log.cb_x).max() > 0.001
+
+
+@pytest.mark.parametrize("scheme", ["musl", "usf"])
+def test_three_solids_in_any_order(run_interpreted, scheme):
+    """Pairs that meet at a node take their impulses at once: the first of them has no advantage."""
+    log = run_interpreted(three("abc", scheme)).log
+    for order in ("cab", "bca"):
+        other = run_interpreted(three(order, scheme), folder=order).log
+        for name in ("a_x", "a_y", "b_x", "b_y", "c_x", "c_y", "ab_x", "cb_x"):
+            assert other[name] == pytest.approx(log[name], rel=1e-9, abs=1e-9), name
+
+
+def test_two_bodies_on_a_third(run_interpreted):
+    """At a node that three share, equal bodies that meet head on in one line come to rest."""
+    script = """
+        method(ulmpm/contacts, PIC, linear)
+        dimension(1, 0, 1, 0.1)
+        region(a, block, 0.4, 0.5)
+        region(b, block, 0.5, 0.6)
+        material(m, neo-hookean, 1, 100, 0)
+        solid(a, region, a, 1, m, 0.1, 0)
+        solid(b, region, b, 1, m, 0.1, 0)
+        solid(c, region, b, 1, m, 0.1, 0)
+        group(a, particles, region, a, solid, a)
+        group(b, particles, region, b, solid, b, c)
+        fix(va, initial_velocity_particles, a, 1)
+        fix(vb, initial_velocity_particles, b, -0.5)
+        compute(a, average_velocity, a)
+        compute(b, average_velocity, b)
+        log_modify(custom, step, a_x, b_x)
+        set_dt(1e-6)
+        run(1)
+    """
+    # Half of each mass is at the node they share, where the mean velocity is 0.
+    log = run_interpreted(script).log
+    assert log.a_x[-1] == pytest.approx(0.5, abs=1e-4)
+    assert log.b_x[-1] == pytest.approx(-0.25, abs=1e-4)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_scene_that_grows_between_runs(state_interpreted, scheme):
+    """What touched in the last step is known when the arrays are made anew: the same bits."""
+    far = "region(far, block, 1.8, 1.9)\nsolid(far, region, far, 2, m, 0.1, 0)"
+    lines = "set_dt(1e-3)", "log_modify(custom, step)"
+    whole = state_interpreted(bars(0, *lines, far, "run(12)", scheme=scheme))
+    for pieces in ((far, "run(5)", "run(7)"), ("run(5)", far, "run(7)")):
+        assert same_bits(whole, state_interpreted(bars(0, *lines, *pieces, scheme=scheme)))
 
 
 def column(*lines: str) -> str:
@@ -211,7 +263,11 @@ def test_one_thread_or_two(tmp_path, monkeypatch):
     assert same_bits(final_state(path, 1), final_state(path, 2))
 
 
+TWICE = "fix(f, contact/friction, a, b, 0.1)\nfix(g, contact/friction, {}, {}, 0.2)"
+
 MESSAGES = {
+    "pair twice": (TWICE.format("a", "b"), "that of fix 'f' (line 17) already"),
+    "pair turned around": (TWICE.format("b", "a"), "that of fix 'f' (line 17) already"),
     "named twice": ("fix(f, contact/friction, a, a, 0.1)", "'a' is named twice"),
     "negative": ("fix(f, contact/friction, a, b, -0.1)", "-0.1"),
     "unknown": ("fix(f, contact/friction, a, c, 0.1)", "unknown solid 'c'"),
@@ -223,16 +279,34 @@ def test_messages(run_interpreted, line, said):
     assert said in run_interpreted(bars(0, line, "run(1)"), status=1).err
 
 
+def test_an_id_again_replaces_the_friction(run_interpreted):
+    lines = "fix(f, contact/friction, a, b, 0.1)", "fix(f, contact/friction, b, a, 0.2)"
+    assert not run_interpreted(bars(0, *lines, "log_modify(custom, step)", "run(1)")).err
+
+
 @pytest.mark.parametrize("method", ["ulmpm", "tlmpm"])
 def test_friction_needs_fields_of_their_own(run_interpreted, method):
     script = bars(0, "fix(f, contact/friction, a, b, 0.1)", "run(1)", method=method)
     assert "method(ulmpm/contacts, ...)" in run_interpreted(script, status=1).err
 
 
-def test_groups_before_solids_are_a_warning(run_interpreted):
-    script = bars(0).replace("solid(b,", "group(n, nodes, region, a, all)\nsolid(b,")
-    result = run_interpreted(script + "\nlog_modify(custom, step)\nrun(1)")
-    assert "group 'n' was made before" in result.err
+@pytest.mark.parametrize("method", ["ulmpm/contacts", "tlmpm"])
+def test_nodes_of_solids_that_come_later(run_interpreted, method):
+    """A force on a group of nodes pushes both bars, though b is made after the group."""
+    early = "region(all, block, 0, 2)\ngroup(n, nodes, region, all, all)\n"
+    script = bars(0, v=0, method=method).replace("solid(b,", early + "solid(b,")
+    lines = "\nfix(g, body_force, n, 1)\nlog_modify(custom, step, g_x, vb_x)\nset_dt(1e-3)\nrun(1)"
+    log = run_interpreted(script + lines).log
+    assert log.g_x[-1] == pytest.approx(0.8, rel=1e-12)
+    assert log.vb_x[-1] == pytest.approx(1e-3, rel=1e-12)
+
+
+def test_solids_that_bring_no_nodes_to_a_group(run_interpreted):
+    """The group waits for the solids; the run tells when none brings a node, once."""
+    early = "region(far, block, 1.9, 2)\ngroup(n, nodes, region, far, all)\nsolid(a,"
+    script = bars(0, method="tlmpm").replace("solid(a,", early)
+    err = run_interpreted(script + "\nlog_modify(custom, step)\nrun(1)\nrun(1)").err
+    assert err.count("group 'n' holds no nodes") == 1
 
 
 def test_glued_solids_share_a_field(run_interpreted):

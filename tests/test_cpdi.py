@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from textwrap import dedent
+from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -34,6 +35,7 @@ from karamelo_py.points.basis.cpdi.quadrilateral import Q4
 from karamelo_py.points.basis.cpdi.quadrilateral import SIGNS as SQUARE
 from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
+from karamelo_py.views import PointsView
 
 LO, HI, H = (0.3, 0.5, 2.0), (1.35, 1.1, 2.6), 0.15
 FLAT = [(R4, PlaneStrain()), (Q4, PlaneStrain()), (T3, PlaneStrain())]
@@ -290,6 +292,41 @@ def test_angular_momentum_is_kept(run_interpreted):
     assert log.L_z[-1] == pytest.approx(log.L_z[0], rel=1e-9)
 
 
+@pytest.mark.parametrize("variant", ["Q4", "R4"])
+def test_domains_go_with_prescribed_points(state_interpreted, variant):
+    """Points that are moved all alike take their domains with them, whatever the grid does."""
+    script = block(
+        f"ulcpdi, FLIP, linear, 1, {variant}",
+        "fix(grip, velocity_particles, all, 40*time, -20*time)", "set_dt(1e-3)", "run({})",
+    )  # fmt: skip
+    before, after = (state_interpreted(script.format(n))["x"] for n in (0, 6))
+    assert after[0, 0] - before[0, 0] == pytest.approx(40e-6 * 15, rel=1e-9)
+    if variant == "Q4":
+        before[:, 2:] -= np.tile(before[:, :2], 4)
+        after[:, 2:] -= np.tile(after[:, :2], 4)
+    assert after[:, 2:] == pytest.approx(before[:, 2:], abs=1e-13)
+
+
+@pytest.mark.parametrize("method, corners", [
+    ("ulcpdi, FLIP, linear, 1, Q4", 4), ("ulcpdi, FLIP, linear, 1, R4", 0),
+    ("tlcpdi, FLIP, linear, 1, Q4", 0),
+])  # fmt: skip
+def test_domains_go_with_points_moved_in_python(tmp_path, method, corners):
+    """Corners are moved as their point is; edges stay, and so do domains in the reference."""
+    path = tmp_path / "in.script"
+    path.write_text(block(method), encoding="utf-8")
+    simulation = final_hub(path).simulation
+    before = simulation.state().x
+    group = SimpleNamespace(all=False, ids=np.array([3, 5]))
+    view = PointsView(simulation, group, then=False)
+    view.position = view.position + [0.01, -0.02]
+    moved = simulation.state().x - before
+    assert view.moved and np.flatnonzero(moved.any(axis=1)).tolist() == [3, 5]
+    wanted = np.zeros(moved.shape[1])
+    wanted[: 2 + 2 * corners] = np.tile([0.01, -0.02], 1 + corners)
+    assert moved[[3, 5]] == pytest.approx(np.array([wanted, wanted]), abs=1e-15)
+
+
 def test_a_tangled_domain_ends_the_run(run_interpreted):
     """The message names the point, what happened, and what to do."""
     wild = "fix(v, initial_velocity_particles, all, 3*sin(17*y0), 3*sin(13*x0))"
@@ -309,6 +346,44 @@ def test_a_tangled_domain_ends_the_run(run_interpreted):
 def test_what_does_not_go_together(run_interpreted, method, message):
     result = run_interpreted(block(method, "run(1)"), status=1)
     assert message in result.err
+
+
+@pytest.mark.parametrize("d, typed, wanted", [
+    (2, "ulcpdi, FLIP, linear, 0.9", "method(ulcpdi, FLIP, linear, 0.9, R4)"),
+    (3, "ulcpdi, APIC, linear", "method(ulcpdi, APIC, linear, R8)"),
+    (3, "tlcpdi, XPIC, linear, 2, mechanical", "method(tlcpdi, XPIC, linear, 2, mechanical, R8)"),
+    (3, "ulcpdi, FLIP, R4, 0.5", "method(ulcpdi, FLIP, linear, 0.5, R8)"),
+    (2, "ulcpdi, PIC, Q4", "method(ulcpdi, PIC, linear, Q4)"),
+    (1, "ulcpdi, FLIP, linear, 0.9, R4", "method(ulmpm, FLIP, cpgimp, 0.9)"),
+])  # fmt: skip
+def test_hints_can_be_typed(run_interpreted, d, typed, wanted):
+    """What a message says to write instead goes with the rest of what was typed, and runs."""
+    script = "\n".join([
+        f"dimension({d}, {'0, 1, ' * d}0.25)", "method({})",
+        f"region(box, block, {', '.join(['0.25, 0.75'] * d)})", "material(m, linear, 2, 100, 0.3)",
+        "solid(body, region, box, 1, m, 0.25, 0)", "run(1)",
+    ])  # fmt: skip
+    assert wanted in run_interpreted(script.format(typed), status=1).err
+    run_interpreted(script.format(wanted[len("method(") : -1]))
+
+
+@pytest.mark.parametrize("d, shape, fit", [(2, "H8", "R4, Q4, T3"), (3, "Q4", "R8, H8, Tet4")])
+def test_shapes_for_another_dimension(run_interpreted, d, shape, fit):
+    """The word is marked where it is typed, and only what fits is offered, also for a wrong one."""
+    script = f"dimension({d}, {'0, 1, ' * d}0.25)\nmethod(ulcpdi, FLIP, linear, 1, {{}})\nrun(1)"
+    err = run_interpreted(script.format(shape), status=1).err
+    assert f"in.script:2:33: error: method: domains of the shape {shape}" in err
+    assert f"one of {fit}" in err
+    err = run_interpreted(script.format(f"{fit[:2]}, no-such"), status=1).err
+    assert f"gradient-enhanced, {fit}\n" in err
+
+
+def test_a_missing_share_of_flip(run_interpreted):
+    """The rest of what was typed stays in the example."""
+    err = run_interpreted("method(ulcpdi, FLIP, linear, 1)", status=1).err
+    assert "in 2D one of R4, Q4, T3; in 3D one of R8, H8, Tet4; at the end" in err
+    err = run_interpreted("method(ulcpdi, FLIP, linear, Q4)", status=1).err
+    assert "method(ulcpdi, FLIP, linear, alpha, Q4) with alpha" in err
 
 
 def test_one_dimension(run_interpreted):

@@ -290,3 +290,27 @@ def test_whole_file_appears_at_once(tmp_path):
         assert not target.exists()
     assert target.read_bytes() == b"1"
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
+
+
+def test_the_nodes_of_several_grids(run_interpreted):
+    """One after the other, numbered through; the type says which grid, as the page of the style."""
+    script = """
+        method({})
+        dimension(1, 0, 1, 0.1)
+        region(a, block, 0.1, 0.3)
+        region(b, block, 0.6, 0.9)
+        material(m, linear, 1, 100, 0)
+        solid(a, region, a, 2, m, 0.1, 0)
+        solid(b, region, b, 2, m, 0.1, 0)
+        dump(d, all, grid, 1, d.*.txt, x, mass)
+        run(0)
+    """
+    own = run_interpreted(script.format("tlmpm, FLIP, linear, 1")).dump("d.0.txt")
+    assert own["id"].tolist() == list(range(3 + 4))
+    assert own["type"].tolist() == [1] * 3 + [2] * 4
+    assert own.x == pytest.approx([0.1, 0.2, 0.3, 0.6, 0.7, 0.8, 0.9])
+    each = run_interpreted(script.format("ulmpm/contacts, FLIP, linear, 1"), folder="c")
+    both = each.dump("d.0.txt")
+    assert both["type"].tolist() == [1] * 11 + [2] * 11
+    assert (both.x[:11] == both.x[11:]).all()
+    assert both.mass.reshape(2, 11).sum(axis=1) == pytest.approx([0.2, 0.3])

@@ -6,6 +6,11 @@ from fakes_scene import FakeArgument, FakeHub
 
 from karamelo_py.commands.solids import group
 from karamelo_py.group import AnyGroup, NodeGroup, ParticleGroup
+from karamelo_py.methods.base import Method
+from karamelo_py.methods.tlmpm import TLMPM
+from karamelo_py.methods.ulmpm_contacts import ULMPMContacts
+from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
+from karamelo_py.points.basis.linear import Linear
 from karamelo_py.regions.block import Block
 from karamelo_py.regions.cylinder import Cylinder
 from karamelo_py.regions.difference import Difference
@@ -99,6 +104,33 @@ def test_points_made_later_do_not_join():
     group(hub, "g", "particles", "region", hub.regions["r1"], "all")
     hub.solid("s3", hub.regions["r1"])
     assert len(hub.groups["g"]) == 16
+
+
+@pytest.mark.parametrize("method", [TLMPM, ULMPMContacts])
+def test_nodes_of_grids_made_later_join(method):
+    hub = FakeHub(2, 0, 1, 0.1)
+    hub.update.method = method(hub, Linear())
+    r1 = hub.region("r1", Block, 0, 0.2, 0, 0.2)
+    r2 = hub.region("r2", Block, 0.5, 0.7, 0.5, 0.7)
+    group(hub, "g", "nodes", "region", r2, "all")
+    s1 = hub.solid("s1", r1)
+    group(hub, "one", "nodes", "region", r1, "solid", s1)
+    before = hub.groups["one"].nodes
+    hub.solid("s2", r2)
+    both = np.concatenate([lattice.positions() for lattice in hub.lattices])
+    np.testing.assert_array_equal(hub.groups["g"].nodes, np.flatnonzero(r2.inside(both)))
+    np.testing.assert_array_equal(hub.groups["one"].nodes, before)
+    assert len(hub.groups["g"]) and not hub.warnings
+
+
+def test_nodes_of_the_grid_of_a_method_that_comes_later():
+    """Functions with nodes in the middle of cells number the nodes in their own way."""
+    hub = FakeHub(1, 0, 1, 0.25)
+    hub.update.method = None
+    group(hub, "g", "nodes", "region", hub.region("r", Block, 0.5, 1), "all")
+    np.testing.assert_array_equal(hub.groups["g"].nodes, [2, 3, 4])
+    hub.update.method = Method(hub, BernsteinQuadratic())
+    np.testing.assert_array_equal(hub.groups["g"].nodes, [4, 5, 6, 7, 8])
 
 
 def test_groups_by_name():

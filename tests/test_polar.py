@@ -135,3 +135,13 @@ group(g, particles, region, disk, solid, s1)
 populate_cylindrical_coordinates(s2, disk, 0, 0, 0.1, 2, 6, 0)
 """
     )
+
+
+def test_groups_of_nodes_follow_the_grid_of_the_solid(run):
+    """In tlmpm a grid begins at the box of its points; a group made before goes along."""
+    script = PLANE.replace("ulmpm", "tlmpm") + "group(low, nodes, region, left, solid, s1)\n"
+    hub = run(script + "populate_cylindrical_coordinates(s1, disk, -0.2, 0, 0.3, 6, 24, 0)")
+    grid = hub.lattices[0]
+    assert grid.lo[:2] == pytest.approx([-0.4, -0.3])  # the box of the points within the region
+    wanted = np.flatnonzero(hub.regions["left"].inside(grid.positions()))
+    np.testing.assert_array_equal(hub.groups["low"].nodes, wanted)

@@ -2,7 +2,6 @@
 
 import math
 import tracemalloc
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from karamelo_py.commands import solids as commands
-from karamelo_py.methods.base import Method
+from karamelo_py.methods.base import Method, OwnGrids
 from karamelo_py.methods.ulcpdi import ULCPDI
 from karamelo_py.placement import cell_pattern
 from karamelo_py.points.basis.cpdi.parallel import R4
+from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.regions.block import Block
 from karamelo_py.regions.cylinder import Cylinder
@@ -261,7 +261,8 @@ def test_axisymmetric_volumes_are_times_the_radius():
 
 def own_grids(hub, **attributes):
     """Let the method lay a grid for each solid, as total Lagrangian ones do."""
-    hub.update.method = SimpleNamespace(own_grids=True, **attributes)
+    hub.update.method = OwnGrids(hub, Linear())
+    hub.update.method.__dict__.update(attributes)
     return hub
 
 

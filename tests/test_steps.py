@@ -42,12 +42,46 @@ def test_set_dt(run_interpreted):
 
 @pytest.mark.parametrize("time", ["0.0471", "1e-7", "PI/50"])
 def test_run_time_ends_exactly(run_interpreted, time):
-    """The last step is shortened, for any magnitude of the time."""
+    """The last steps are shortened, for any magnitude of the time."""
     script = block(1, "set_dt(0.01)", "log_modify(custom, step, time, dt, time - (" + time + "))",
                    f"run_time({time})")  # fmt: skip
     log = run_interpreted(script).log
     rest = list(log.values())[-1]
     assert rest[-1] == 0
+
+
+def test_the_last_two_steps_are_shortened_alike(run_interpreted):
+    log = run_interpreted(block(1, "set_dt(0.01)", "set_output(1)", LOG, "run_time(0.0302)")).log
+    assert np.diff(log.Time) == pytest.approx([0.01, 0.01, 0.0051, 0.0051], rel=1e-9)
+
+
+def test_the_last_reaction_of_a_run(run_interpreted):
+    """A piston that presses a bar: its load goes on evenly to the end of the run.
+
+    Nodes at rest or driven take the momentum that points map to them, in every step the same; over
+    a last step of a fiftieth of dt that would be a force fifty times as large.
+    """
+    script = """
+        method(ulmpm, FLIP, linear, 0.9)
+        dimension(1, 0, 1.1, 0.1)
+        region(bar, block, 0, 1)
+        material(m, neo-hookean, 1, 100, 0)
+        solid(bar, region, bar, 2, m, 0.1, 0)
+        region(low, block, 0, 0)
+        region(top, block, 1, 1)
+        group(low, nodes, region, low, all)
+        group(top, nodes, region, top, all)
+        fix(hold, velocity_nodes, low, 0)
+        fix(press, velocity_nodes, top, -0.01*min(time/0.5, 1))
+        log_modify(custom, step, time, press_x, hold_x)
+        set_output(1)
+        set_dt(0.004)
+        run_time(1.20008)
+    """
+    log = run_interpreted(script).log
+    for reaction in (log.press_x, log.hold_x):
+        steps = np.abs(np.diff(reaction))
+        assert steps[-1] < 3 * steps[-30:-3].max()
 
 
 @pytest.mark.parametrize("dt", [0.1, 0.01, 1 / 3])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
 from karamelo_py import registry
 from karamelo_py.points.transfers.flip import FLIP
@@ -51,14 +51,13 @@ def method(hub: Hub, kind: str, transfer: str, basis: str, *options: Argument) -
     """
     method_class = registry.find("method", kind)
     transfer_class = registry.find("transfer", transfer)
+    call = _Call(hub, kind, method_class, transfer_class, basis, options)
+    _refuse_shape(call)
+    basis_class = registry.find("basis", basis)
+    variants = _variants(method_class, basis_class)
     words = list(options)
-    _refuse_shape(kind, transfer_class, method_class, basis, words)
-    parameters = [
-        _parameter(hub, transfer_class, name, words, f"method({kind}, {transfer}, {basis}")
-        for name in transfer_class._fields
-    ]
-    variants = _variants(method_class, registry.find("basis", basis))
-    basis_class, chosen = _basis(kind, method_class, basis, words)
+    parameters = [_parameter(call, variants, name, words) for name in transfer_class._fields]
+    basis_class, chosen = _basis(call, basis_class, variants, words)
     for argument in words:
         word = argument.word() or argument.text
         if word == "thermo-mechanical":
@@ -72,7 +71,7 @@ def method(hub: Hub, kind: str, transfer: str, basis: str, *options: Argument) -
         if word == "gradient-enhanced":
             transfer_class = _enhanced(transfer_class, argument)
         elif argument is not chosen and word not in OPTIONS:
-            known = [*(o for o in OPTIONS if o != "thermo-mechanical"), *variants]
+            known = [*(o for o in OPTIONS if o != "thermo-mechanical"), *call.fitting(variants)]
             close = nearest(word, known)
             raise ScriptError(
                 f"'{argument.text}' is not an option of method({kind}, {transfer}, {basis})",
@@ -87,7 +86,49 @@ def method(hub: Hub, kind: str, transfer: str, basis: str, *options: Argument) -
             hint=f"move it above line {next(iter(hub.solids.values())).place.line}",
         )
     hub.update.method = method_class(hub, basis_class())
+    hub.update.method.place = hub.place
     hub.update.transfer = transfer_class(*parameters)
+
+
+class _Call(NamedTuple):
+    """What was typed, for messages that say what to type instead."""
+
+    hub: Hub
+    kind: str
+    method_class: type
+    transfer_class: type
+    basis: str
+    options: tuple[Argument, ...]
+
+    @property
+    def dimension(self) -> int | None:
+        """That of the scene, where it is known already."""
+        domain = self.hub.domain
+        return domain.dimension if domain is not None else self.hub.announced_dimension
+
+    def fitting(self, variants: dict[str, type]) -> list[str]:
+        """Names of the variants for the dimension of the scene."""
+        d = self.dimension
+        return [n for n, v in variants.items() if d in (None, getattr(v, "dimension", d))]
+
+    def choice(self, variants: dict[str, type]) -> str:
+        """Which of the variants there are; those of each dimension as long as it is not known."""
+        names: dict[int | None, list[str]] = {}
+        for name in self.fitting(variants):
+            names.setdefault(getattr(variants[name], "dimension", None), []).append(name)
+        if len(names) == 1:
+            return "one of " + ", ".join(*names.values())
+        return "; ".join(f"in {d}D one of {', '.join(fit)}" for d, fit in names.items())
+
+    def instead(self, *, basis: str, option: str | None = None, kind: str | None = None) -> str:
+        """The same call with another basis, and with `option` at the end."""
+        numbers = [argument.text for argument in self.options if argument.word() is None]
+        names = self.transfer_class._fields
+        numbers += ["1"] * (len(names) - len(numbers))
+        kept = [argument.text for argument in self.options if argument.word() in OPTIONS]
+        last = [option] if option is not None else []
+        name = self.transfer_class.__name__
+        return f"method({', '.join([kind or self.kind, name, basis, *numbers, *kept, *last])})"
 
 
 def _variants(method_class: type, basis_class: type) -> dict[str, type]:
@@ -95,45 +136,57 @@ def _variants(method_class: type, basis_class: type) -> dict[str, type]:
     return getattr(method_class, "variants", None) or getattr(basis_class, "variants", {})
 
 
-def _refuse_shape(
-    kind: str, transfer_class: type, method_class: type, basis: str, words: list[Argument]
-) -> None:
+def _refuse_shape(call: _Call) -> None:
     """The shape of the domains in the place of the basis, as older scripts have it."""
-    if basis not in (getattr(method_class, "variants", None) or ()):
+    variants = getattr(call.method_class, "variants", None) or {}
+    if call.basis not in variants:
         return
-    numbers = [x.text for x in words if x.word() is None] or ["1"] * len(transfer_class._fields)
-    form = ", ".join([kind, transfer_class.__name__, "linear", *numbers, basis])
+    fit = call.fitting(variants)
+    shape = call.basis if call.basis in fit or not fit else fit[0]
     raise ScriptError(
-        f"'{basis}' is the shape of the domains, not a basis",
+        f"'{call.basis}' is the shape of the domains, not a basis",
         argument="basis",
-        expected=f"linear, and the shape at the end: method({form})",
+        expected=f"linear, and the shape at the end: {call.instead(basis='linear', option=shape)}",
     )
 
 
 def _basis(
-    kind: str, method_class: type, basis: str, words: list[Argument]
+    call: _Call, basis_class: type, variants: dict[str, type], words: list[Argument]
 ) -> tuple[type, Argument | None]:
     """The class of the basis, and the option that chose the variant."""
-    basis_class = registry.find("basis", basis)
-    variants = _variants(method_class, basis_class)
-    if getattr(method_class, "variants", None) and basis != "linear":
+    shaped = bool(getattr(call.method_class, "variants", None))
+    if shaped and call.basis != "linear":
         raise ScriptError(
-            f"method {kind} maps the corners of domains by linear functions only",
+            f"method {call.kind} maps the corners of domains by linear functions only",
             argument="basis",
             expected="linear",
         )
     if not variants:
         return basis_class, None
+    fit = call.fitting(variants)
+    if not fit:
+        raise ScriptError(
+            f"method {call.kind} has no domains for {call.dimension} dimension",
+            hint=f"{call.instead(basis='cpgimp', kind='ulmpm')}: in one dimension that is the "
+            "same thing",
+        )
     for argument in words:
-        if (word := argument.word()) in variants:
+        if (word := argument.word()) in fit:
             return variants[word], argument
+        if word in variants:
+            raise ScriptError(
+                f"domains of the shape {word} are for {variants[word].dimension} dimensions, and "
+                f"this scene has {call.dimension}",
+                place=argument.place,
+                expected="one of " + ", ".join(fit),
+            )
     default = getattr(basis_class, "default_variant", None)
-    if default is not None and not getattr(method_class, "variants", None):
+    if default is not None and not shaped:
         return variants[default], None
     raise ScriptError(
-        f"method {kind} needs the shape of the domains",
-        expected="one of " + ", ".join(variants) + f" at the end, as in method({kind}, ..., "
-        f"{next(iter(variants))})",
+        f"method {call.kind} needs the shape of the domains",
+        expected=f"{call.choice(variants)}; at the end, as in "
+        + call.instead(basis=call.basis, option=fit[0]),
     )
 
 
@@ -148,20 +201,23 @@ def _enhanced(transfer_class: type, argument: Argument) -> type:
     return TFLIP
 
 
-def _parameter(hub: Hub, transfer: type, name: str, words: list[Argument], call: str) -> Any:
+def _parameter(call: _Call, variants: dict, name: str, words: list[Argument]) -> Any:
     """The next number of a transfer: a share, or a whole number where the class says so."""
+    transfer = call.transfer_class
     whole = get_type_hints(transfer)[name] is int
     wanted = "a whole number from 1 to 20" if whole else "a number from 0 (PIC) to 1 (pure FLIP)"
     first_word = words[0].word() if words else None
     value = None
-    if words and first_word not in OPTIONS:
-        value = words[0].value(hub)
+    if words and first_word not in (*OPTIONS, *variants):
+        value = words[0].value(call.hub)
     if not isinstance(value, (int, float)):
         if words and first_word is None:
             raise ScriptError(f"{name} is {words[0].text}", place=words[0].place, expected=wanted)
+        rest = [argument.text for argument in words]
+        typed = f"method({', '.join([call.kind, transfer.__name__, call.basis, name, *rest])}"
         raise ScriptError(
             f"{transfer.__name__} needs a number {name} after the basis",
-            expected=f"{call}, {name}) with {name} {wanted}",
+            expected=f"{typed}) with {name} {wanted}",
         )
     argument = words.pop(0)
     in_range = 1 <= value <= 20 and value == int(value) if whole else 0 <= value <= 1

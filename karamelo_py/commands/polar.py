@@ -100,18 +100,7 @@ populate_cylindrical_coordinates.syntax = (
 
 
 def _refuse_chosen(hub: Hub, solid: Solid) -> None:
-    """Groups and contact know points by number, and the numbers from here on change.
-
-    So do those of nodes, where solids have grids of their own.
-    """
-    own_grids = getattr(hub.update.method, "own_grids", False)
-    for group in hub.groups.values():
-        if own_grids and group.kind == "nodes" and not group.all and len(group):
-            raise ScriptError(
-                f"group '{group.id}' was chosen from nodes of grids that would change",
-                argument="solid",
-                expected=f"group({group.id}, ...) after populate_cylindrical_coordinates",
-            )
+    """Groups of points and contact know points by number, and the numbers from here on change."""
     for fix in hub.fixes.values():
         if fix.puts_force_on_points:
             raise ScriptError(

@@ -75,7 +75,7 @@ def run(hub: Hub, steps: Annotated[int, NonNegative]) -> None:
 
 
 def run_time(hub: Hub, time: Annotated[float, NonNegative]) -> None:
-    """Run for a span of time; the last step is shortened to end there exactly.
+    """Run for a span of time; the last two steps are shortened to end there exactly.
 
     Parameters
     ----------

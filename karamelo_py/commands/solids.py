@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Literal
 
 from karamelo_py import registry, signature
 from karamelo_py.domain import require_domain
-from karamelo_py.group import ALL, KINDS
+from karamelo_py.group import ALL, KINDS, NOTHING_THERE
 from karamelo_py.regions.base import Region
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.signature import Argument
-from karamelo_py.solid import Solid, warn_of_coinciding
+from karamelo_py.solid import Solid, own_grids, warn_of_coinciding
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -44,7 +44,7 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
     --------
     region, material, dimension, group
     """
-    if getattr(hub.update, "method", None) is None:
+    if hub.update.method is None:
         raise ScriptError(
             "there is no method yet",
             expected="method(...) before the first solid, such as method(ulmpm, FLIP, linear, 1)",
@@ -71,8 +71,9 @@ def group(
 ) -> None:
     """Name a set of points or of nodes.
 
-    Who belongs to it is decided here, once, by the reference positions of the points or by the
-    positions of the nodes. The group ``all`` of everything is always there.
+    Which points belong to it is decided here, once, by their reference positions. Nodes belong to
+    it by their positions; where solids have nodes of their own, those of solids that are made
+    later do, too, unless solids are named. The group ``all`` of everything is always there.
 
     Parameters
     ----------
@@ -87,7 +88,8 @@ def group(
     of
         ``all``, or ``solid`` followed by the IDs of the solids whose points may belong.
     solids
-        IDs of solids. They share one grid: for nodes it makes no difference which are named.
+        IDs of solids. Where these share one grid, for nodes it makes no difference which are
+        named.
 
     Example
     -------
@@ -128,12 +130,15 @@ def group(
             members = copy.copy(members)
     else:
         members = hub.groups.add(ID, KINDS[kind](hub))
-    found = members.add(region, solids or tuple(hub.solids.values()))
-    if not found and not region.unknown:
+    found = members.add(region, solids or None)
+    if found or region.unknown:
+        return
+    if kind == "nodes" and not solids and own_grids(hub):
+        members.awaits_solids = True  # the run tells when none came
+    else:
         none_yet = kind == "particles" and not hub.solids
         hub.warn(
-            f"group '{ID}': region '{region.id}' holds no {kind}; "
-            "what acts on this group does nothing there",
+            f"group '{ID}': region '{region.id}' holds no {kind}; {NOTHING_THERE}",
             hint="no solid is made yet: groups of particles come after the solids"
             if none_yet
             else None,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from karamelo_py.modify import puts_force_on_points
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.signature import OutputFile, Positive
 
@@ -58,7 +59,7 @@ class Dump:
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
         """Warn of columns that are 0 because no point or node (`what`) keeps them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]
-        if what == "points" and any(fix.puts_force_on_points for fix in self.hub.fixes.values()):
+        if what == "points" and puts_force_on_points(self.hub):
             empty = [name for name in empty if name not in POINT_FORCE]
         if empty:
             self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} have no such field")

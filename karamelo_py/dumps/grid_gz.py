@@ -5,7 +5,7 @@ from karamelo_py.dumps.lammps import Gzipped
 
 
 class GridGz(Gzipped, Grid):
-    """Write the nodes of the background grid in LAMMPS text format, gzipped.
+    """Write the nodes of the background grids in LAMMPS text format, gzipped.
 
     Everything else is as in dump grid.
 

@@ -21,7 +21,7 @@ class ContactFriction(Fix):
     Parameters
     ----------
     solid1, solid2
-        IDs of the two solids. Other pairs stay frictionless.
+        IDs of the two solids. Other pairs stay frictionless; a pair has one fix.
     mu
         Coefficient of friction (Coulomb): the force along the surface is at most mu times the
         force across it. The words ``no-slip`` let the solids stick while they are pressed together.

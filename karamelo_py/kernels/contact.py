@@ -5,6 +5,11 @@ each other along their common normal is taken away by an impulse, after Bardenha
 improved contact algorithm for the material point method and application to stress propagation in
 granular material", CMES 2(4)); friction adds an impulse along the surface, at most mu times as
 large (Coulomb). What leaves one field enters the other: momentum is kept to round-off.
+
+Where more than two fields meet, all pairs take their impulses from the same velocities, so that it
+does not matter in which order the solids were defined. Each pair takes the share 1 / k of its own,
+where k is the number of pairs of the one of its two bodies that is in more of them: then no body
+gets more than would stop it, and energy does not grow. What remains is taken in the same way again.
 """
 
 from __future__ import annotations
@@ -15,11 +20,11 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compile import kernel
-from karamelo_py.kernels.arrays import DT
+from karamelo_py.kernels.arrays import DT, TIMESTEP
 from karamelo_py.kernels.step import touch, touch_velocity
 from karamelo_py.points.kinematics import dimension
 
-APART, SLIDES, STICKS = range(3)
+REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
 
 
 class SeparateFields(NamedTuple):
@@ -30,8 +35,12 @@ class SeparateFields(NamedTuple):
     pair: np.ndarray  # (F, F) slot of the published force of a pair on its first field, or -1
     slot: np.ndarray  # (F,) slot of the published force on each field
     copies: np.ndarray  # (k, 2) slots: from a field to the other solids that share it
-    touching: np.ndarray  # (N,) uint8: whether contact acted last: APART, SLIDES or STICKS
+    touched: np.ndarray  # (N, F) int32: the last step (from 1) in which a node touched that of
+    #                      another field, which comes later; minus that where the two stuck
     held: np.ndarray  # (N, d) 1 + slot of the reaction, where a fix prescribes the velocity, else 0
+    meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a place
+    partners: np.ndarray  # (F,) int64 scratch: with how many others each of them is in contact
+    change: np.ndarray  # (F, d) scratch: of the velocity of each of them
 
 
 @kernel
@@ -80,13 +89,11 @@ def _slide(contact, nodes, shares, n, m, k, per_a, per_b, push):
 
 
 @kernel
-def _take(contact, nodes, values, d, a, n, k, impulse, per_mass):
+def _take(contact, values, a, i, n, k, impulse, per_mass):
     """A node takes a component of an impulse; one that is held hands it on to what holds it."""
     held = contact.held[n, k]
     if not held:
-        change = impulse * per_mass
-        nodes.update[n, k] += change
-        nodes.update[n, d + k] += change
+        contact.change[i, k] += impulse * per_mass
     force = impulse / values[DT]
     values[contact.slot[a] + k] += force
     if held:
@@ -94,16 +101,55 @@ def _take(contact, nodes, values, d, a, n, k, impulse, per_mass):
 
 
 @kernel
-def _touch_pair(contact, d, nodes, values, a, b, n, m):
-    """The impulse between field `a` at node `n` and field `b` at node `m`, the same place."""
+def _meet(contact, nodes, n):
+    """Put the fields that have mass at the place of node `n` into `meeting`; their number.
+
+    It is 0 where a field that comes before that of `n` is among them: a place is visited once.
+    """
+    a = n // contact.stride
+    for b in range(a):
+        if nodes.sums[n - (a - b) * contact.stride, 0] > 0:
+            return 0
+    count = 0
+    for b in range(a, contact.slot.size):
+        if nodes.sums[n + (b - a) * contact.stride, 0] > 0:
+            contact.meeting[count] = b
+            count += 1
+    return count
+
+
+@kernel
+def _clear_change(contact, d, count):
+    for i in range(count):
+        for k in range(d):
+            contact.change[i, k] = 0.0
+
+
+@kernel
+def _approach(contact, d, nodes, n, m):
+    """How fast two bodies approach, times the length of their normal."""
     shares = _shares(contact, d, nodes, n, m)
-    size = 0.0
     approach = 0.0
     for k in range(d):
         normal = _outward(nodes, shares, n, m, k)
-        size += normal * normal
         approach += normal * (nodes.update[n, k] - nodes.update[m, k])
-    if not (approach > 0 and size > 0):
+    return approach
+
+
+@kernel
+def _touch_pair(contact, d, nodes, values, i, j, place, share):
+    """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
+    a, b = contact.meeting[i], contact.meeting[j]
+    n, m = place + a * contact.stride, place + b * contact.stride
+    approach = _approach(contact, d, nodes, n, m)
+    if not approach > 0:
+        return
+    shares = _shares(contact, d, nodes, n, m)
+    size = 0.0
+    for k in range(d):
+        normal = _outward(nodes, shares, n, m, k)
+        size += normal * normal
+    if not size > 0:
         return
     size = sqrt(size)
     approach /= size
@@ -115,8 +161,8 @@ def _touch_pair(contact, d, nodes, values, a, b, n, m):
         compliance += normal * normal * _yielding(contact.held, n, m, k, per_a, per_b)
     if not compliance > 0:
         return  # both are held
-    push = approach / compliance
-    state = SLIDES
+    push = share * approach / compliance
+    step = int(values[TIMESTEP]) + 1
     rub = 0.0
     friction = contact.friction[a, b]
     slip = 0.0
@@ -128,23 +174,64 @@ def _touch_pair(contact, d, nodes, values, a, b, n, m):
             compliance += slide * slide * _yielding(contact.held, n, m, k, per_a, per_b)
         slip = sqrt(slip)
         if compliance > 0:
-            stop = slip * slip * slip / compliance
+            stop = share * slip * slip * slip / compliance
             if stop <= friction * push:
-                state = STICKS
+                step = -step
             rub = min(stop, friction * push) / slip
-    contact.touching[n] = state
-    contact.touching[m] = state
+    contact.touched[n, b] = step
     for k in range(d):
         impulse = push * _outward(nodes, shares, n, m, k) / size
         if rub > 0:
             slide = _slide(contact, nodes, shares, n, m, k, per_a, per_b, push / size)
             impulse += rub * slide
-        _take(contact, nodes, values, d, a, n, k, -impulse, per_a)
-        _take(contact, nodes, values, d, b, m, k, impulse, per_b)
+        _take(contact, values, a, i, n, k, -impulse, per_a)
+        _take(contact, values, b, j, m, k, impulse, per_b)
         if contact.pair[a, b] >= 0:
             values[contact.pair[a, b] + k] -= impulse / values[DT]
         if contact.pair[b, a] >= 0:
             values[contact.pair[b, a] + k] += impulse / values[DT]
+
+
+@kernel
+def _share(contact, i, j):
+    return 1.0 / max(contact.partners[i], contact.partners[j], 1)
+
+
+@kernel
+def _count_approaching(contact, d, nodes, place, count):
+    """Note in how many pairs that approach each of the fields is; whether any is."""
+    if count == 2:
+        contact.partners[:count] = 1  # whether they approach, the pair itself looks at
+        return True
+    found = False
+    contact.partners[:count] = 0
+    for i in range(count):
+        for j in range(i + 1, count):
+            n = place + contact.meeting[i] * contact.stride
+            m = place + contact.meeting[j] * contact.stride
+            if _approach(contact, d, nodes, n, m) > 0:
+                contact.partners[i] += 1
+                contact.partners[j] += 1
+                found = True
+    return found
+
+
+@kernel
+def _touch_place(contact, d, nodes, values, place, count):
+    """Resolve contact where `count` fields meet."""
+    for _ in range(REPEATS if count > 2 else 1):
+        if not _count_approaching(contact, d, nodes, place, count):
+            return
+        _clear_change(contact, d, count)
+        for i in range(count):
+            for j in range(i + 1, count):
+                share = _share(contact, i, j)
+                _touch_pair(contact, d, nodes, values, i, j, place, share)
+        for i in range(count):
+            n = place + contact.meeting[i] * contact.stride
+            for k in range(d):
+                nodes.update[n, k] += contact.change[i, k]
+                nodes.update[n, d + k] += contact.change[i, k]
 
 
 @kernel
@@ -160,26 +247,19 @@ def _touch_nodes(contact, kin, nodes, spans, values):
                     values[contact.pair[a, b] + k] = 0.0
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
-            contact.touching[n] = APART
-    # Spans go field by field, so that pairs are met in the order of their fields.
-    for s in range(1, 1 + spans[0, 0]):
-        for n in range(spans[s, 0], spans[s, 1]):
             if not nodes.sums[n, 0] > 0:
                 continue
-            a = n // contact.stride
-            for b in range(a + 1, fields):
-                m = n + (b - a) * contact.stride
-                if nodes.sums[m, 0] > 0:
-                    _touch_pair(contact, d, nodes, values, a, b, n, m)
+            count = _meet(contact, nodes, n)
+            if count > 1:
+                _touch_place(contact, d, nodes, values, n % contact.stride, count)
     for c in range(len(contact.copies)):
         for k in range(3):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
 
 
 @kernel
-def _stay_pair(contact, d, nodes, n, m):
-    """Take the relative velocity across the surface, or all of it where the pair sticks."""
-    sticks = contact.touching[n] == STICKS and contact.touching[m] == STICKS
+def _stay_pair(contact, d, nodes, i, j, n, m, share, sticks):
+    """Take `share` of the relative velocity across the surface, or of all where the pair sticks."""
     v = nodes.velocity
     per_a = 1.0 / nodes.sums[n, 0]
     per_b = 1.0 / nodes.sums[m, 0]
@@ -190,38 +270,73 @@ def _stay_pair(contact, d, nodes, n, m):
         normal = _outward(nodes, shares, n, m, k)
         across += normal * (v[n, k] - v[m, k])
         compliance += normal * normal * _yielding(contact.held, n, m, k, per_a, per_b)
-    push = across / compliance if compliance > 0 else 0.0
+    push = share * across / compliance if compliance > 0 else 0.0
     for k in range(d):
         yielding = _yielding(contact.held, n, m, k, per_a, per_b)
         if not yielding > 0:
             continue
         impulse = push * _outward(nodes, shares, n, m, k)
         if sticks:
-            impulse = (v[n, k] - v[m, k]) / yielding
+            impulse = share * (v[n, k] - v[m, k]) / yielding
         if not contact.held[n, k]:
-            v[n, k] -= impulse * per_a
+            contact.change[i, k] -= impulse * per_a
         if not contact.held[m, k]:
-            v[m, k] += impulse * per_b
+            contact.change[j, k] += impulse * per_b
 
 
 @kernel
-def _stay_nodes(contact, kin, nodes, spans):
-    """Where contact acted, keep the velocity that deforms the points from opening or closing it.
+def _count_touched(contact, place, count, step):
+    """Note in how many pairs that touched in `step` each of the fields is; whether any is."""
+    found = False
+    contact.partners[:count] = 0
+    for i in range(count):
+        n = place + contact.meeting[i] * contact.stride
+        for j in range(i + 1, count):
+            if abs(contact.touched[n, contact.meeting[j]]) == step:
+                contact.partners[i] += 1
+                contact.partners[j] += 1
+                found = True
+    return found
+
+
+@kernel
+def _stay_place(contact, d, nodes, place, count, step):
+    if not _count_touched(contact, place, count, step):
+        return
+    for _ in range(REPEATS if count > 2 else 1):
+        _clear_change(contact, d, count)
+        for i in range(count):
+            n = place + contact.meeting[i] * contact.stride
+            for j in range(i + 1, count):
+                touched = contact.touched[n, contact.meeting[j]]
+                if abs(touched) == step:
+                    m = place + contact.meeting[j] * contact.stride
+                    share = _share(contact, i, j)
+                    _stay_pair(contact, d, nodes, i, j, n, m, share, touched < 0)
+        for i in range(count):
+            n = place + contact.meeting[i] * contact.stride
+            for k in range(d):
+                nodes.velocity[n, k] += contact.change[i, k]
+
+
+@kernel
+def _stay_nodes(contact, kin, nodes, spans, step):
+    """Where contact acted in `step`, keep the velocity that deforms from opening or closing it.
 
     Where that velocity is mapped apart from v*, the surfaces would seem to move in it although they
     are pressed together, and stress would do work on nothing: a collision of bars then quadruples
     their energy, or doubles it when only approach is taken away.
     """
+    if step == 0:
+        return  # nothing has touched yet
     d = dimension(kin)
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
-            if contact.touching[n] == APART or not nodes.sums[n, 0] > 0:
+            if not nodes.sums[n, 0] > 0:
                 continue
-            a = n // contact.stride
-            for b in range(a + 1, contact.slot.size):
-                m = n + (b - a) * contact.stride
-                if contact.touching[m] != APART and nodes.sums[m, 0] > 0:
-                    _stay_pair(contact, d, nodes, n, m)
+            count = _meet(contact, nodes, n)
+            if count > 1:
+                _stay_place(contact, d, nodes, n % contact.stride, count, step)
 
 
 @touch.on(SeparateFields)
@@ -230,5 +345,6 @@ def _(contact, s):
 
 
 @touch_velocity.on(SeparateFields)
-def _(contact, s):
-    _stay_nodes(contact, s.kin, s.nodes, s.spans)
+def _(contact, s, steps):
+    step = int(s.control.values[TIMESTEP]) + steps
+    _stay_nodes(contact, s.kin, s.nodes, s.spans, step)

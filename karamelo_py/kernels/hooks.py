@@ -230,8 +230,8 @@ def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt):
 
 
 @kernel
-def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y):
-    """Act on the chosen points; add to the published totals."""
+def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y, corners):
+    """Act on the chosen points and, as far as they move, their corners; add to the totals."""
     step_back = min(dt, control.values[TIME])
     where = hooks.scratch
     d = dimension(kin)
@@ -260,6 +260,8 @@ def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y):
                 dt,
             )
             v[p, c] = velocity
+            for corner in range(corners):
+                y[p, d + d * corner + c] += place - y[p, c]
             y[p, c] = place
             total += part
         slot = hooks.table[h, SLOT]
@@ -278,8 +280,11 @@ def clear_point_totals(stage, hooks, control):
 
 
 @kernel
-def point_hooks(stage, kin, v, mass, ids, hooks, control, dt, x, y):
-    """Call the point functions of `stage` on the members in a block."""
+def point_hooks(stage, kin, v, mass, ids, hooks, control, dt, x, y, corners):
+    """Call the point functions of `stage` on the members in a block.
+
+    Behind the d coordinates of a point, `y` has those of `corners` corners of its domain.
+    """
     dt = float(dt)
     for axis in range(6):
         for q in range(BLOCK):
@@ -295,7 +300,7 @@ def point_hooks(stage, kin, v, mass, ids, hooks, control, dt, x, y):
             hooks.chosen[count] = p
             count += 1
             if count == BLOCK:
-                _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y)
+                _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y, corners)
                 count = np.int64(0)
         if count > 0:
-            _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y)
+            _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y, corners)

@@ -68,6 +68,7 @@ from karamelo_py.kernels.stages import (
     deformation_of,
 )
 from karamelo_py.kernels.sweep import sweep_nodes, sweep_tiles
+from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import Total, Updated, follows, thinning
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import dimension, largest_component, vector_at
@@ -204,7 +205,12 @@ def step_size(s):
 
 @kernel
 def choose_dt(control):
-    """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end."""
+    """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end.
+
+    The last two steps are shortened alike. Where velocities are mapped or prescribed, a step takes
+    impulses that do not vanish with its length: in a last step that is a small part of the others,
+    forces (impulses over dt) would be many times what they are before.
+    """
     real_, whole = control.real, control.whole
     limit = real_[COURANT] * real_[SPACING] / real_[RATE] if real_[RATE] > 0 else inf
     fixed = real_[FIXED_DT]
@@ -214,6 +220,8 @@ def choose_dt(control):
     # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end.
     if 0 < remaining <= dt * (1 + 1e-9):
         dt = remaining
+    elif 0 < remaining < 2 * dt * (1 - 1e-9):
+        dt = 0.5 * remaining
     control.values[DT] = dt
 
 
@@ -251,11 +259,19 @@ def _(hooks, stage, target, s):
     node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, dt)
 
 
+@shared
+def corners_that_move(s):
+    """How many corners stand behind the position of a point, and move with it."""
+    return placed(s.basis, s.kin) if follows(s.frame) else 0
+
+
 def _point_hooks(block, s, hooks, stage, now, then):
     x = block.x[now]
     y = block.x[then]
     points, ids = block.points, block.id
-    point_hooks(stage, s.kin, points.v, points.mass, ids, hooks, s.control, step_size(s), x, y)
+    corners = corners_that_move(s)
+    dt = step_size(s)
+    point_hooks(stage, s.kin, points.v, points.mass, ids, hooks, s.control, dt, x, y, corners)
 
 
 hook_points = over_blocks(_point_hooks)
@@ -328,12 +344,15 @@ def _(contact, s):
 
 
 @point_function()
-def touch_velocity(contact, s):
-    """See that the velocity that deforms the points agrees with contact, where it is not v*."""
+def touch_velocity(contact, s, steps):
+    """See that the velocity that deforms the points agrees with contact, where it is not v*.
+
+    `steps` is 1 when v* of this step is known, and 0 before: what touched in the last step counts.
+    """
 
 
 @touch_velocity.otherwise
-def _(contact, s):
+def _(contact, s, steps):
     return None
 
 

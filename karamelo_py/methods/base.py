@@ -12,7 +12,7 @@ from karamelo_py.lattice import Lattice, numbered
 from karamelo_py.points.basis import blank
 from karamelo_py.points.frames import Updated
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Place, ScriptError
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -30,6 +30,8 @@ class Method:
     ----------
     basis
         The basis' tag.
+    place
+        Place of the command in the script, for messages.
     frame
         Whether weights belong to present or reference positions.
     own_grids
@@ -38,6 +40,7 @@ class Method:
         Whether every solid has a velocity field of its own on the grid of the domain.
     """
 
+    place: Place | None = None
     frame: NamedTuple = Updated()
     own_grids: ClassVar[bool] = False
     fields_per_solid: ClassVar[bool] = False
@@ -56,6 +59,13 @@ class Method:
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
         """Before every run: bring what `contact_between` made up to date with the fixes."""
+
+    def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
+        """Views of what of `contact` the next step reads, in the ranges `spans` (k, 2) of nodes."""
+        return []
+
+    def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
+        """Take over what a step left in the contact `before` the scene was lowered anew."""
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
         """A solid has been defined."""

@@ -63,14 +63,14 @@ class Convected(Method):
             f"domains of the shape {basis.__name__} are for {basis.dimension} dimensions, and "
             f"this scene has {d}",
             hint=f"one of {', '.join(fit)} in its place" if fit
-            else "method(ulmpm, ..., cpgimp): in one dimension that is the same thing",
+            else "method ulmpm with the basis cpgimp: in one dimension that is the same thing",
         )  # fmt: skip
 
     def _check_solid(self, solid: Solid) -> None:
         """The element of a mesh, or the box around a point, must be what the basis works on."""
         basis = type(self.basis)
         wanted = basis.__name__
-        has = getattr(solid, "shape", "box")
+        has = solid.shape
         boxes = [n for n, v in VARIANTS.items() if v.element in (None, "quad", "hexahedron")]
         if has == "box":
             if wanted in boxes:
@@ -88,6 +88,6 @@ class Convected(Method):
         raise ScriptError(
             f"points of solid '{solid.id}' have {has} around them, and {wanted} domains "
             f"cannot be made of those",
-            place=getattr(solid, "place", None),
+            place=solid.place,
             hint=hint,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,9 +10,11 @@ import numpy as np
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.lattice import Lattice, numbered
 from karamelo_py.methods.base import Method
+from karamelo_py.script.errors import ScriptError
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
+    from karamelo_py.modify import Fix
     from karamelo_py.solid import Solid
 
 DIRECTIONS = ("x", "y", "z")
@@ -27,7 +29,7 @@ def fields(hub: Hub) -> list[int]:
     """The velocity field of each solid; a solid that is glued to another has the same."""
     found: dict[str, int] = {}
     for solid in hub.solids.values():
-        other = getattr(solid, "glued_to", None)
+        other = solid.glued_to
         found[solid.id] = max(found.values(), default=-1) + 1 if other is None else found[other.id]
     return list(found.values())
 
@@ -53,12 +55,13 @@ class ULMPMContacts(Method):
 
     The normal at a node is one for both solids, so that they get opposite impulses and momentum is
     kept: from the sums of m grad N of the two, that of the solid that is held, else mostly the
-    larger one. Where more than two solids meet at a node, the
-    pairs push each other one after the other, in the order in which the solids were defined. Nodes
-    that fix velocity_nodes holds are not moved by contact; what they would have taken is added to
-    the reaction that the fix publishes. Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster
-    2001, "An improved contact algorithm for the material point method and application to stress
-    propagation in granular material".
+    larger one. Where more than two solids meet at a node, every pair that approaches takes its
+    impulse from the same velocities, reduced where a solid is in several pairs, and what remains is
+    taken again, up to 16 times: the order in which solids are defined does not matter, and momentum
+    is kept. Nodes that fix velocity_nodes holds are not moved by contact; what they would have
+    taken is added to the reaction that the fix publishes. Bardenhagen, Guilkey, Roessig, Brackbill,
+    Witzel & Foster 2001, "An improved contact algorithm for the material point method and
+    application to stress propagation in granular material".
 
     See Also
     --------
@@ -79,19 +82,12 @@ class ULMPMContacts(Method):
         return fields(hub)[solid.index]
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
-        """Publish the contact force; say so where groups of nodes came too early."""
+        """Publish the contact force."""
         hub.values.publish_vector(force_on(solid), DIRECTIONS)
-        early = [g for g in hub.groups.values() if g.kind == "nodes" and not g.all]
-        if early and getattr(solid, "glued_to", None) is None and solid.index > 0:
-            hub.warn(
-                f"solid '{solid.id}' has nodes of its own, and group '{early[0].id}' was made "
-                "before: it has none of them",
-                hint="put group(..., nodes, ...) after the last solid",
-            )
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """Contact where the fields of two solids meet."""
-        count = len(lattices)
+        count, d = len(lattices), hub.domain.dimension
         nodes = sum(lattice.node_count for lattice in lattices)
         first: dict[int, int] = {}
         copies = []
@@ -105,21 +101,62 @@ class ULMPMContacts(Method):
             pair=np.full((count, count), -1, np.int64),
             slot=np.array([first[k] for k in range(count)], np.int64),
             copies=np.array(copies, np.int64).reshape(-1, 2),
-            touching=np.zeros(nodes, np.uint8),
-            held=np.zeros((nodes, hub.domain.dimension), np.int32),
+            # Pages that nothing is written to cost no memory.
+            touched=np.zeros((nodes, count), np.int32),
+            held=np.zeros((nodes, d), np.int32),
+            meeting=np.zeros(count, np.int64),
+            partners=np.zeros(count, np.int64),
+            change=np.zeros((count, d)),
         )
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
         """Friction and held nodes as the fixes have them now."""
         contact.friction[:] = 0
         contact.pair[:] = -1
+        for (a, b), fix in self._rubbing(hub):
+            contact.friction[a, b] = contact.friction[b, a] = fix.friction
+            contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
+        self._hold(hub, contact.held)
+
+    def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
+        """Which nodes touched last: usf and usavg ask for it at the start of a step."""
+        return [contact.touched[begin:end] for begin, end in spans]
+
+    def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
+        """Go on from the contact before; fields that came since are behind those."""
+        if contact.stride == before.stride:
+            fields = before.touched.shape[1]
+            touched = np.flatnonzero(before.touched.any(axis=1))
+            contact.touched[touched, :fields] = before.touched[touched]
+
+    def check(self, hub: Hub) -> None:
+        """Refuse two coefficients of friction for a pair of velocity fields."""
+        super().check(hub)
+        known: dict[frozenset, Fix] = {}
+        for pair, fix in self._rubbing(hub):
+            other = known.setdefault(frozenset(pair), fix)
+            if other is not fix:
+                first, second = (solid.id for solid in fix.solids)
+                line = f" (line {other.place.line})" if other.place else ""
+                error = ScriptError(
+                    f"the friction of solids '{first}' and '{second}' is that of fix "
+                    f"'{other.id}'{line} already",
+                    place=fix.place,
+                    expected="one fix contact/friction for each pair of solids (those that are "
+                    "glued together count as one)",
+                    hint=f"fix({other.id}, contact/friction, {first}, {second}, ...) replaces it",
+                )
+                error.command = f"fix {fix.style}"
+                raise error
+
+    @staticmethod
+    def _rubbing(hub: Hub) -> Iterator[tuple[tuple[int, int], Fix]]:
+        """Fixes that say how two solids rub, each with the fields of the two."""
         of = fields(hub)
         for fix in hub.fixes.values():
-            if hasattr(fix, "friction"):
-                a, b = (of[solid.index] for solid in fix.solids)
-                contact.friction[a, b] = contact.friction[b, a] = fix.friction
-                contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
-        self._hold(hub, contact.held)
+            if fix.friction is not None:
+                first, second = fix.solids
+                yield (of[first.index], of[second.index]), fix
 
     def _hold(self, hub: Hub, held: np.ndarray) -> None:
         """Note which nodes fixes hold, and where the reaction of each is published."""

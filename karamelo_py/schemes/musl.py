@@ -77,7 +77,7 @@ def _(scheme, visits, mode, s, hooks, more):
         return False
     sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
-    touch_velocity(s.contact, s)
+    touch_velocity(s.contact, s, 1)
     if not more:
         return strain(s.averaging, s, mode, Gradient(), Nothing(), dt)
     sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
@@ -102,7 +102,7 @@ def _(scheme, visits, mode, s, hooks, more):
     sweep_here(s, mode, Nothing(), Momentum(), dt)
     sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
-    touch_velocity(s.contact, s)
+    touch_velocity(s.contact, s, 1)
     if not strain(s.averaging, s, mode, Gradient(), Nothing(), dt):
         return False
     at_points(hooks, FINAL_INTEGRATE, 1, s)

@@ -88,7 +88,7 @@ def _half_first(s, mode, hooks, half):
     """From the momentum on the nodes to v*, by way of half of the strain."""
     sweep_nodes(mode, SumsToVelocity(), s.kin, s.nodes, s.spans, half)
     at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_VELOCITY, s)
-    touch_velocity(s.contact, s)
+    touch_velocity(s.contact, s, 0)
     if not strain(s.averaging, s, mode, Gradient(), Force(), half):
         return False
     update_nodes(s, mode, hooks)
@@ -100,7 +100,7 @@ def _half_first(s, mode, hooks, half):
 def _remap(s, mode, hooks, half):
     sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, half)
     at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
-    touch_velocity(s.contact, s)
+    touch_velocity(s.contact, s, 1)
 
 
 @step.on(USAVG, Fused)

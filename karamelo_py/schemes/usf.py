@@ -71,7 +71,7 @@ def _stress_first(s, mode, hooks):
     dt = step_size(s)
     sweep_nodes(mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
     at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_VELOCITY, s)
-    touch_velocity(s.contact, s)
+    touch_velocity(s.contact, s, 0)
     if not strain(s.averaging, s, mode, Gradient(), Force(), dt):
         return False
     update_nodes(s, mode, hooks)

@@ -78,7 +78,7 @@ class RegionSolid(Solid):
         self.region = region
         self.ppc = ppc
         lattice = lattice_of(region, domain, self.h, own=own_grids(hub))
-        if points is None and getattr(hub.update.method, "regular_points", False):
+        if points is None and hub.update.method.regular_points:
             points = "regular"
         placement = fill(region, domain, lattice, ppc, points)
         self.put(hub, placement, may_be_empty=region.unknown)

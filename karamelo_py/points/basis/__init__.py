@@ -112,6 +112,16 @@ def _(basis, kin):
 
 
 @point_function()
+def placed(basis, kin):
+    """How many corners a place keeps by their positions, right behind the point's own."""
+
+
+@placed.otherwise
+def _(basis, kin):
+    return 0
+
+
+@point_function()
 def carriers(basis, kin):
     """How many nodes carry one corner."""
 

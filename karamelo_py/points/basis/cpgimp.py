@@ -18,7 +18,7 @@ from karamelo_py.points.basis import (
     mapped_again,
 )
 from karamelo_py.points.basis.product import along, register
-from karamelo_py.points.basis.ugimp import blank_box, box, half_sizes, in_cell
+from karamelo_py.points.basis.ugimp import blank_box, box, in_cell
 from karamelo_py.points.frames import stretched_share
 from karamelo_py.points.grid import cells_along
 from karamelo_py.points.kinematics import (
@@ -61,7 +61,7 @@ class CPGIMPDet(NamedTuple):
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
         """Half sizes of the domains of a solid's points, (n, d)."""
-        return half_sizes(solid)
+        return solid.half_size
 
 
 class CPGIMPDiagonal(NamedTuple):
@@ -131,7 +131,7 @@ class CPGIMPCorners(NamedTuple):
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
         """Half sizes of the domains of a solid's points, (n, d)."""
-        return half_sizes(solid)
+        return solid.half_size
 
 
 class CPGIMP(NamedTuple):
@@ -170,7 +170,7 @@ class CPGIMP(NamedTuple):
 
 
 def _sizes_and_deformation(solid: Solid) -> np.ndarray:
-    half = half_sizes(solid)
+    half = solid.half_size
     n, d = half.shape
     return np.concatenate([half, half, np.tile(np.eye(d).ravel(), (n, 1))], axis=1)
 

@@ -38,13 +38,7 @@ class UGIMP(NamedTuple):
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
         """Half sizes of the domains of a solid's points, (n, d)."""
-        return half_sizes(solid)
-
-
-def half_sizes(solid: Solid) -> np.ndarray:
-    """Half the size of the box that each point of a solid stands for, (n, d)."""
-    half = getattr(solid, "half_size", None)
-    return np.full(solid.x0.shape, solid.h / (2 * solid.ppc)) if half is None else half
+        return solid.half_size
 
 
 def blank_box(basis: type) -> None:

@@ -17,6 +17,7 @@ from karamelo_py.points.basis import (
     entry,
     extent,
     locate,
+    placed,
     reach,
     support,
 )
@@ -398,6 +399,10 @@ def register_carried(basis: type, d: int, corners: int) -> None:
     register(basis, d, corners)
 
     @carried.on(basis)
+    def _(basis, kin):
+        return corners
+
+    @placed.on(basis)
     def _(basis, kin):
         return corners
 

@@ -1,7 +1,7 @@
 """The domains of points before the first step, from what a solid says of its points.
 
-A solid has `half_size`, of the box around each point (a number, (d,) or (n, d)), or `corners`
-(n, c, d), of the element of a mesh around each point.
+A solid has `half_size` (n, d), of the box around each point, and, where it comes from a mesh,
+`corners` (n, c, d), of the element around each point.
 """
 
 from __future__ import annotations
@@ -11,17 +11,9 @@ from typing import Any
 import numpy as np
 
 
-def half_sizes(solid: Any) -> np.ndarray:
-    """Half sizes (n, d) of the boxes around the points of a solid."""
-    half = getattr(solid, "half_size", None)
-    if half is None:
-        half = solid.h / (2 * solid.ppc)
-    return np.array(np.broadcast_to(half, solid.x0.shape), float)
-
-
 def half_edges(solid: Any) -> np.ndarray:
     """Half edges along the axes, one after another (n, d * d)."""
-    half = half_sizes(solid)
+    half = solid.half_size
     d = half.shape[1]
     return (half[:, :, None] * np.eye(d)).reshape(-1, d * d)
 
@@ -31,9 +23,9 @@ def element_corners(solid: Any, signs: np.ndarray | None = None) -> np.ndarray:
 
     `signs` (c, d) are the corners of the box of side 2 around 0.
     """
-    corners = getattr(solid, "corners", None)
+    corners = solid.corners
     if corners is None:
-        corners = solid.x0[:, None, :] + signs * half_sizes(solid)[:, None, :]
+        corners = solid.x0[:, None, :] + signs * solid.half_size[:, None, :]
     return corners.reshape(len(corners), -1).astype(float)
 
 
