@@ -23,10 +23,10 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.step import FBar
 from karamelo_py.lattice import table
-from karamelo_py.laws import law_in, law_kind, law_table
+from karamelo_py.laws import can, law_in, law_kind, law_on, law_table
 from karamelo_py.methods.base import NoContact
 from karamelo_py.points.kinematics import identity, planar
-from karamelo_py.points.materials import deformation, initial_state
+from karamelo_py.points.materials import deformation, initial_state, with_temperature
 from karamelo_py.points.transfers import terms
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.state.tiles import Tiles
@@ -151,21 +151,32 @@ def lower_blocks(hub, kin, needs: Needs, tiles: Tiles, real: type, previous: Sta
     )
 
 
+def start(law, T0: float | None, kin, real: type) -> np.ndarray:
+    """The state (s,) of a point at rest."""
+    state = initial_state(law, kin, real(1))
+    return np.array(state if T0 is None else with_temperature(law, kin, state, real(T0)), real)
+
+
 def lower_block(
     hub, solids, kin, needs: Needs, tiles: Tiles, real: type, previous: State | None
 ) -> Block:
     """The points of all solids whose law is of one kind."""
     method = hub.update.method
-    materials = list({id(s.material): s.material for s in solids}.values())
-    laws = law_table([m.law for m in materials], real)
+    known = [law_on(s.material.law, s.h, s.T0) for s in solids]
+    laws_of_solids = list(dict.fromkeys(known))
+    laws = law_table(laws_of_solids, real)
     kind = law_kind(laws)
     n = sum(len(s.x0) for s in solids)
     d = kin.dimension
     ids = np.concatenate([np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids])
-    fresh = initial_state(law_in(materials[0].law, real), kin, real(1))
-    state = np.tile(np.array(fresh, real), (n, 1))
+    state = np.concatenate(
+        [
+            np.tile(start(law_in(k, real), s.T0, kin, real), (len(s.x0), 1))
+            for s, k in zip(solids, known, strict=True)
+        ]
+    )
     moment = np.zeros((n, planar(kin).tensor_size), real) if needs.moment else None
-    stores_f = not method.frame.moves and not deformation.defined(type(laws))
+    stores_f = not method.frame.moves and not can(laws, deformation)
     unit = np.array(identity(kin, real(1)), real)
     f = np.tile(unit, (n, 1)) if stores_f else None
     places = np.concatenate([method.places(kin, s, real) for s in solids])
@@ -189,7 +200,10 @@ def lower_block(
         state=state,
         moment=moment,
         material=np.concatenate(
-            [np.full(len(s.x0), materials.index(s.material), np.int32) for s in solids]
+            [
+                np.full(len(s.x0), laws_of_solids.index(law), np.int32)
+                for s, law in zip(solids, known, strict=True)
+            ]
         ),
         deformation=f,
         force=np.zeros((n, d), real) if needs.force else None,

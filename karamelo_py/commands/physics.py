@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from karamelo_py import registry, signature
+from karamelo_py.commands.materials import define
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.signature import Argument
 
@@ -73,10 +74,7 @@ def material(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     --------
     solid
     """
-    target = registry.find("material", style)
-    if ID in hub.materials:
-        hub.materials.add(ID, None)
-    hub.materials.add(ID, signature.call(target, hub, list(arguments), f"material {style}"))
+    define(hub, hub.materials, ID, style, arguments)
 
 
 def fix(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
