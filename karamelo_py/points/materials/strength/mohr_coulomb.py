@@ -104,9 +104,9 @@ def _(strength, kin, s, p, K, strain):
     values, frame = principal(kin, s)
     a, b, c = values
     # Places in the order from the largest; equal values keep theirs.
-    at_a = (b > a) + (c > a)
-    at_b = (a >= b) + (c > b)
-    at_c = (a >= c) + (b >= c)
+    at_a = (1 if b > a else 0) + (1 if c > a else 0)
+    at_b = (1 if a >= b else 0) + (1 if c > b else 0)
+    at_c = (1 if a >= c else 0) + (1 if b >= c else 0)
     largest = max(a, max(b, c))
     smallest = min(a, min(b, c))
     middle = -largest - smallest
