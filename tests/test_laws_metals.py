@@ -80,7 +80,7 @@ def test_stress_ends_on_the_yield_surface(strength, kin, steps):
 @pytest.mark.parametrize("kin", [PlaneStrain(), Axisymmetric(), Space()])
 @every_strength
 def test_simple_shear(strength, kin):
-    """Small shear: s_xy = Y(ep)/sqrt(3), ep = (gamma - s_xy/G)/sqrt(3), but for the turn's gamma."""
+    """s_xy = Y(ep)/sqrt(3), ep = (gamma - s_xy/G)/sqrt(3), but for the turn, of order gamma."""
     law = EosStrength(EOS, strength)
     shear = np.zeros((3, 3))
     shear[0, 1] = 1e-4
@@ -232,8 +232,8 @@ def test_work_is_stored_or_dissipated(strength):
         stored, lost = energy_density(law, kin, state), dissipated_energy(law, kin, state)
         assert lost > stored > 0
         errors.append(abs(stored + lost - work) / work)
-    assert errors[0] < 0.03
-    assert errors[2] < 2e-2 and (errors[2] < 0.8 * errors[0] or errors[2] < 5e-3)
+    # J and the sum of the strain increments differ by squares of strain: 4e-4 stay.
+    assert errors[2] < 6e-4 and errors[2] < 0.6 * errors[0] < 1e-3
 
 
 @every_strength

@@ -96,7 +96,7 @@ def test_principal_values(kin, data):
 @every_law
 @given(data=st.data())
 def test_stress_ends_within_the_surface(law, kin, data):
-    """From any stress inside, by any increment: on the surface to 1e-12 of the stress, or inside.
+    """From any stress inside, by any increment: on the surface to 1e-11 of the stress, or inside.
 
     What is plastic is on it: nothing flows inside.
     """
@@ -140,7 +140,7 @@ def triaxial(law, radial, steps=400, rate=-2e-4):
             if fb == fa:
                 break
             a, fa, b = b, fb, b - fb * (b - a) / (fb - fa)
-            new, fb = tried(b)
+            fb = tried(b)[1]
             if abs(fb) < 1e-13:
                 break
         state = tried(b)[0]
@@ -180,7 +180,7 @@ def test_plane_strain_cone():
         for _ in range(600):
             a, b = 0.0, 1e-5
 
-            def mean(v, state=state):
+            def mean(v, state=state, law=law):
                 new = stretched(law, kin, state, np.diag([2e-4 + v, -2e-4 + v, 0]), 1)
                 full = stress(law, kin, new)
                 return (full[0, 0] + full[1, 1]) / 2 + 2.0
@@ -296,7 +296,7 @@ def test_dilatancy(make):
 
 @pytest.mark.parametrize("make", [mohr, drucker])
 def test_softening_to_the_residual_strength(make):
-    """Half way the mean of peak and residual, in the end the residual, for cohesion and friction."""
+    """Half way the mean of peak and residual, in the end the residual."""
     law = make(psi=0, residual_cohesion=0.1, residual_phi=20, softening=0.05)
     peak, rest = make(psi=0), make(c=0.1, phi=20, psi=0)
     kin = PlaneStrain()
@@ -340,7 +340,8 @@ def test_work_is_stored_or_dissipated(law):
         lost = dissipated_energy(law, kin, state)
         assert lost > 0
         errors.append(abs(stored + lost - work) / work)
-    assert errors[1] < 2e-2
+    # J and the sum of the strain increments differ by squares of strain: 4e-4 stay.
+    assert errors[1] < 1e-3 and errors[0] < 3e-3
 
 
 @every_law
