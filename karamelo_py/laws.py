@@ -61,6 +61,11 @@ def law_on(law: NamedTuple, h: float, T0: float | None) -> NamedTuple:
     )
 
 
+def elastic_law(law: NamedTuple) -> NamedTuple:
+    """The law that makes the stress, of one that adds a temperature to it."""
+    return getattr(law, "elastic", law)
+
+
 def can(law: NamedTuple, function: Callable) -> bool:
     """Whether a point function is defined for a law, or for one of its parts."""
     return any(function.defined(kind) for kind in law_kind(law))

@@ -23,7 +23,7 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.step import FBar
 from karamelo_py.lattice import table
-from karamelo_py.laws import can, law_in, law_kind, law_on, law_table
+from karamelo_py.laws import can, elastic_law, law_in, law_kind, law_on, law_table
 from karamelo_py.methods.base import NoContact
 from karamelo_py.points.kinematics import identity, planar
 from karamelo_py.points.materials import deformation, initial_state, with_temperature
@@ -176,7 +176,7 @@ def lower_block(
         ]
     )
     moment = np.zeros((n, planar(kin).tensor_size), real) if needs.moment else None
-    stores_f = not method.frame.moves and not can(laws, deformation)
+    stores_f = not method.frame.moves and not can(elastic_law(laws), deformation)
     unit = np.array(identity(kin, real(1)), real)
     f = np.tile(unit, (n, 1)) if stores_f else None
     places = np.concatenate([method.places(kin, s, real) for s in solids])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from karamelo_py.points.materials.thermoelastic import Expansion, Thermoelastic
 from karamelo_py.regions.base import look_up
 from karamelo_py.script.errors import ScriptError
 
@@ -47,6 +48,22 @@ def check_poisson_ratio(nu: float) -> None:
             argument="nu",
             expected="a number above -1 and below 0.5",
         )
+
+
+def expanding(
+    law: NamedTuple, moduli: LameParameters, cp: float | None, kappa: float | None, alpha: float
+) -> NamedTuple:
+    """An elastic law with a temperature where heat capacity and conductivity are given."""
+    if cp is None or kappa is None:
+        if cp is not None:
+            raise ScriptError(
+                "with the heat capacity cp the conductivity kappa is needed",
+                argument="cp",
+                expected="cp and kappa, or neither",
+            )
+        return law
+    bulk = moduli.lam + 2 / 3 * moduli.G
+    return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, 0.0))
 
 
 def lame_parameters(E: float, nu: float) -> LameParameters:

@@ -43,7 +43,7 @@ from karamelo_py.kernels.step import (
     step_size,
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
-from karamelo_py.laws import law_kind
+from karamelo_py.laws import can, elastic_law, law_kind
 from karamelo_py.lowering import State, lower, thread_count
 from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
@@ -211,7 +211,7 @@ class Simulation:
                 stress[ids, k] = given[name]
         flags = np.array([name in given for name in names])
         for block in s.blocks:
-            if with_stress.defined(type(block.laws)):
+            if can(elastic_law(block.laws), with_stress):
                 rows = stress[block.id]
                 part = chosen[block.id]
                 like = s.nodes.sums[0, 0]
