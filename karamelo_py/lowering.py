@@ -25,8 +25,9 @@ from karamelo_py.kernels.step import FBar
 from karamelo_py.lattice import table
 from karamelo_py.laws import can, elastic_law, law_in, law_kind, law_on, law_table
 from karamelo_py.methods.base import NoContact
+from karamelo_py.points.basis import carried, deformed
 from karamelo_py.points.kinematics import identity, planar
-from karamelo_py.points.materials import deformation, initial_state, with_temperature
+from karamelo_py.points.materials import deformation, driven, initial_state, with_temperature
 from karamelo_py.points.transfers import terms
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.state.tiles import Tiles
@@ -65,6 +66,22 @@ def check_scene(hub: Hub) -> None:
             hint="put solid(ID, region, regionID, points per cell, material, h, T0) before run",
         )
     hub.update.method.check(hub)
+    check_rigid(hub)
+
+
+def check_rigid(hub: Hub) -> None:
+    """Refuse rigid bodies whose points would have domains that deform."""
+    method = hub.update.method
+    basis = type(method.basis)
+    if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
+        return
+    for solid in hub.solids.values():
+        if can(solid.material.law, driven):
+            raise ScriptError(
+                f"solid '{solid.id}' is rigid, and the domains of its points would deform",
+                place=solid.place,
+                hint="a basis without domains that deform: linear, a spline, or ugimp",
+            )
 
 
 def thread_count(hub: Hub, points: int) -> int:

@@ -47,6 +47,7 @@ from karamelo_py.laws import can, elastic_law, law_kind
 from karamelo_py.lowering import State, lower, thread_count
 from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.state.hooks import lower_hooks
 from karamelo_py.views import NodesView, PointsView
 
@@ -243,6 +244,11 @@ class Simulation:
         self._prepare_hooks()
         update.method.begin(self.hub, self.setup.contact)
         self._choose_dt()
+        if not np.isfinite(self.dt):
+            raise ScriptError(
+                "nothing limits the time step: all that there is is rigid and at rest",
+                hint="set_dt(...), or a velocity from fix initial_velocity_particles",
+            )
         control.whole[WATCH_LIMIT] = int(not self.above_limit())
         control.whole[OVER_LIMIT] = 0
 

@@ -62,7 +62,7 @@ def material(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     ID
         Name of the material.
     style
-        ``linear``, ``neo-hookean``, ``eos-strength``, or the style of a plug-in.
+        ``linear``, ``neo-hookean``, ``eos-strength``, ``rigid``, or the style of a plug-in.
     arguments
         What the style asks for; see its page.
 

@@ -50,6 +50,7 @@ from karamelo_py.points.kinematics import (
 from karamelo_py.points.materials import (
     advance,
     deformation,
+    driven,
     initial_state,
     jacobian,
     kirchhoff_stress,
@@ -448,11 +449,13 @@ def grown_by(basis, kin, grid, before, after):
 @shared
 def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
-    v = updated_velocity(w.transfer, vector_at(w.kin, w.points.v, p), total[0], total[1])
+    law = record(w.laws, index(w.points.material[p]))
+    old = vector_at(w.kin, w.points.v, p)
+    v = driven(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
     put_at(w.points.v, p, 0, v)
     put_optional(w.points.moment, p, total[2])
     x = vector_at(w.kin, w.places.x, p)
-    step = scale(dt, displacing_velocity(w.transfer, v, total[0]))
+    step = scale(dt, driven(law, v, displacing_velocity(w.transfer, v, total[0])))
     y = add_scaled(x, real(1, dt), step)
     put_at(w.places.y, p, 0, y)
     moved = largest_component(w.kin, step) * w.grid.inv_h

@@ -80,6 +80,16 @@ def energy_density(law, kin, state):
 
 
 @point_function()
+def driven(law, own, given):
+    """Velocity of a point after a step: what the grid gives, or of rigid bodies their own."""
+
+
+@driven.otherwise
+def _(law, own, given):
+    return given
+
+
+@point_function()
 def dissipated_energy(law, kin, state):
     """Energy that is gone, per reference volume; left out by laws that dissipate nothing."""
 

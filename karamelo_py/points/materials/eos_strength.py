@@ -488,11 +488,12 @@ def _(law, kin, state):
 def _(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
     m = memory_of(law, kin, state)
-    warm = plus(state[0] - state[0], thermal_pressure(law.temperature, m.heat))
-    p = -trace(stress) * real(1 / 3, state[0]) - warm
-    j, energy = at_pressure(law.eos, state[0], m.energy, p, m.heat)
+    elastic = elastic_ratio(law.strength, m.strength, state[0])
+    beside = plus(plus(elastic - elastic, thermal_pressure(law.temperature, m.heat)), m.viscous)
+    p = -trace(stress) * real(1 / 3, elastic) - beside
+    after, energy = at_pressure(law.eos, elastic, m.energy, p, m.heat)
     now = Memory(energy, m.viscous, m.damage, m.heat, m.loss, m.strength)
-    return state_of(j, deviator(kin, stress), now)
+    return state_of(state[0] * (after / elastic), deviator(kin, stress), now)
 
 
 @specific_volume.on(EosStrength)
