@@ -27,8 +27,9 @@ fix(pull, velocity_nodes, nodes, RATE*x0, 0)
 compute(worst, max_plastic_strain, all)
 compute(Es, strain_energy, all)
 compute(Ed, dissipated_energy, all)
+compute(heat, average_temperature, all)
 dump(end, all, particle, 100000, end.*.LAMMPS, x, s11, s22, s33, s12, ep, damage, damage_init, T)
-log_modify(custom, step, time, worst_Epmax, Es, Ed)
+log_modify(custom, step, time, worst_Epmax, worst_Tmax, heat, Es, Ed)
 set_output(100000)
 set_dt(0.02)
 run(50)
@@ -55,6 +56,8 @@ def test_columns_and_computes(run_interpreted, method):
     assert last.T[0] > 298 and last.ep[0] > 0 and 0 < last.damage_init[0] < 1
     assert last.damage.tolist() == [0] * len(last.id)
     lost = result.log.Ed[-1]
+    assert result.log.worst_Tmax[-1] == pytest.approx(last.T[0])
+    assert result.log.heat == pytest.approx([298, last.T[0]])
     assert result.log.Ed[0] == 0
     # One unit of volume: dT = chi/(rho0 cp) Ed.
     assert last.T[0] - 298 == pytest.approx(0.9 / (8.96 * 383e-8) * lost, rel=1e-2)
