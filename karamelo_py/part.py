@@ -1,4 +1,4 @@
-"""What every part of a composed law has: the parameters of its point functions."""
+"""What every material and every part of a composed law has: parameters of point functions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Part:
-    """Base of the styles of parts of a law: equations of state, strengths, and so on.
+    """Base of the styles of materials and of parts of a law: equations of state, and so on.
 
     Attributes
     ----------
