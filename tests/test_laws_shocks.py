@@ -1,4 +1,4 @@
-"""Shock tube of two ideal gases (Sod 1978), with artificial viscosity."""
+"""Shocks in scenes: the tube of two ideal gases (Sod 1978), and copper driven by a piston."""
 
 from __future__ import annotations
 
@@ -56,3 +56,36 @@ def test_sod(run_script):
     assert front == pytest.approx(shock, abs=0.005)
     total = np.array(result.log.Ek) + result.log.Es + result.log.Ed
     assert np.abs(total).max() < 0.01 * result.log.Ek[-1]
+
+
+PISTON = """
+method(tlmpm, FLIP, linear, 0.99)
+dimension(1, -1, 3, 0.01)
+region(bar, block, 0, 2)
+region(end, block, -0.001, 0.001)
+eos(a, shock, 8.96, 1.1, 0.394, 1.489, 2.02, 383e-8, 298, 1.5, 0.06)
+strength(thin, fluid, 0)
+material(m, eos-strength, a, thin)
+solid(l, region, bar, 1, m, 0.01)
+group(w1, nodes, region, end, all)
+fix(h1, velocity_nodes, w1, 0.1)
+dump(end, all, particle, 100000, end.*.LAMMPS, x0, s11, volume)
+set_output(1000)
+dt_factor(0.4)
+run_time(2.5)
+"""
+
+
+@pytest.mark.full
+def test_piston(run_script):
+    """Behind the shock p = rho0 U u and J = (U - u)/U, U = c0 + S u (Rankine & Hugoniot)."""
+    result = run_script(PISTON)
+    (end,) = (p for p in result.folder.glob("end.*") if p.name != "end.0.LAMMPS")
+    last = result.dump(end.name)
+    u = 0.1
+    U = 0.394 + 1.489 * u
+    shocked = (last.x0 > 0.2) & (last.x0 < 2.5 * U - 0.15)
+    assert -last.s11[shocked].mean() == pytest.approx(8.96 * U * u, rel=5e-3)
+    assert last.volume[shocked].mean() / 0.01 == pytest.approx((U - u) / U, rel=2e-3)
+    front = last.x0[-last.s11 > 8.96 * U * u / 2].max()
+    assert front == pytest.approx(2.5 * U, abs=0.01)
