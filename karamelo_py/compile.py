@@ -225,6 +225,21 @@ def _real(value, like):
     return lambda value, like: numba.float64(value)
 
 
+def round_off(like: Any) -> Any:
+    """The relative error of one operation, in the number type of `like`."""
+    return type(like)(_ROUND_OFF.get(type(like).__name__, 2.0**-52))
+
+
+_ROUND_OFF = {"float32": 2.0**-23}
+
+
+@by_type(round_off)
+def _round_off(like):
+    if like is numba.types.float32:
+        return lambda like: numba.float32(2.0**-23)
+    return lambda like: numba.float64(2.0**-52)
+
+
 def fma(a: float, b: float, c: float) -> float:
     """a b + c with one rounding, where compiled: always so, whatever surrounds it."""
     return a * b + c

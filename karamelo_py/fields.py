@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +13,19 @@ from karamelo_py.kernels.export import (
     EXPORTED,
     JACOBIAN,
     STRAIN,
-    export_energy,
-    export_plastic_strain,
+    Damage,
+    DamageInitiation,
+    DissipatedEnergy,
+    PlasticStrain,
+    StoredEnergy,
+    Temperature,
+    export,
     export_state,
 )
-from karamelo_py.points.materials import plastic_strain
+from karamelo_py.laws import can
+from karamelo_py.points.materials import dissipated_energy, energy_density, plastic_strain
+from karamelo_py.points.materials.damages import damage_begun
+from karamelo_py.points.materials.temperatures import initial_heat
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -47,6 +56,13 @@ NODE_NAMES = (
 ABSENT_AT_POINTS = (
     "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
 )  # fmt: skip
+# What only some materials have: the number, and the function that shows that a law has it.
+OF_SOME = {
+    "ep": (PlasticStrain(), plastic_strain),
+    "damage": (Damage(), damage_begun),
+    "damage_init": (DamageInitiation(), damage_begun),
+    "T": (Temperature(), initial_heat),
+}
 ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez")
 
 
@@ -138,7 +154,14 @@ class Fields:
 
     def strain_energy(self, group: Any) -> float:
         """Stored energy of a particle group."""
-        energy = self._cached("energy", _stored_energy)
+        return self._energy(group, StoredEnergy(), energy_density)
+
+    def dissipated_energy(self, group: Any) -> float:
+        """Dissipated energy of a particle group."""
+        return self._energy(group, DissipatedEnergy(), dissipated_energy)
+
+    def _energy(self, group: Any, what: Any, function: Any) -> float:
+        energy = self._cached(type(what).__name__, lambda s: _measured(s, what, function))
         return float(energy.sum() if group.all else energy[group.ids].sum())
 
     def particle_names(self) -> list[str]:
@@ -151,8 +174,8 @@ class Fields:
 
     def absent_at_points(self) -> list[str]:
         """Names that `particle` knows, but that are 0 because no material has them."""
-        laws = [type(material.law) for material in self.hub.materials.values()]
-        present = {"ep"} if any(plastic_strain.defined(law) for law in laws) else set()
+        laws = [material.law for material in self.hub.materials.values()]
+        present = {name for name, (_, has) in OF_SOME.items() if any(can(law, has) for law in laws)}
         return [name for name in ABSENT_AT_POINTS if name not in present]
 
     def particle(self, name: str) -> np.ndarray:
@@ -182,8 +205,8 @@ class Fields:
             return self.reference_volume * self._exported[:, JACOBIAN]
         if name == "ienergy":
             return self._exported[:, ENERGY].copy()
-        if name == "ep":
-            return self._cached("ep", _plastic_strain).copy()
+        if name in OF_SOME:
+            return self._cached(name, lambda s: _measured(s, *OF_SOME[name])).copy()
         if name == "seq":
             return _von_mises(self._exported[:, :STRAIN])
         if name[:1] in "se" and name[1:] in COMPONENTS:
@@ -226,31 +249,31 @@ class Fields:
         return self._cached("exported", _exported_state)
 
 
-def _told_by(
-    kernel: Callable, *columns: int, wanted: Callable = lambda law: True
-) -> Callable[[Any], np.ndarray]:
-    """A function of a simulation: what `kernel` says of its points, by id, (N, *columns).
+def _of_points(
+    simulation: Any, fill: Callable, *columns: int, has: Callable = lambda laws: True
+) -> np.ndarray:
+    """What `fill(kin, like, points, laws, rows)` says of all points, by id, (N, *columns).
 
-    Points are left at 0 where the class of their law is not `wanted`.
+    Points are left at 0 where the scene's laws do not have it.
     """
-
-    def collect(simulation: Any) -> np.ndarray:
-        s = simulation.setup
-        out = np.zeros((simulation.count, *columns))
-        for block in s.blocks:
-            if wanted(type(block.laws)):
-                rows = np.zeros((len(block.id), *columns))
-                kernel(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
-                out[block.id] = rows
-        return out
-
-    return collect
+    s = simulation.setup
+    out = np.zeros((simulation.count, *columns))
+    for block in s.blocks:
+        if has(block.laws):
+            rows = np.zeros((len(block.id), *columns))
+            fill(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
+            out[block.id] = rows
+    return out
 
 
-# A kinematics fills its own components: in the plane the fourth is 12, as in space.
-_exported_state = _told_by(export_state, EXPORTED)
-_stored_energy = _told_by(export_energy)
-_plastic_strain = _told_by(export_plastic_strain, wanted=plastic_strain.defined)
+def _exported_state(simulation: Any) -> np.ndarray:
+    # A kinematics fills its own components: in the plane the fourth is 12, as in space.
+    return _of_points(simulation, export_state, EXPORTED)
+
+
+def _measured(simulation: Any, what: Any, function: Any) -> np.ndarray:
+    """A number of all points (`kernels.export.measured`)."""
+    return _of_points(simulation, partial(export, what), has=lambda laws: can(laws, function))
 
 
 def _column(field: np.ndarray, k: int) -> np.ndarray:

@@ -71,8 +71,10 @@ class Hub:
     ----------
     domain
         The domain, or None before ``dimension``.
-    regions, eos, strengths, materials, load_paths, elements, solids, groups, fixes, computes, dumps
+    regions, load_paths, elements, solids, groups, fixes, computes, dumps
         Catalogues of what the script has named.
+    materials, eos, strengths, damages, temperatures
+        The same: materials, and the parts that some are made of.
     values
         Numbers that fixes and computes publish, and time, timestep, dt.
     place
@@ -97,6 +99,8 @@ class Hub:
         self.regions = Catalogue("region", self)
         self.eos = Catalogue("eos", self)
         self.strengths = Catalogue("strength", self)
+        self.damages = Catalogue("damage", self)
+        self.temperatures = Catalogue("temperature", self)
         self.materials = Catalogue("material", self)
         self.load_paths = Catalogue("load path", self)
         self.elements = Catalogue("element", self)
@@ -172,7 +176,8 @@ class Hub:
         other = copy.copy(self)
         other.rehearsing = True
         for name in (
-            "regions", "eos", "strengths", "materials", "load_paths", "elements", "solids",
+            "regions", "eos", "strengths", "damages", "temperatures", "materials", "load_paths",
+            "elements", "solids",
             "groups", "fixes", "computes", "dumps",
         ):  # fmt: skip
             catalogue = Catalogue(getattr(self, name).kind, other)

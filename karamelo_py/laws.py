@@ -6,7 +6,7 @@ A law is a NamedTuple of numbers, or of parts that are NamedTuples of numbers
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +22,11 @@ def law_kind(law: NamedTuple) -> tuple[type, ...]:
 
 
 def law_name(law: NamedTuple) -> str:
-    """The names of a law and of its parts, such as EosStrength(LinearPressure, Plastic)."""
-    parts = ", ".join(law_name(part) for part in law if isinstance(part, tuple))
+    """The names of a law and of its parts, such as EosStrength(LinearPressure, Plastic).
+
+    Parts that are absent, tags without parameters, are left out.
+    """
+    parts = ", ".join(law_name(part) for part in law if isinstance(part, tuple) and part)
     return type(law).__name__ + (f"({parts})" if parts else "")
 
 
@@ -38,3 +41,31 @@ def law_table(laws: Sequence[NamedTuple], real: type) -> NamedTuple:
     return type(laws[0])(
         *(law_table(c, real) if isinstance(c[0], tuple) else np.array(c, real) for c in columns)
     )
+
+
+def law_on(law: NamedTuple, h: float, T0: float | None) -> NamedTuple:
+    """The law with what it has to know of a solid: cell size `h`, initial temperature `T0`.
+
+    Laws and parts that need them have fields ``cell_size`` and ``initial_temperature``.
+    """
+    known = {"cell_size": h, "initial_temperature": T0}
+    return type(law)(
+        *(
+            law_on(value, h, T0)
+            if isinstance(value, tuple)
+            else value
+            if known.get(name) is None
+            else known[name]
+            for name, value in zip(law._fields, law, strict=True)
+        )
+    )
+
+
+def elastic_law(law: NamedTuple) -> NamedTuple:
+    """The law that makes the stress, of one that adds a temperature to it."""
+    return getattr(law, "elastic", law)
+
+
+def can(law: NamedTuple, function: Callable) -> bool:
+    """Whether a point function is defined for a law, or for one of its parts."""
+    return any(function.defined(kind) for kind in law_kind(law))

@@ -25,12 +25,13 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.step import FBar
 from karamelo_py.lattice import table
-from karamelo_py.laws import law_in, law_kind, law_table
+from karamelo_py.laws import can, elastic_law, law_in, law_kind, law_on, law_table
 from karamelo_py.methods.base import NoContact
 from karamelo_py.modify import puts_force_on_points
+from karamelo_py.points.basis import carried, deformed
 from karamelo_py.points.boundary import ReflectingGrid
 from karamelo_py.points.kinematics import identity, planar
-from karamelo_py.points.materials import deformation, initial_state
+from karamelo_py.points.materials import deformation, driven, initial_state, with_temperature
 from karamelo_py.points.transfers import terms
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.state.tiles import Tiles
@@ -79,6 +80,22 @@ def check_scene(hub: Hub) -> None:
             error.place, error.command = method.place, "method"
         raise
     boundary.check(hub)
+    check_rigid(hub)
+
+
+def check_rigid(hub: Hub) -> None:
+    """Refuse rigid bodies whose points would have domains that deform."""
+    method = hub.update.method
+    basis = type(method.basis)
+    if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
+        return
+    for solid in hub.solids.values():
+        if can(solid.material.law, driven):
+            raise ScriptError(
+                f"solid '{solid.id}' is rigid, and the domains of its points would deform",
+                place=solid.place,
+                hint="a basis without domains that deform: linear, a spline, or ugimp",
+            )
 
 
 def thread_count(hub: Hub, points: int) -> int:
@@ -180,21 +197,32 @@ def lower_blocks(hub, kin, needs: Needs, tiles: Tiles, real: type, previous: Sta
     )
 
 
+def start(law, T0: float | None, kin, real: type) -> np.ndarray:
+    """The state (s,) of a point at rest."""
+    state = initial_state(law, kin, real(1))
+    return np.array(state if T0 is None else with_temperature(law, kin, state, real(T0)), real)
+
+
 def lower_block(
     hub, solids, kin, needs: Needs, tiles: Tiles, real: type, previous: State | None
 ) -> Block:
     """The points of all solids whose law is of one kind."""
     method = hub.update.method
-    materials = list({id(s.material): s.material for s in solids}.values())
-    laws = law_table([m.law for m in materials], real)
+    known = [law_on(s.material.law, s.h, s.T0) for s in solids]
+    laws_of_solids = list(dict.fromkeys(known))
+    laws = law_table(laws_of_solids, real)
     kind = law_kind(laws)
     n = sum(len(s.x0) for s in solids)
     d = kin.dimension
     ids = np.concatenate([np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids])
-    fresh = initial_state(law_in(materials[0].law, real), kin, real(1))
-    state = np.tile(np.array(fresh, real), (n, 1))
+    state = np.concatenate(
+        [
+            np.tile(start(law_in(k, real), s.T0, kin, real), (len(s.x0), 1))
+            for s, k in zip(solids, known, strict=True)
+        ]
+    )
     moment = np.zeros((n, planar(kin).tensor_size), real) if needs.moment else None
-    stores_f = not method.frame.moves and not deformation.defined(type(laws))
+    stores_f = not method.frame.moves and not can(elastic_law(laws), deformation)
     unit = np.array(identity(kin, real(1)), real)
     f = np.tile(unit, (n, 1)) if stores_f else None
     places = np.concatenate([method.places(kin, s, real) for s in solids])
@@ -223,7 +251,10 @@ def lower_block(
         state=state,
         moment=moment,
         material=np.concatenate(
-            [np.full(len(s.x0), materials.index(s.material), np.int32) for s in solids]
+            [
+                np.full(len(s.x0), laws_of_solids.index(law), np.int32)
+                for s, law in zip(solids, known, strict=True)
+            ]
         ),
         deformation=f,
         force=np.zeros((n, d), real) if needs.force else None,

@@ -2,34 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
-from karamelo_py.regions.base import look_up
+from karamelo_py.part import Part
+from karamelo_py.points.materials.thermoelastic import Expansion, Thermoelastic
 from karamelo_py.script.errors import ScriptError
 
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
-    from karamelo_py.signature import Argument
 
+class Material(Part):
+    """Base of the material styles; `law` is the whole law."""
 
-class Material:
-    """Base of the material styles.
-
-    Attributes
-    ----------
-    law
-        The law's NamedTuple of numbers; its class selects the point functions
-        (:mod:`karamelo_py.points.materials`).
-    """
-
-    id: str = ""
-    place: Any = None
-    law: NamedTuple
-
-    @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> Material:
-        """The material that `argument` names."""
-        return look_up(hub.materials, argument)
+    script_kind = "the ID of a material"
+    catalogue = "materials"
 
 
 class LameParameters(NamedTuple):
@@ -47,6 +31,22 @@ def check_poisson_ratio(nu: float) -> None:
             argument="nu",
             expected="a number above -1 and below 0.5",
         )
+
+
+def expanding(
+    law: NamedTuple, moduli: LameParameters, cp: float | None, kappa: float | None, alpha: float
+) -> NamedTuple:
+    """An elastic law with a temperature where heat capacity and conductivity are given."""
+    if cp is None or kappa is None:
+        if cp is not None:
+            raise ScriptError(
+                "with the heat capacity cp the conductivity kappa is needed",
+                argument="cp",
+                expected="cp and kappa, or neither",
+            )
+        return law
+    bulk = moduli.lam + 2 / 3 * moduli.G
+    return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, 0.0))
 
 
 def lame_parameters(E: float, nu: float) -> LameParameters:

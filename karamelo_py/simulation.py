@@ -44,11 +44,12 @@ from karamelo_py.kernels.step import (
     step_size,
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
-from karamelo_py.laws import law_kind
+from karamelo_py.laws import can, elastic_law, law_kind
 from karamelo_py.lowering import State, chosen, lower, thread_count
 from karamelo_py.modify import puts_force_on_points
 from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.state.hooks import lower_hooks
 from karamelo_py.views import NodesView, PointsView
 
@@ -225,7 +226,7 @@ class Simulation:
                 stress[ids, k] = given[name]
         flags = np.array([name in given for name in names])
         for block in s.blocks:
-            if with_stress.defined(type(block.laws)):
+            if can(elastic_law(block.laws), with_stress):
                 rows = stress[block.id]
                 part = chosen[block.id]
                 like = s.nodes.sums[0, 0]
@@ -273,6 +274,11 @@ class Simulation:
         self._prepare_hooks()
         update.method.begin(self.hub, self.setup.contact)
         self._choose_dt()
+        if not np.isfinite(self.dt):
+            raise ScriptError(
+                "nothing limits the time step: all that there is is rigid and at rest",
+                hint="set_dt(...), or a velocity from fix initial_velocity_particles",
+            )
         control.whole[WATCH_LIMIT] = int(not self.above_limit())
         control.whole[OVER_LIMIT] = 0
 

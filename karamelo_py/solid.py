@@ -35,7 +35,7 @@ class Solid:
         Cell size. With a grid shared by all solids it must be that of the domain; a method with
         the attribute ``own_grids`` lays a grid of its own for each solid.
     T0
-        Initial temperature.
+        Initial temperature; None for that of the material.
     glued_to
         The solid with which this one shares a velocity field, in methods that have several.
 
@@ -69,11 +69,17 @@ class Solid:
     source = "region"
 
     def __init__(
-        self, hub: Hub, material: Material, h: float, T0: float, glued_to: Solid | None = None
+        self,
+        hub: Hub,
+        material: Material,
+        h: float,
+        T0: float | None,
+        glued_to: Solid | None = None,
     ):
         self.domain = require_domain(hub)
         for name, value in (("h", h), ("T0", T0)):
-            finite(hub, value, name)
+            if value is not None:
+                finite(hub, value, name)
         self.h = _cell_size(hub, self.domain, h)
         self.material = material
         self.T0 = T0

@@ -216,3 +216,73 @@ def _add_row(a, first, b):
             term = f"(a[{k}] + b[{j}] if first == {k - j} else {term})"
         items.append(term)
     return define("a, first, b", f"return ({''.join(item + ', ' for item in items)})")
+
+
+def leading(values, like):
+    """The first len(like) of `values`."""
+    return values[: len(like)]
+
+
+@by_type(leading)
+def _leading(values, like):
+    return define("values, like", f"return values[:{len(like)}]" if len(like) else "return ()")
+
+
+def following(values, like):
+    """What comes after the first len(like) of `values`, perhaps nothing."""
+    return values[len(like) :]
+
+
+@by_type(following)
+def _following(values, like):
+    rest = range(len(like), len(values))
+    items = "".join(f"values[{k}], " for k in rest)
+    return define("values, like", f"return ({items})")
+
+
+def plus(number, present):
+    """number + present[0], or the number alone where `present` is empty."""
+    return number + present[0] if len(present) else number
+
+
+@by_type(plus)
+def _plus(number, present):
+    if len(present) == 0:
+        return lambda number, present: number
+    return lambda number, present: number + present[0]
+
+
+def times(number, present):
+    """number * present[0], or the number alone where `present` is empty."""
+    return number * present[0] if len(present) else number
+
+
+@by_type(times)
+def _times(number, present):
+    if len(present) == 0:
+        return lambda number, present: number
+    return lambda number, present: number * present[0]
+
+
+def increased(present, change):
+    """(present[0] + change,), or nothing where `present` is empty."""
+    return (present[0] + change,) if len(present) else ()
+
+
+@by_type(increased)
+def _increased(present, change):
+    if len(present) == 0:
+        return lambda present, change: ()
+    return lambda present, change: (present[0] + change,)
+
+
+def either(first, second):
+    """`first`, or `second` where `first` is empty."""
+    return first if len(first) else second
+
+
+@by_type(either)
+def _either(first, second):
+    if len(first) == 0:
+        return lambda first, second: second
+    return lambda first, second: first

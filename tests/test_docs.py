@@ -147,7 +147,10 @@ def _tried(lines, dimension, folder):
         interpreter.run_text(line)
 
 
-SCENE_FAMILIES = ("fix", "compute", "region", "solid", "eos", "strength", "material", "dump")
+SCENE_FAMILIES = (
+    "fix", "compute", "region", "solid", "eos", "strength", "damage", "temperature", "material",
+    "dump",
+)  # fmt: skip
 TRIED = [(f, n) for f, n in STYLES if f in SCENE_FAMILIES]
 
 

@@ -311,12 +311,12 @@ def test_single_precision(run_script):
 
 
 def test_check_names_the_parts(tmp_path, capsys):
-    """karamelo-py check tells what a point carries: J, four of s, and the plastic strain."""
+    """karamelo-py check tells what a point carries: J, four of s, dissipated energy, ep."""
     script = tmp_path / "in.check"
     script.write_text(BLOCK + "solid(s, region, box, 1, steel, 0.1, 0)\nrun(1)\n")
     assert main(["check", str(script)]) == 0
     out = capsys.readouterr().out
-    assert re.search(r"^  state \(EosStrength\(LinearPressure, Plastic\)\) +6 +48$", out, re.M)
+    assert re.search(r"^  state \(EosStrength\(LinearPressure, Plastic\)\) +7 +56$", out, re.M)
 
 
 def test_values_of_a_replaced_compute_are_forgotten():
@@ -347,7 +347,10 @@ def test_values_of_a_replaced_compute_are_forgotten():
         ("material(m, eos-strength, bulk, mld)", "unknown strength 'mld'"),
         ("material(m, eos-strength, mild, bulk)", "one of bulk"),
         ("material(m, eos-strength, 3, mild)", "'3' is not the ID of an eos"),
-        ("material(m, eos-strength, bulk)", "material(ID, eos-strength, eos, strength)"),
+        (
+            "material(m, eos-strength, bulk)",
+            "material(ID, eos-strength, eos, strength[, damage][, temperature])",
+        ),
     ],
 )
 def test_mistakes(run_interpreted, line, says):

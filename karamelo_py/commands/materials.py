@@ -1,4 +1,4 @@
-"""Commands about the parts of composed materials: eos, strength."""
+"""Commands about the parts of composed materials: eos, strength, damage, temperature."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def eos(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     ID
         Name of the equation of state.
     style
-        ``linear``, or the style of a plug-in.
+        ``linear``, ``shock``, ``fluid``, ``ideal-gas``, or the style of a plug-in.
     arguments
         What the style asks for; see its page.
 
@@ -31,7 +31,7 @@ def eos(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     --------
     strength, material, material eos-strength
     """
-    _define(hub, hub.eos, ID, style, arguments)
+    define(hub, hub.eos, ID, style, arguments)
 
 
 def strength(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
@@ -42,7 +42,8 @@ def strength(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     ID
         Name of the strength.
     style
-        ``linear``, ``plastic``, or the style of a plug-in.
+        ``linear``, ``plastic``, ``johnson_cook``, ``swift``, ``mohr-coulomb``, ``drucker-prager``,
+        ``fluid``, or the style of a plug-in.
     arguments
         What the style asks for; see its page.
 
@@ -52,14 +53,63 @@ def strength(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
 
     See Also
     --------
-    eos, material, material eos-strength
+    eos, damage, temperature, material, material eos-strength
     """
-    _define(hub, hub.strengths, ID, style, arguments)
+    define(hub, hub.strengths, ID, style, arguments)
 
 
-def _define(
+def damage(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+    """Define a damage: how a material loses its strength.
+
+    Parameters
+    ----------
+    ID
+        Name of the damage.
+    style
+        ``damage_johnson_cook``, or the style of a plug-in.
+    arguments
+        What the style asks for; see its page.
+
+    Example
+    -------
+    damage(ductile, damage_johnson_cook, 0.54, 4.89, -3.03, 0.014, 1.12, 1, 298, 1356)
+
+    See Also
+    --------
+    strength, temperature, material, material eos-strength
+    """
+    define(hub, hub.damages, ID, style, arguments)
+
+
+def temperature(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+    """Define a temperature: how a material heats, and what heat does to its pressure.
+
+    Parameters
+    ----------
+    ID
+        Name of the temperature.
+    style
+        ``plastic_work``, or the style of a plug-in.
+    arguments
+        What the style asks for; see its page.
+
+    Example
+    -------
+    temperature(warm, plastic_work, 0.9, 385, 0, 0, 298, 1356)
+
+    See Also
+    --------
+    strength, damage, material, material eos-strength
+    """
+    define(hub, hub.temperatures, ID, style, arguments)
+
+
+def define(
     hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: tuple[Argument, ...]
 ) -> None:
+    """File under `ID` what the style makes of the arguments; an ID in use is an error first."""
     family = catalogue.kind
     target = registry.find(family, style)
+    if ID in catalogue:
+        catalogue.add(ID, None)
     catalogue.add(ID, signature.call(target, hub, list(arguments), f"{family} {style}"))

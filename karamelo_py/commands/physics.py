@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from karamelo_py import registry, signature
+from karamelo_py.commands.materials import define
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.signature import Argument
 
@@ -61,7 +62,7 @@ def material(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     ID
         Name of the material.
     style
-        ``linear``, ``neo-hookean``, ``eos-strength``, or the style of a plug-in.
+        ``linear``, ``neo-hookean``, ``eos-strength``, ``rigid``, or the style of a plug-in.
     arguments
         What the style asks for; see its page.
 
@@ -73,10 +74,7 @@ def material(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     --------
     solid
     """
-    target = registry.find("material", style)
-    if ID in hub.materials:
-        hub.materials.add(ID, None)
-    hub.materials.add(ID, signature.call(target, hub, list(arguments), f"material {style}"))
+    define(hub, hub.materials, ID, style, arguments)
 
 
 def fix(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:

@@ -30,7 +30,7 @@ def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
         What the style asks for, see the page of the style. For ``region``:
         ``regionID, ppc, material, h[, T0]``, the region to fill, the points per cell in each
         direction, the material, the cell size (that of the domain), and the initial temperature
-        (0 when left out). For ``mesh``: ``file, material, h[, T0]``.
+        (that of the material when left out). For ``mesh``: ``file, material, h[, T0]``.
 
     Example
     -------

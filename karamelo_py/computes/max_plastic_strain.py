@@ -6,9 +6,9 @@ from karamelo_py.modify import Compute
 
 
 class MaxPlasticStrain(Compute):
-    """Measure the largest equivalent plastic strain of a group of points; published as ID_Epmax.
+    """Measure the largest equivalent plastic strain and temperature of a group of points.
 
-    It is 0 where nothing can yield.
+    Published as ID_Epmax and ID_Tmax; 0 where nothing can yield, or has a temperature.
 
     Parameters
     ----------
@@ -25,10 +25,12 @@ class MaxPlasticStrain(Compute):
     strength plastic
     """
 
-    published = ("Epmax",)
+    published = ("Epmax", "Tmax")
 
     def refresh(self) -> None:
         """Measure and publish."""
-        strain = self.hub.fields.particle("ep")[self.hub.fields.members(self.group)]
-        if len(strain):
-            self.publish("Epmax", float(strain.max()))
+        members = self.hub.fields.members(self.group)
+        for published, field in (("Epmax", "ep"), ("Tmax", "T")):
+            values = self.hub.fields.particle(field)[members]
+            if len(values):
+                self.publish(published, float(values.max()))

@@ -11,16 +11,19 @@ from karamelo_py.dumps.files import savefig, whole
 from karamelo_py.element.load_path import COMPONENTS
 from karamelo_py.element.point import Point
 from karamelo_py.figures import blank_figure, tidy
+from karamelo_py.laws import can
 from karamelo_py.points import materials
+from karamelo_py.points.materials.damages import damage_begun
+from karamelo_py.points.materials.temperatures import initial_heat
 
 WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take, and a blank
 
-# Column: point function, of laws that have it.
+# Column: point function, and what is defined for a law (or a part of it) that has it.
 OF_SOME_LAWS = {
-    "ep": "plastic_strain",
-    "dissipated": "dissipated_energy",
-    "damage": "damage",
-    "T": "temperature",
+    "ep": (materials.plastic_strain, materials.plastic_strain),
+    "dissipated": (materials.dissipated_energy, materials.dissipated_energy),
+    "damage": (materials.damage, damage_begun),
+    "T": (materials.temperature, initial_heat),
 }
 
 
@@ -50,9 +53,8 @@ def columns(point: Point) -> dict[str, Callable[[], float]]:
     found["J"] = lambda: materials.jacobian(law, kin, point.state)
     found["stored"] = lambda: materials.energy_density(law, kin, point.state)
     found["work"] = lambda: point.work
-    for column, name in OF_SOME_LAWS.items():
-        function = getattr(materials, name, None)
-        if function is not None and function.defined(type(law)):
+    for column, (function, has) in OF_SOME_LAWS.items():
+        if can(law, has):
             found[column] = lambda function=function: function(law, kin, point.state)
     return found
 

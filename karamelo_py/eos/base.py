@@ -1,32 +1,29 @@
-"""What every equation of state has: the parameters of its point functions."""
+"""Base of the styles of equations of state."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
-from karamelo_py.regions.base import look_up
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
-    from karamelo_py.signature import Argument
+from karamelo_py.part import Part
+from karamelo_py.points.materials.viscosity import NoViscosity
+from karamelo_py.points.materials.viscosity.artificial import ArtificialViscosity
 
 
-class Eos:
-    """Base of the styles of equations of state.
+class Eos(Part):
+    """Base of the styles of equations of state; the class of `law` selects the point functions
+    (:mod:`karamelo_py.points.materials.eos`).
 
     Attributes
     ----------
-    law
-        The NamedTuple of numbers; its class selects the point functions
-        (:mod:`karamelo_py.points.materials.eos`).
+    viscosity
+        The viscous pressure that goes with it (:mod:`karamelo_py.points.materials.viscosity`).
     """
 
     script_kind = "the ID of an equation of state"
-    id: str = ""
-    place: Any = None
-    law: NamedTuple
+    catalogue = "eos"
+    viscosity: NamedTuple = NoViscosity()
 
-    @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> Eos:
-        """The equation of state that `argument` names."""
-        return look_up(hub.eos, argument)
+
+def artificial_viscosity(Q1: float, Q2: float) -> NamedTuple:
+    """The artificial viscosity with these coefficients; none where both are 0."""
+    return ArtificialViscosity(Q1, Q2, 0.0) if Q1 > 0 or Q2 > 0 else NoViscosity()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from karamelo_py.fixes.pairs import PairContact
+from karamelo_py.laws import elastic_law
 from karamelo_py.points.pairs import Hertz
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.solid import Solid
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 def plane_modulus(solid: Solid, argument: str) -> float:
     """E / (1 - nu^2) of a solid's material: 4 G (lambda + G) / (lambda + 2 G)."""
-    law = solid.material.law
+    law = elastic_law(solid.material.law)
     G, lam = getattr(law, "G", None), getattr(law, "lam", None)
     if G is None or lam is None or not G > 0:
         raise ScriptError(

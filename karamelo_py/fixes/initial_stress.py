@@ -8,6 +8,7 @@ import numpy as np
 
 from karamelo_py.fixes.formulas import evaluated
 from karamelo_py.group import ParticleGroup
+from karamelo_py.laws import can, elastic_law
 from karamelo_py.modify import Fix, PointsView
 from karamelo_py.points.materials import with_stress
 from karamelo_py.script.errors import ScriptError
@@ -57,11 +58,10 @@ class InitialStress(Fix):
         super().__init__(hub, group)
         self.formulas = (sxx, syy, szz, syz, sxz, sxy)
         for solid in hub.solids.values():
-            law = type(solid.material.law)
             in_group = group.all or np.any(
                 (group.ids >= solid.first_id) & (group.ids < solid.first_id + solid.count)
             )
-            if in_group and not with_stress.defined(law):
+            if in_group and not can(elastic_law(solid.material.law), with_stress):
                 raise ScriptError(
                     f"the stress of solid '{solid.id}' follows from its deformation "
                     "and cannot be set",

@@ -2,21 +2,86 @@
 
 from __future__ import annotations
 
-from karamelo_py.compile import kernel
+from typing import NamedTuple
+
+from karamelo_py.compile import kernel, point_function
 from karamelo_py.points.materials import (
     cauchy_stress,
+    damage,
+    damage_initiation,
+    dissipated_energy,
     elastic_strain,
     energy_density,
     initial_state,
     jacobian,
     plastic_strain,
     specific_volume,
+    temperature,
     with_stress,
 )
 from karamelo_py.tensors import put_at, record, row
 
 STRAIN, JACOBIAN, ENERGY = 6, 12, 13
 EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point
+
+
+class StoredEnergy(NamedTuple):
+    """Stored energy of a point."""
+
+
+class DissipatedEnergy(NamedTuple):
+    """Dissipated energy of a point."""
+
+
+class PlasticStrain(NamedTuple):
+    """Equivalent plastic strain."""
+
+
+class Damage(NamedTuple):
+    """Damage, from 0 to 1."""
+
+
+class DamageInitiation(NamedTuple):
+    """What grows to 1 before damage begins."""
+
+
+class Temperature(NamedTuple):
+    """Temperature."""
+
+
+@point_function()
+def measured(what, law, kin, state, volume):
+    """A number of a point with this reference volume."""
+
+
+@measured.on(StoredEnergy)
+def _(what, law, kin, state, volume):
+    return volume * energy_density(law, kin, state)
+
+
+@measured.on(DissipatedEnergy)
+def _(what, law, kin, state, volume):
+    return volume * dissipated_energy(law, kin, state)
+
+
+@measured.on(PlasticStrain)
+def _(what, law, kin, state, volume):
+    return plastic_strain(law, kin, state)
+
+
+@measured.on(Damage)
+def _(what, law, kin, state, volume):
+    return damage(law, kin, state)
+
+
+@measured.on(DamageInitiation)
+def _(what, law, kin, state, volume):
+    return damage_initiation(law, kin, state)
+
+
+@measured.on(Temperature)
+def _(what, law, kin, state, volume):
+    return temperature(law, kin, state)
 
 
 @kernel
@@ -33,22 +98,12 @@ def export_state(kin, like, points, laws, out):
 
 
 @kernel
-def export_energy(kin, like, points, laws, out):
-    """Stored energy ``out`` (n,) of each point."""
+def export(what, kin, like, points, laws, out):
+    """One number ``out`` (n,) of each point, for laws that have it (`measured`)."""
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
         state = row(points.state, p, 0, initial_state(law, kin, like))
-        volume = points.mass[p] * specific_volume(law)
-        out[p] = volume * energy_density(law, kin, state)
-
-
-@kernel
-def export_plastic_strain(kin, like, points, laws, out):
-    """Equivalent plastic strain ``out`` (n,) of each point, for laws that have one."""
-    for p in range(points.mass.size):
-        law = record(laws, points.material[p])
-        state = row(points.state, p, 0, initial_state(law, kin, like))
-        out[p] = plastic_strain(law, kin, state)
+        out[p] = measured(what, law, kin, state, points.mass[p] * specific_volume(law))
 
 
 @kernel

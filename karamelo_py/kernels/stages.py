@@ -51,6 +51,7 @@ from karamelo_py.points.kinematics import (
 from karamelo_py.points.materials import (
     advance,
     deformation,
+    driven,
     initial_state,
     jacobian,
     kirchhoff_stress,
@@ -449,9 +450,11 @@ def grown_by(basis, kin, grid, before, after):
 @shared
 def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
-    v = updated_velocity(w.transfer, vector_at(w.kin, w.points.v, p), total[0], total[1])
+    law = record(w.laws, index(w.points.material[p]))
+    old = vector_at(w.kin, w.points.v, p)
+    v = driven(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
     x = vector_at(w.kin, w.places.x, p)
-    step = scale(dt, displacing_velocity(w.transfer, v, total[0]))
+    step = scale(dt, driven(law, v, displacing_velocity(w.transfer, v, total[0])))
     y = add_scaled(x, real(1, dt), step)
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, total[2])
     add_to_optional(w.points.bounces, p, real(1, dt), hits)

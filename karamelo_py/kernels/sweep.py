@@ -82,12 +82,12 @@ def _tiles_serial(
 
 @kernel(parallel=True)
 def _tiles_threaded(
-    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, law, first, second, tiling,
-    places, dt,
+    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, law, first, second, third,
+    fourth, fifth, tiling, places, dt,
 ):  # fmt: skip
     for c in range(tiling.colour.size - 1):
         for t in prange(tiling.colour[c], tiling.colour[c + 1]):
-            laws = assemble(law, first, second)
+            laws = assemble(law, first, second, third, fourth, fifth)
             sweep_tile(
                 gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling,
                 places, dt, t,
@@ -109,10 +109,10 @@ def _(mode, gather, scatter, s, block, places, dt):
 
 @sweep_tiles.on(Threaded)
 def _(mode, gather, scatter, s, block, places, dt):
-    law, first, second = separate(block.laws)
+    law, parts = separate(block.laws)
     _tiles_threaded(
         gather, scatter, s.frame, s.kin, s.basis, s.grids, s.transfer, s.nodes, block.points, law,
-        first, second, block.tiling, places, dt,
+        parts[0], parts[1], parts[2], parts[3], parts[4], block.tiling, places, dt,
     )  # fmt: skip
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from karamelo_py.material import Material, check_poisson_ratio, lame_parameters
+from karamelo_py.material import Material, check_poisson_ratio, expanding, lame_parameters
 from karamelo_py.points.materials.linear import FixedFrame, Jaumann
-from karamelo_py.signature import Positive
+from karamelo_py.signature import NonNegative, Positive
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -23,6 +23,11 @@ class LinearElastic(Material):
         Young's modulus.
     nu
         Poisson's ratio, above -1 and below 0.5.
+    cp, kappa
+        Heat capacity per mass, and conductivity; both or neither. With them points have a
+        temperature, at first that of their solid.
+    alpha
+        Coefficient of linear expansion.
     rate
         ``jaumann``: the stress turns with the point, as it must. ``none``: it does not, as in
         Karamelo; only to repeat results of programs that leave the turn out.
@@ -30,6 +35,7 @@ class LinearElastic(Material):
     Example
     -------
     material(rubber, linear, 1000, 1e6, 0.3)
+    material(girder, linear, 7850, 211e9, 0.3, 460, 45, 12e-6)
 
     Notes
     -----
@@ -37,6 +43,9 @@ class LinearElastic(Material):
     increment of the step (Jaumann rate; Hughes & Winget 1980). For strains of more than some ten
     per cent a hyperelastic law such as neo-hookean is the better model. One dimension means
     uniaxial strain, as plane strain and space have it.
+
+    A temperature T other than that at the start, T0, adds the stress -3 K alpha (T - T0), K the
+    bulk modulus; the elastic strain is without the expansion alpha (T - T0).
 
     See Also
     --------
@@ -49,10 +58,13 @@ class LinearElastic(Material):
         rho: Annotated[float, Positive],
         E: Annotated[float, Positive],
         nu: float,
+        cp: Annotated[float, Positive] | None = None,
+        kappa: Annotated[float, NonNegative] | None = None,
+        alpha: float = 0.0,
         *,
         rate: Literal["jaumann", "none"] = "jaumann",
     ):
         check_poisson_ratio(nu)
-        lam, G = lame_parameters(E, nu)
+        moduli = lame_parameters(E, nu)
         law = Jaumann if rate == "jaumann" else FixedFrame
-        self.law = law(1 / rho, lam, G)
+        self.law = expanding(law(1 / rho, *moduli), moduli, cp, kappa, alpha)

@@ -35,7 +35,7 @@ class MeshSolid(Solid):
     h
         Cell size. With a grid shared by all solids (ulmpm) it must be that of the domain.
     T0
-        Initial temperature.
+        Initial temperature; that of the material when left out.
     group
         Name or number of a physical group, whose elements are taken. Left out: the whole mesh.
     GlueToSolid
@@ -66,7 +66,7 @@ class MeshSolid(Solid):
         file: InputFile,
         material: Material,
         h: Annotated[float, Positive],
-        T0: float = 0.0,
+        T0: float | None = None,
         *,
         group: str | int | None = None,
         GlueToSolid: Solid | None = None,

@@ -33,7 +33,7 @@ class RegionSolid(Solid):
     h
         Cell size. With a grid shared by all solids (ulmpm) it must be that of the domain.
     T0
-        Initial temperature.
+        Initial temperature; that of the material when left out.
     points
         ``regular``: at equal distances. ``gauss``: at the Gauss points of the cell, whose weights
         share out the volume. Left out: at equal distances with equal volumes, but for ``ppc`` 3,
@@ -68,7 +68,7 @@ class RegionSolid(Solid):
         ppc: Annotated[int, AtLeast(1)],
         material: Material,
         h: Annotated[float, Positive],
-        T0: float = 0.0,
+        T0: float | None = None,
         *,
         points: Literal["regular", "gauss"] | None = None,
         GlueToSolid: Solid | None = None,

@@ -29,6 +29,7 @@ from karamelo_py.points.kinematics.deformation import (
     volume_ratio,
     zero_tensor,
 )
+from karamelo_py.points.kinematics.principal import from_principal, principal
 from karamelo_py.points.kinematics.symmetric import (
     add_pressure,
     after_symmetric,
@@ -79,6 +80,7 @@ __all__ = [
     "deviator",
     "diagonal",
     "dimension",
+    "from_principal",
     "identity",
     "increment_of",
     "inverse",
@@ -89,6 +91,7 @@ __all__ = [
     "multiply",
     "nominal",
     "planar",
+    "principal",
     "right_cauchy_green",
     "spin",
     "stretch",

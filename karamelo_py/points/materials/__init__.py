@@ -17,7 +17,7 @@ class Whole(NamedTuple):
 
 @point_function()
 def separate(law):
-    """A tag that stands for the class of a law, and its parts, two at most.
+    """A tag that stands for the class of a law, and its parts, five at most; () for none.
 
     Numba hands tuples of arrays to threads, but no tuples of such tuples: laws that are made of
     parts cross one by one.
@@ -26,16 +26,16 @@ def separate(law):
 
 @separate.otherwise
 def _(law):
-    return Whole(), law, ()
+    return Whole(), (law, (), (), (), ())
 
 
 @point_function()
-def assemble(tag, first, second):
+def assemble(tag, first, second, third, fourth, fifth):
     """The law again from what `separate` returned."""
 
 
 @assemble.on(Whole)
-def _(tag, first, second):
+def _(tag, first, second, third, fourth, fifth):
     return first
 
 
@@ -77,6 +77,56 @@ def wave_speed_squared(law, kin, state):
 @point_function()
 def energy_density(law, kin, state):
     """Stored energy per reference volume."""
+
+
+@point_function()
+def driven(law, own, given):
+    """Velocity of a point after a step: what the grid gives, or of rigid bodies their own."""
+
+
+@driven.otherwise
+def _(law, own, given):
+    return given
+
+
+@point_function()
+def dissipated_energy(law, kin, state):
+    """Energy that is gone, per reference volume; left out by laws that dissipate nothing."""
+
+
+@point_function()
+def damage(law, kin, state):
+    """0 intact to 1 broken; left out by laws without."""
+
+
+@point_function()
+def damage_initiation(law, kin, state):
+    """Grows from 0, damage begins at 1; left out by laws without."""
+
+
+@point_function()
+def temperature(law, kin, state):
+    """Temperature; left out by laws without."""
+
+
+@point_function()
+def with_temperature(law, kin, state, T):
+    """The state at the temperature `T`, which laws without a temperature pass over."""
+
+
+@with_temperature.otherwise
+def _(law, kin, state, T):
+    return state
+
+
+@point_function()
+def heat_capacity(law):
+    """Heat per mass and kelvin; left out by laws without temperature."""
+
+
+@point_function()
+def conductivity(law):
+    """Heat flux per gradient of temperature; left out by laws without temperature."""
 
 
 @point_function()

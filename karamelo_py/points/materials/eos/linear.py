@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from karamelo_py.compile import real
-from karamelo_py.points.materials import specific_volume
 from karamelo_py.points.materials.eos import (
     bulk_modulus,
     compression_energy,
+    give_specific_volume,
     pressure,
     ratio_at_pressure,
 )
@@ -21,27 +21,25 @@ class LinearPressure(NamedTuple):
     K: float  # bulk modulus
 
 
+give_specific_volume(LinearPressure)
+
+
 @pressure.on(LinearPressure)
-def _(eos, j):
+def _(eos, j, memory, heat):
     return eos.K * (real(1, eos.K) - j)
 
 
 @bulk_modulus.on(LinearPressure)
-def _(eos, j):
+def _(eos, j, memory, heat):
     return eos.K * j
 
 
 @compression_energy.on(LinearPressure)
-def _(eos, j):
+def _(eos, j, memory):
     change = real(1, eos.K) - j
     return real(0.5, eos.K) * eos.K * change * change
 
 
 @ratio_at_pressure.on(LinearPressure)
-def _(eos, p):
+def _(eos, p, heat):
     return real(1, eos.K) - p / eos.K
-
-
-@specific_volume.on(LinearPressure)
-def _(eos):
-    return eos.specific_volume

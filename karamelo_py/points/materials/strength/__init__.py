@@ -2,7 +2,11 @@
 
 A strength is a NamedTuple of parameters (its class is the tag), a part of a composed law
 (`karamelo_py.points.materials.eos_strength`). What it remembers of the past (plastic strain and
-the like) is its memory, a flat tuple with as many numbers as it needs, none at best.
+the like) is its memory, a flat tuple with as many numbers as it needs, none at best. `heat` is the
+temperature (T,), or () where the law has none.
+
+Strengths that depend on pressure, and change the volume, have `pressure_response` in the place of
+`shear_response` (`karamelo_py.points.materials.strength.frictional`).
 """
 
 from karamelo_py.compile import point_function
@@ -14,16 +18,60 @@ def initial_memory(strength, like):
 
 
 @point_function()
-def shear_response(strength, kin, s, strain, memory, dt):
-    """Deviatoric stress and memory after a strain increment of a step dt.
+def shear_response(strength, kin, s, strain, memory, heat, dt):
+    """Deviatoric stress, memory, and work per volume that is not stored, after a step dt.
 
-    `s` is the old deviatoric stress, turned with the point already; `strain` is not deviatoric.
+    `s` is the old deviatoric stress, turned with the point already; `strain`, the increment, is not
+    deviatoric.
     """
+
+
+@point_function()
+def pressure_response(strength, kin, s, p, K, strain):
+    """Deviatoric stress and pressure on or within the yield surface, from an elastic trial.
+
+    `K` is the bulk modulus, `strain` the equivalent plastic strain.
+    """
+
+
+@point_function()
+def initial_loss(strength, like):
+    """(0,) for a strength that dissipates energy, or ()."""
+
+
+@initial_loss.otherwise
+def _(strength, like):
+    return ()
+
+
+@point_function()
+def elastic_ratio(strength, memory, j):
+    """The part of the volume ratio j that is elastic: what makes pressure."""
+
+
+@elastic_ratio.otherwise
+def _(strength, memory, j):
+    return j
+
+
+@point_function()
+def with_elastic_ratio(strength, memory, j, elastic):
+    """The memory with which `elastic_ratio` of j is `elastic`."""
 
 
 @point_function()
 def shear_modulus(strength):
     """Stiffness against a further change of shape, for the speed of waves."""
+
+
+@point_function()
+def viscosity_of(strength):
+    """(mu, h) of a viscous strength, h the cell size, or ()."""
+
+
+@viscosity_of.otherwise
+def _(strength):
+    return ()
 
 
 @point_function()

@@ -55,8 +55,8 @@ def _(strength, like):
 
 
 @shear_response.on(Elastic)
-def _(strength, kin, s, strain, memory, dt):
-    return elastic_trial(kin, strength.G, s, strain), memory
+def _(strength, kin, s, strain, memory, heat, dt):
+    return elastic_trial(kin, strength.G, s, strain), memory, real(0, strength.G)
 
 
 @equivalent_plastic_strain.on(Elastic)

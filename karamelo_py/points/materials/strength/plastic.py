@@ -1,18 +1,14 @@
-"""Elastic shear up to a yield stress that stays as it is: perfect plasticity of von Mises."""
+"""Elastic shear up to a yield stress, constant or in proportion to plastic strain (von Mises)."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import real, shared
+from karamelo_py.compile import real
 from karamelo_py.points.kinematics import von_mises
-from karamelo_py.points.materials.strength import (
-    equivalent_plastic_strain,
-    initial_memory,
-    shear_response,
-)
-from karamelo_py.points.materials.strength.elastic import elastic_trial, give_elastic_shear
-from karamelo_py.tensors import scale
+from karamelo_py.points.materials.strength import shear_response
+from karamelo_py.points.materials.strength.elastic import elastic_trial
+from karamelo_py.points.materials.strength.hardening import give_plastic_strain, returned
 
 
 class Plastic(NamedTuple):
@@ -22,34 +18,34 @@ class Plastic(NamedTuple):
     yield_stress: float  # in uniaxial stress
 
 
-@shared
-def radial_return(kin, G, flow_stress, trial):
-    """Deviatoric stress and plastic strain increment for an elastic trial (Wilkins 1964).
+class LinearHardening(NamedTuple):
+    """The same with a yield stress that rises by H for each unit of plastic strain."""
 
-    Where q = sqrt(3/2 s:s) of the trial is above the flow stress Y, the plastic strain increment is
-    (q - Y)/(3 G) and s shrinks to Y/q of itself.
-    """
-    q = von_mises(kin, trial)
-    if q > flow_stress:
-        return scale(flow_stress / q, trial), (q - flow_stress) / (real(3, G) * G)
-    return trial, real(0, G)
+    G: float  # shear modulus
+    yield_stress: float  # in uniaxial stress, at first
+    H: float  # hardening modulus
 
 
-give_elastic_shear(Plastic)
-
-
-@initial_memory.on(Plastic)
-def _(strength, like):
-    return (real(0, like),)
+give_plastic_strain(Plastic)
+give_plastic_strain(LinearHardening)
 
 
 @shear_response.on(Plastic)
-def _(strength, kin, s, strain, memory, dt):
+def _(strength, kin, s, strain, memory, heat, dt):
     trial = elastic_trial(kin, strength.G, s, strain)
-    returned, increment = radial_return(kin, strength.G, strength.yield_stress, trial)
-    return returned, (memory[0] + increment,)
+    q = von_mises(kin, trial)
+    if q > strength.yield_stress:
+        increment = (q - strength.yield_stress) / (real(3, q) * strength.G)
+        return returned(trial, q, strength.yield_stress, memory, increment)
+    return trial, memory, real(0, q)
 
 
-@equivalent_plastic_strain.on(Plastic)
-def _(strength, memory):
-    return memory[0]
+@shear_response.on(LinearHardening)
+def _(strength, kin, s, strain, memory, heat, dt):
+    trial = elastic_trial(kin, strength.G, s, strain)
+    q = von_mises(kin, trial)
+    flow_stress = strength.yield_stress + strength.H * memory[0]
+    if q > flow_stress:
+        increment = (q - flow_stress) / (real(3, q) * strength.G + strength.H)
+        return returned(trial, q, flow_stress + strength.H * increment, memory, increment)
+    return trial, memory, real(0, q)

@@ -1,0 +1,1 @@
+"""Damage: how strength is lost. One style a file, named as in the script."""

@@ -1,0 +1,49 @@
+"""eos fluid: Tait's equation of state."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from karamelo_py.eos.base import Eos
+from karamelo_py.points.materials.eos.tait import Tait
+from karamelo_py.signature import Positive
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+class Fluid(Eos):
+    """Pressure of a liquid from a power of its density (Tait).
+
+    Parameters
+    ----------
+    rho0
+        Density at zero pressure.
+    K
+        Reference pressure; the bulk modulus is K gamma.
+    gamma
+        Exponent, 7 for water.
+
+    Example
+    -------
+    eos(water, fluid, 1000, 2.2e9/7, 7)
+
+    Notes
+    -----
+    p = K ((rho/rho0)^gamma - 1) (Cole 1948; Monaghan 1994). The speed of sound is
+    sqrt(K gamma/rho0) at zero pressure. A smaller K than that of the liquid allows longer time
+    steps, and the density stays within 1 % where no speed is above a tenth of that of sound.
+
+    See Also
+    --------
+    strength fluid, ideal-gas, material eos-strength
+    """
+
+    def __init__(
+        self,
+        hub: Hub,
+        rho0: Annotated[float, Positive],
+        K: Annotated[float, Positive],
+        gamma: Annotated[float, Positive],
+    ):
+        self.law = Tait(1 / rho0, K, gamma)

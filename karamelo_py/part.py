@@ -1,0 +1,45 @@
+"""What every material and every part of a composed law has: parameters of point functions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+from karamelo_py.regions.base import look_up
+from karamelo_py.script.errors import ScriptError
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+    from karamelo_py.signature import Argument
+
+
+class Part:
+    """Base of the styles of materials and of parts of a law: equations of state, and so on.
+
+    Attributes
+    ----------
+    catalogue
+        The attribute of the hub that holds parts of this kind.
+    law
+        The NamedTuple of numbers; its class selects the point functions
+        (:mod:`karamelo_py.points.materials`).
+    """
+
+    catalogue: ClassVar[str]
+    id: str = ""
+    place: Any = None
+    law: NamedTuple
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Part:
+        """The part that `argument` names."""
+        return look_up(getattr(hub, cls.catalogue), argument)
+
+
+def check_temperatures(Tr: float, Tm: float) -> None:
+    """Refuse a melting temperature that is not above the reference temperature."""
+    if not Tm > Tr:
+        raise ScriptError(
+            f"the melting temperature Tm = {Tm:g} is not above Tr = {Tr:g}",
+            argument="Tm",
+            expected=f"a number above {Tr:g}",
+        )

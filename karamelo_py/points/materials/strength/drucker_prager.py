@@ -1,0 +1,69 @@
+"""Drucker-Prager strength: a cone around the axis of pressure, cut off in tension."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+from karamelo_py.compile import real
+from karamelo_py.points.kinematics import contract
+from karamelo_py.points.materials.strength import pressure_response
+from karamelo_py.points.materials.strength.frictional import (
+    give_friction,
+    give_softening,
+    surface,
+)
+from karamelo_py.tensors import scale
+
+
+class DruckerPrager(NamedTuple):
+    """sqrt(s:s / 2) <= cohesion + friction p, and p >= -tension."""
+
+    G: float  # shear modulus
+    cohesion: float
+    friction: float
+    dilation: float
+    tension: float
+
+
+class DruckerPragerSoftening(NamedTuple):
+    """The same, with strength that falls with plastic strain."""
+
+    G: float  # shear modulus
+    cohesion: float
+    friction: float
+    dilation: float
+    tension: float
+    residual_cohesion: float
+    residual_friction: float
+    over: float  # plastic strain at the end of softening
+
+
+give_friction(DruckerPrager)
+give_softening(DruckerPragerSoftening)
+
+
+@pressure_response.on(DruckerPrager)
+@pressure_response.on(DruckerPragerSoftening)
+def _(strength, kin, s, p, K, strain):
+    cohesion, friction, dilation = surface(strength, strain)
+    zero = real(0, p)
+    trial = sqrt(real(0.5, p) * contract(kin, s, s))
+    lowest = -strength.tension
+    if friction > 0:
+        lowest = max(lowest, -cohesion / friction)
+    f = trial - cohesion - friction * p
+    root = trial
+    if f > 0:
+        x = f / (strength.G + K * friction * dilation)
+        p += K * dilation * x
+        root = cohesion + friction * p
+        if p < lowest:
+            # Beyond the end of the cone: the trial pressure counts again, see below.
+            p -= K * dilation * x
+    if p < lowest:
+        p = lowest
+        root = min(trial, cohesion + friction * lowest)
+    if root < trial:
+        return scale(max(root, zero) / trial, s), p
+    return s, p

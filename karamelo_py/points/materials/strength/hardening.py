@@ -1,0 +1,94 @@
+"""What strengths of von Mises share: the radial return to a flow stress that hardens as it will."""
+
+from __future__ import annotations
+
+from karamelo_py.compile import point_function, real, round_off, shared
+from karamelo_py.points.kinematics import von_mises
+from karamelo_py.points.materials.strength import (
+    equivalent_plastic_strain,
+    initial_loss,
+    initial_memory,
+    shear_response,
+)
+from karamelo_py.points.materials.strength.elastic import elastic_trial, give_elastic_shear
+from karamelo_py.tensors import scale
+
+
+@point_function()
+def flow_stress(strength, strain, increment, heat, dt):
+    """Flow stress and its slope by `increment`, the part of the plastic strain of a step dt."""
+
+
+@shared
+def returned(trial, q, flow, memory, increment):
+    """Stress, memory and plastic work where the trial of von Mises stress q is above `flow`.
+
+    The deviatoric stress shrinks to flow/q of itself (Wilkins 1964).
+    """
+    return scale(flow / q, trial), (memory[0] + increment,), flow * increment
+
+
+# Newton's method takes three to five; bisection, where it has to step in, one for each bit.
+_MOST_ITERATIONS = 80
+
+
+@shared
+def plastic_increment(strength, q, strain, heat, dt):
+    """The plastic strain x of a step that solves q - 3 G x = flow stress, for q above it at 0.
+
+    The left side falls with x and the flow stress does not: there is one solution, whatever the
+    size of the step. Newton's method from above, kept within bounds by bisection.
+    """
+    half = real(0.5, q)
+    slope = real(3, q) * strength.G
+    low = real(0, q)
+    high = q / slope
+    first, _ = flow_stress(strength, strain, low, heat, dt)
+    x = (q - first) / slope
+    for _ in range(_MOST_ITERATIONS):
+        flow, hardening = flow_stress(strength, strain, x, heat, dt)
+        excess = q - slope * x - flow
+        if excess > 0:
+            low = x
+        else:
+            high = x
+        if abs(excess) <= round_off(q) * q:
+            break
+        x += excess / (slope + hardening)
+        if not (low < x < high):
+            x = half * (low + high)
+            if not (low < x < high):
+                break
+    return x
+
+
+def give_plastic_strain(strength: type) -> None:
+    """Give `strength` (with a field ``G``) elastic shear, and plastic strain as its memory."""
+    give_elastic_shear(strength)
+
+    @initial_memory.on(strength)
+    def _(strength, like):
+        return (real(0, like),)
+
+    @initial_loss.on(strength)
+    def _(strength, like):
+        return (real(0, like),)
+
+    @equivalent_plastic_strain.on(strength)
+    def _(strength, memory):
+        return memory[0]
+
+
+def give_hardening(strength: type) -> None:
+    """Give `strength` (with a field ``G`` and a `flow_stress`) the radial return."""
+    give_plastic_strain(strength)
+
+    @shear_response.on(strength)
+    def _(strength, kin, s, strain, memory, heat, dt):
+        trial = elastic_trial(kin, strength.G, s, strain)
+        q = von_mises(kin, trial)
+        flow, _ = flow_stress(strength, memory[0], real(0, q), heat, dt)
+        if q > flow:
+            x = plastic_increment(strength, q, memory[0], heat, dt)
+            return returned(trial, q, q - real(3, q) * strength.G * x, memory, x)
+        return trial, memory, real(0, q)

@@ -1,0 +1,1 @@
+"""Temperature of a material. One style a file, named as in the script."""

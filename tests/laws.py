@@ -1,0 +1,68 @@
+"""One point of a law, driven through strains; numbers of the tests of laws."""
+
+from __future__ import annotations
+
+import numpy as np
+from tensors import flat, symmetric_matrix
+
+from karamelo_py.points.materials import advance, cauchy_stress, kirchhoff_stress
+
+TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+
+
+def stretched(law, kin, state, full, steps, dt=1.0):
+    """The state after `steps` equal increments, each a (3, 3) velocity gradient times dt."""
+    dl = flat(kin, np.asarray(full, float))
+    for _ in range(steps):
+        state = advance(law, kin, state, dl, dt)
+    return state
+
+
+def closed_to(law, kin, state, j, steps=1, dt=1.0):
+    """The state when the volume ratio has come to `j` along x, from det F = state[0]."""
+    ratio = (j / state[0]) ** (1 / steps)
+    return stretched(law, kin, state, np.diag([ratio - 1, 0, 0]), steps, dt)
+
+
+def worked(law, kin, state, full, steps, dt=1.0):
+    """The state after `steps` increments, and the work by the mean of old and new stress."""
+    work = 0.0
+    full = np.asarray(full, float)
+    strain = (full + full.T) / 2
+    # The increment I + dl acts on a volume that grows on the way: tau : ln(I + dl) to 2nd order.
+    strain = strain - full @ full / 2
+    for _ in range(steps):
+        before = symmetric_matrix(kin, kirchhoff_stress(law, kin, state))
+        state = stretched(law, kin, state, full, 1, dt)
+        after = symmetric_matrix(kin, kirchhoff_stress(law, kin, state))
+        work += np.sum((before + after) / 2 * strain)
+    return state, work
+
+
+def stress(law, kin, state):
+    """(3, 3) Cauchy stress."""
+    return symmetric_matrix(kin, cauchy_stress(law, kin, state))
+
+
+def pressure_of(law, kin, state):
+    return -np.trace(stress(law, kin, state)) / 3
+
+
+def mises(law, kin, state):
+    full = stress(law, kin, state)
+    s = full - np.trace(full) / 3 * np.eye(3)
+    return np.sqrt(1.5 * np.sum(s * s))
+
+
+def integrated(rate, y, end, steps=20_000):
+    """y(end) of dy/dt = rate(t, y) from y at 0, by the classical method of Runge and Kutta."""
+    h = end / steps
+    y = np.asarray(y, float)
+    for k in range(steps):
+        t = k * h
+        a = rate(t, y)
+        b = rate(t + h / 2, y + h / 2 * a)
+        c = rate(t + h / 2, y + h / 2 * b)
+        d = rate(t + h, y + h * c)
+        y = y + h / 6 * (a + 2 * b + 2 * c + d)
+    return y

@@ -1,0 +1,277 @@
+"""Strengths of metals and their heating: one point against closed forms and integrations."""
+
+from __future__ import annotations
+
+from math import log, sqrt
+
+import numpy as np
+import pytest
+from laws import TURN, integrated, mises, stress, stretched, worked
+from tensors import ALL_KINEMATICS, symmetric_flat
+
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.materials import (
+    advance,
+    dissipated_energy,
+    energy_density,
+    initial_state,
+    kirchhoff_stress,
+    plastic_strain,
+    temperature,
+    with_stress,
+    with_temperature,
+)
+from karamelo_py.points.materials.eos.linear import LinearPressure
+from karamelo_py.points.materials.eos_strength import EosStrength
+from karamelo_py.points.materials.strength.johnson_cook import JohnsonCook
+from karamelo_py.points.materials.strength.plastic import LinearHardening, Plastic
+from karamelo_py.points.materials.strength.swift import Swift
+from karamelo_py.points.materials.temperatures.plastic_work import PlasticWork
+
+RHO, K, G = 8.0, 160.0, 80.0
+EOS = LinearPressure(1 / RHO, K)
+A, B, N, RATE0, C, M, TR, TM = 0.4, 0.3, 0.3, 1.0, 0.05, 1.1, 300.0, 1300.0
+COOK = JohnsonCook(G, A, B, N, RATE0, C, M, TR, TM)
+HARDENING = LinearHardening(G, 0.4, 2.0)
+SWIFT = Swift(G, 0.4, 0.5, 0.002, 0.5)
+HEAT = PlasticWork(0.9, 0.5, 0.0, 0.0, TR, TM)
+every_kinematics = pytest.mark.parametrize(
+    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
+)
+every_strength = pytest.mark.parametrize(
+    "strength", [Plastic(G, 0.4), HARDENING, SWIFT, COOK], ids=lambda s: type(s).__name__
+)
+
+
+def start(law, kin):
+    return initial_state(law, kin, 1.0)
+
+
+def isochoric(e):
+    return np.diag([e, -e / 2, -e / 2])
+
+
+def static_flow(strength, ep):
+    """Flow stress at the reference rate and temperature, as published."""
+    if isinstance(strength, Plastic):
+        return strength.yield_stress
+    if isinstance(strength, LinearHardening):
+        return strength.yield_stress + strength.H * ep
+    if isinstance(strength, Swift):
+        return strength.A + strength.B * max(ep - strength.C, 0) ** strength.n
+    return strength.A + strength.B * ep**strength.n
+
+
+@every_kinematics
+@every_strength
+@pytest.mark.parametrize("steps", [1, 20])
+def test_stress_ends_on_the_yield_surface(strength, kin, steps):
+    """After increments of any size: q = Y(ep), and q + 3 G ep is what it were without yield."""
+    law = EosStrength(EOS, strength)
+    e = -0.03 / steps
+    # Slower than the reference rate.
+    state = stretched(law, kin, start(law, kin), np.diag([e, 0, 0]), steps, 1e3)
+    ep = plastic_strain(law, kin, state)
+    assert ep > 0.015
+    assert mises(law, kin, state) == pytest.approx(static_flow(strength, ep), rel=1e-12)
+    assert mises(law, kin, state) + 3 * G * ep == pytest.approx(2 * G * 0.03, rel=1e-12)
+
+
+@pytest.mark.parametrize("kin", [PlaneStrain(), Axisymmetric(), Space()])
+@every_strength
+def test_simple_shear(strength, kin):
+    """s_xy = Y(ep)/sqrt(3), ep = (gamma - s_xy/G)/sqrt(3), but for the turn, of order gamma."""
+    law = EosStrength(EOS, strength)
+    shear = np.zeros((3, 3))
+    shear[0, 1] = 1e-4
+    state = stretched(law, kin, start(law, kin), shear, 200, 1e3)
+    ep = plastic_strain(law, kin, state)
+    s = static_flow(strength, ep) / sqrt(3)
+    assert ep == pytest.approx((0.02 - s / G) / sqrt(3), rel=1e-3)
+    assert stress(law, kin, state)[0, 1] == pytest.approx(s, rel=1e-3)
+
+
+@every_strength
+def test_unloading_is_elastic(strength):
+    law, kin = EosStrength(EOS, strength), Axisymmetric()
+    state = stretched(law, kin, start(law, kin), isochoric(1e-3), 20, 1e3)
+    ep, q = plastic_strain(law, kin, state), mises(law, kin, state)
+    back = stretched(law, kin, state, isochoric(-q / G / 6), 1, 1e3)  # q falls by 3 G e
+    assert plastic_strain(law, kin, back) == ep
+    assert mises(law, kin, back) == pytest.approx(q / 2, rel=1e-9)
+    further = stretched(law, kin, back, isochoric(-q / G), 1, 1e3)
+    assert plastic_strain(law, kin, further) > ep
+
+
+def test_swift_has_a_plateau():
+    law, kin = EosStrength(EOS, SWIFT), Axisymmetric()
+    state = stretched(law, kin, start(law, kin), isochoric(1e-4), 30)
+    assert 0 < plastic_strain(law, kin, state) < 0.002
+    assert mises(law, kin, state) == pytest.approx(0.4, rel=1e-12)
+    prestrained = EosStrength(EOS, SWIFT._replace(C=-0.01))
+    state = stretched(prestrained, kin, start(law, kin), isochoric(1e-2), 1)
+    assert mises(prestrained, kin, state) > 0.4 + 0.5 * 0.01**0.5
+
+
+@pytest.mark.parametrize("rate", [1e-6, 0.5, 1.0])
+def test_up_to_the_reference_rate_the_factor_is_one(rate):
+    """In rigid-plastic flow the plastic rate is the strain rate, here with a long yielded past."""
+    law, kin = EosStrength(EOS, COOK._replace(B=0.0)), Axisymmetric()
+    state = stretched(law, kin, start(law, kin), isochoric(1e-2), 10, 1e-2 / rate)
+    assert mises(law, kin, state) == pytest.approx(A, rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", [10.0, 1e4])
+def test_factor_of_the_rate(rate):
+    """1 + C ln(rate/epsdot0) (Johnson & Cook 1983) where flow is steady."""
+    law, kin = EosStrength(EOS, COOK._replace(B=0.0)), Axisymmetric()
+    state = stretched(law, kin, start(law, kin), isochoric(1e-2), 10, 1e-2 / rate)
+    assert mises(law, kin, state) == pytest.approx(A * (1 + C * log(rate)), rel=1e-12)
+
+
+def test_factor_of_the_temperature():
+    """1 - T*^m above Tr, 1 below, 0 from Tm on; without temperature 1."""
+    law, kin = EosStrength(EOS, COOK, temperature=HEAT._replace(chi=0.0)), Axisymmetric()
+    flow = []
+    for T in (0.0, 300.0, 800.0, 1300.0, 2000.0):
+        state = with_temperature(law, kin, start(law, kin), T)
+        state = stretched(law, kin, state, isochoric(1e-2), 1, 1e3)
+        ep = plastic_strain(law, kin, state)
+        flow.append(mises(law, kin, state) / static_flow(COOK, ep))
+        assert temperature(law, kin, state) == T
+    assert flow == pytest.approx([1, 1, 1 - 0.5**M, 0, 0], rel=1e-12, abs=1e-12)
+    never = EosStrength(EOS, COOK._replace(m=0.0), temperature=HEAT)
+    state = with_temperature(never, kin, start(never, kin), 800.0)
+    state = stretched(never, kin, state, isochoric(1e-2), 1, 1e3)
+    ep = plastic_strain(never, kin, state)
+    assert mises(never, kin, state) == pytest.approx(static_flow(COOK, ep), rel=1e-12)
+
+
+def cook_in_time(rate, end):
+    """q, ep and T of uniaxial isochoric strain at a rate, integrated in time.
+
+    While q is above the flow stress at the reference rate, the overstress gives the plastic rate:
+    q = Y exp... solved for it: rate_p = epsdot0 exp((q/Y0 - 1)/C); below the reference rate flow is
+    rate independent, which the strain rate of this test is far above.
+    """
+
+    def slope(t, y):
+        q, ep, T = y
+        star = min(max((T - TR) / (TM - TR), 0), 1)
+        Y = (A + B * max(ep, 1e-30) ** N) * (1 - star**M)
+        flow = RATE0 * np.exp((q / Y - 1) / C) if q > Y else 0.0
+        return np.array([3 * G * (rate - flow), flow, HEAT.chi * q * flow / (RHO * HEAT.cp)])
+
+    return integrated(slope, (0.0, 0.0, TR), end, 40_000)
+
+
+def test_johnson_cook_against_an_integration_in_time():
+    """Rate, hardening and heat together; the error of 400 steps is half that of 200."""
+    law, kin, rate, end = EosStrength(EOS, COOK, temperature=HEAT), Axisymmetric(), 100.0, 3e-3
+    q, ep, T = cook_in_time(rate, end)
+    errors = []
+    for steps in (200, 400):
+        dt = end / steps
+        # ln(1 + e) of the increments would shrink the volume: deviators only count here.
+        state = stretched(law, kin, start(law, kin), isochoric(rate * dt), steps, dt)
+        assert mises(law, kin, state) == pytest.approx(q, rel=2e-3)
+        assert plastic_strain(law, kin, state) == pytest.approx(ep, rel=2e-3)
+        errors.append(abs(plastic_strain(law, kin, state) - ep))
+        found = temperature(law, kin, state)
+    assert found == pytest.approx(T, rel=2e-3)
+    assert errors[1] < 0.65 * errors[0]
+
+
+def test_adiabatic_heating():
+    """T = T0 + chi/(rho cp) times the integral of the flow stress: closed for linear hardening."""
+    law, kin = EosStrength(EOS, HARDENING, temperature=HEAT), Axisymmetric()
+    steps = 2000
+    state = stretched(law, kin, start(law, kin), isochoric(0.5 / steps), steps)
+    ep = plastic_strain(law, kin, state)
+    plastic_work = 0.4 * ep + 2.0 * ep**2 / 2
+    expected = TR + HEAT.chi / (RHO * HEAT.cp) * plastic_work
+    assert temperature(law, kin, state) - TR == pytest.approx(expected - TR, rel=1e-3)
+    assert dissipated_energy(law, kin, state) == pytest.approx(plastic_work, rel=1e-3)
+
+
+def test_no_heating_from_the_melting_temperature_on():
+    law, kin = EosStrength(EOS, HARDENING, temperature=HEAT), Axisymmetric()
+    state = with_temperature(law, kin, start(law, kin), TM)
+    state = stretched(law, kin, state, isochoric(0.01), 10)
+    assert temperature(law, kin, state) == TM
+
+
+@every_strength
+@pytest.mark.parametrize("heat", [False, True])
+def test_a_quarter_turn(strength, heat):
+    """The stress turns with the point, and nothing flows or heats."""
+    law = EosStrength(EOS, strength, temperature=HEAT) if heat else EosStrength(EOS, strength)
+    kin, steps = Space(), 200
+    loading = isochoric(1e-3) + 1e-3 * (np.eye(3, k=1) + np.eye(3, k=-1))
+    state = stretched(law, kin, start(law, kin), loading, 5, 1e3)
+    full = stress(law, kin, state)
+    mean = np.trace(full) / 3 * np.eye(3)
+    inside = mean + 0.999 * (full - mean)
+    state = with_stress(law, kin, state, symmetric_flat(kin, inside))
+    w = np.zeros((3, 3))
+    w[1, 0] = np.pi / 2 / steps
+    turned = stretched(law, kin, state, w - w.T, steps, 1e3)
+    assert plastic_strain(law, kin, turned) == plastic_strain(law, kin, state) > 0
+    found = stress(law, kin, turned)
+    apart = found - np.trace(found) / 3 * np.eye(3)
+    assert apart == pytest.approx(TURN @ (inside - mean) @ TURN.T, abs=1e-6)
+
+
+@every_strength
+def test_work_is_stored_or_dissipated(strength):
+    """Stored + dissipated = work, to the order of the step: twice the steps, half the error."""
+    law, kin, errors = EosStrength(EOS, strength), Space(), []
+    loading = np.diag([0.01, -0.004, -0.003]) + 0.004 * np.eye(3, k=1)
+    for steps in (50, 100, 200):
+        state, work = worked(law, kin, start(law, kin), loading / steps, steps, 1e3)
+        stored, lost = energy_density(law, kin, state), dissipated_energy(law, kin, state)
+        assert lost > stored > 0
+        errors.append(abs(stored + lost - work) / work)
+    # J and the sum of the strain increments differ by squares of strain: 4e-4 stay.
+    assert errors[2] < 6e-4 and errors[2] < 0.6 * errors[0] < 1e-3
+
+
+@every_strength
+def test_large_increments_converge(strength):
+    """1, 10, 100 increments to 10 % strain at once end alike: at once is within 5 % of ep."""
+    law, kin, found = EosStrength(EOS, strength), Axisymmetric(), []
+    for steps in (1, 10, 100, 1000):
+        state = stretched(law, kin, start(law, kin), isochoric(0.1 / steps), steps, 1e3 / steps)
+        found.append((plastic_strain(law, kin, state), mises(law, kin, state)))
+    # Radial loading: the return to a hardening surface has no error of the step at all.
+    for ep, q in found:
+        assert ep == pytest.approx(found[-1][0], rel=1e-9)
+        assert q == pytest.approx(found[-1][1], rel=1e-9)
+
+
+def test_line_has_the_same_numbers():
+    law = EosStrength(EOS, COOK)
+    one, three = (
+        stretched(law, kin, start(law, kin), np.diag([-1e-3, 0, 0]), 30, 1e-3)
+        for kin in (Line(), Space())
+    )
+    assert kirchhoff_stress(law, Line(), one) == pytest.approx(
+        kirchhoff_stress(law, Space(), three)[:3], rel=1e-14
+    )
+    assert plastic_strain(law, Line(), one) == pytest.approx(plastic_strain(law, Space(), three))
+
+
+def test_single_precision():
+    """Newton's method ends in single precision, too, and the numbers stay in it."""
+    law = EosStrength(EOS, COOK)
+    single = EosStrength(*(type(p)(*(np.float32(x) for x in p)) if p else p for p in law))
+    kin = Axisymmetric()
+    state = initial_state(single, kin, np.float32(1))
+    dl = tuple(np.float32(x) for x in (1e-2, 0, 0, -0.5e-2, -0.5e-2))
+    for _ in range(10):
+        state = advance(single, kin, state, dl, np.float32(1e-3))
+    assert all(isinstance(x, np.float32) for x in state)
+    double = stretched(law, kin, start(law, kin), np.diag([1e-2, -5e-3, -5e-3]), 10, 1e-3)
+    assert float(plastic_strain(single, kin, state)) == pytest.approx(
+        plastic_strain(law, kin, double), rel=1e-4
+    )

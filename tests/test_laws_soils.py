@@ -1,0 +1,390 @@
+"""Strengths of soils: yield surfaces, edges and apex, triaxial strength, dilatancy, softening."""
+
+from __future__ import annotations
+
+from math import cos, log, radians, sin, sqrt, tan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from laws import TURN, stress, stretched, worked
+from tensors import ALL_KINEMATICS, flat, symmetric_flat, symmetric_matrix, symmetric_tensors
+
+from karamelo_py.points.kinematics import (
+    Axisymmetric,
+    PlaneStrain,
+    Space,
+    from_principal,
+    principal,
+)
+from karamelo_py.points.materials import (
+    advance,
+    dissipated_energy,
+    elastic_strain,
+    energy_density,
+    initial_state,
+    jacobian,
+    plastic_strain,
+    with_stress,
+)
+from karamelo_py.points.materials.eos.linear import LinearPressure
+from karamelo_py.points.materials.eos.shock import Shock
+from karamelo_py.points.materials.eos_strength import EosStrength
+from karamelo_py.points.materials.strength.mohr_coulomb import returned_to_plane
+from karamelo_py.strengths.drucker_prager import DruckerPrager
+from karamelo_py.strengths.mohr_coulomb import MohrCoulomb
+
+RHO, K, G = 2.0, 100.0, 60.0
+COHESION, PHI, PSI = 0.3, 30.0, 10.0
+EOS = LinearPressure(1 / RHO, K)
+every_kinematics = pytest.mark.parametrize(
+    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
+)
+FITS = ("compression", "extension", "plane-strain")
+
+
+def mohr(c=COHESION, phi=PHI, psi=PSI, **options):
+    return EosStrength(EOS, MohrCoulomb(None, G, c, phi, psi, **options).law)
+
+
+def drucker(c=COHESION, phi=PHI, psi=PSI, **options):
+    return EosStrength(EOS, DruckerPrager(None, G, c, phi, psi, **options).law)
+
+
+LAWS = [mohr(), mohr(psi=0), mohr(phi=0, psi=0), mohr(c=0), drucker(), drucker(fit="plane-strain")]
+every_law = pytest.mark.parametrize("law", LAWS, ids=range(len(LAWS)))
+
+
+def start(law, kin):
+    return initial_state(law, kin, 1.0)
+
+
+def mohr_excess(full, c=COHESION, phi=PHI):
+    """s1 - s3 + (s1 + s3) sin(phi) - 2 c cos(phi)."""
+    s = np.linalg.eigvalsh(full)
+    a = radians(phi)
+    return s[2] - s[0] + (s[2] + s[0]) * sin(a) - 2 * c * cos(a)
+
+
+def drucker_excess(full, strength):
+    p = -np.trace(full) / 3
+    s = full + p * np.eye(3)
+    return sqrt(np.sum(s * s) / 2) - strength.cohesion - strength.friction * p
+
+
+def excess(law, full):
+    if "Mohr" in type(law.strength).__name__:
+        s = np.linalg.eigvalsh(full)
+        return s[2] - s[0] + (s[2] + s[0]) * law.strength.friction - 2 * law.strength.cohesion
+    return drucker_excess(full, law.strength)
+
+
+@every_kinematics
+@given(data=st.data())
+def test_principal_values(kin, data):
+    """Values are eigenvalues, and the tensor comes back; also where some are nearly equal."""
+    s = data.draw(symmetric_tensors(kin))
+    for t in (s, (1.0, 1.0, 1.0) + s[3:], (1.0, 1.0, 1.0) + tuple(1e-9 * x for x in s[3:])):
+        values, frame = principal(kin, t)
+        known = np.linalg.eigvalsh(symmetric_matrix(kin, t))
+        assert np.sort(values) == pytest.approx(known, abs=4e-16 * 8)
+        assert from_principal(kin, values, frame) == pytest.approx(t, abs=2e-15)
+
+
+@every_kinematics
+@every_law
+@given(data=st.data())
+def test_stress_ends_within_the_surface(law, kin, data):
+    """From any stress inside, by any increment: on the surface to 1e-11 of the stress, or inside.
+
+    What is plastic is on it: nothing flows inside.
+    """
+    direction = np.array(data.draw(symmetric_tensors(kin)))
+    state, e = start(law, kin), data.draw(st.floats(1e-4, 0.03))
+    full = symmetric_matrix(kin, tuple(direction))
+    if kin.dimension == 1:
+        full = np.diag([full[0, 0], 0, 0])
+    elif isinstance(kin, PlaneStrain):
+        full[2, 2] = 0
+    for sign in (1, -0.5, 1.5):
+        before = plastic_strain(law, kin, state)
+        state = stretched(law, kin, state, sign * e * full, 2)
+        found = stress(law, kin, state)
+        scale = max(1.0, np.abs(found).max())
+        assert excess(law, found) < 1e-12 * scale * 10
+        if plastic_strain(law, kin, state) > before + 1e-9:
+            last = stretched(law, kin, state, sign * e * full, 1)
+            if plastic_strain(law, kin, last) > plastic_strain(law, kin, state):
+                found = stress(law, kin, last)
+                scale = max(1.0, np.abs(found).max())
+                assert abs(excess(law, found)) < 1e-12 * scale * 10
+
+
+def triaxial(law, radial, steps=400, rate=-2e-4):
+    """Axial stress at failure in a triaxial test: constant radial stress, by axial strain.
+
+    The radial strain that keeps the radial stress is found by the secant method in each step.
+    """
+    kin = Axisymmetric()
+    state = with_stress(law, kin, start(law, kin), (-radial, -radial, -radial, 0.0))
+
+    def tried(r):
+        new = stretched(law, kin, state, np.diag([r, rate, r]), 1)
+        return new, stress(law, kin, new)[0, 0] + radial
+
+    for _ in range(steps):
+        a, b = 0.0, -rate / 2
+        fa, fb = tried(a)[1], tried(b)[1]
+        for _ in range(60):
+            if fb == fa:
+                break
+            a, fa, b = b, fb, b - fb * (b - a) / (fb - fa)
+            fb = tried(b)[1]
+            if abs(fb) < 1e-13:
+                break
+        state = tried(b)[0]
+    return stress(law, kin, state)[1, 1], state
+
+
+@pytest.mark.parametrize("radial", [0.0, 0.5, 2.0])
+def test_triaxial_compression(radial):
+    """Fails at N sigma3 + 2 c sqrt(N), N = (1 + sin)/(1 - sin); the compression cone agrees."""
+    N = (1 + sin(radians(PHI))) / (1 - sin(radians(PHI)))
+    strength = N * radial + 2 * COHESION * sqrt(N)
+    for law in (mohr(psi=0), mohr(), drucker(), mohr(psi=PHI)):
+        axial, state = triaxial(law, radial)
+        assert plastic_strain(law, Axisymmetric(), state) > 0
+        assert -axial == pytest.approx(strength, rel=1e-9)
+
+
+@pytest.mark.parametrize("radial", [2.0, 3.0])
+def test_triaxial_extension(radial):
+    """Fails where the axial stress falls to (sigma3 - 2 c sqrt(N))/N; the extension cone agrees."""
+    N = (1 + sin(radians(PHI))) / (1 - sin(radians(PHI)))
+    strength = (radial - 2 * COHESION * sqrt(N)) / N
+    for law in (mohr(psi=0), mohr(), drucker(fit="extension", psi=0)):
+        axial, _ = triaxial(law, radial, rate=2e-4)
+        assert -axial == pytest.approx(strength, rel=1e-9)
+
+
+def test_plane_strain_cone():
+    """Flow in plane strain without dilatancy ends where Mohr-Coulomb ends, for psi = phi.
+
+    The plane-strain cone is made for the limit load of associated flow (Drucker & Prager 1952).
+    """
+    kin, ends = PlaneStrain(), []
+    for law in (mohr(psi=PHI), drucker(fit="plane-strain", psi=PHI)):
+        state = with_stress(law, kin, start(law, kin), (-2.0, -2.0, -2.0, 0.0))
+        # Pure shear at a constant mean stress in the plane: dilate as flow does.
+        for _ in range(600):
+            a, b = 0.0, 1e-5
+
+            def mean(v, state=state, law=law):
+                new = stretched(law, kin, state, np.diag([2e-4 + v, -2e-4 + v, 0]), 1)
+                full = stress(law, kin, new)
+                return (full[0, 0] + full[1, 1]) / 2 + 2.0
+
+            fa, fb = mean(a), mean(b)
+            for _ in range(50):
+                if fa == fb or abs(fb) < 1e-13:
+                    break
+                a, fa, b = b, fb, b - fb * (b - a) / (fb - fa)
+                fb = mean(b)
+            state = stretched(law, kin, state, np.diag([2e-4 + b, -2e-4 + b, 0]), 1)
+        full = stress(law, kin, state)
+        ends.append(full[0, 0] - full[1, 1])
+    limit = 2 * (COHESION * cos(radians(PHI)) + 2.0 * sin(radians(PHI)))
+    assert ends == pytest.approx([limit, limit], rel=1e-6)
+
+
+def test_tension_ends_at_the_apex():
+    """p = -c cot(phi), without shear; Mohr-Coulomb's apex and that of every cone."""
+    apex = COHESION / tan(radians(PHI))
+    for law in (
+        mohr(),
+        mohr(psi=0),
+        *(drucker(fit=fit, psi=psi) for fit in FITS for psi in (0, 5)),
+    ):
+        for kin in (Axisymmetric(), Space()):
+            loading = np.diag([0.02, 0.015, 0.018])
+            state = stretched(law, kin, start(law, kin), loading, 3)
+            assert stress(law, kin, state) == pytest.approx(apex * np.eye(3), abs=1e-12)
+            # The volume is plastic: a little compression loads at once, no gap has to close.
+            back = stretched(law, kin, state, -1e-3 * np.eye(3), 1)
+            assert np.trace(stress(law, kin, back)) / 3 < apex - 0.9 * 3 * K * 1e-3 * 0.9
+
+
+def test_tension_cut_off():
+    """With shear as much as the cone has there."""
+    law, kin = drucker(tension=0.1), Space()
+    state = stretched(law, kin, start(law, kin), np.diag([0.02, 0.001, -0.003]), 5)
+    full = stress(law, kin, state)
+    assert np.trace(full) / 3 == pytest.approx(0.1, rel=1e-12)
+    assert drucker_excess(full, law.strength) == pytest.approx(0, abs=1e-12)
+    small = stretched(law, kin, start(law, kin), np.diag([0.02, 0.02, 0.0201]), 5)
+    assert np.trace(stress(law, kin, small)) / 3 == pytest.approx(0.1, rel=1e-12)
+    assert drucker_excess(stress(law, kin, small), law.strength) < -0.05
+
+
+@given(
+    s=st.tuples(*[st.floats(-5, 5, allow_subnormal=False)] * 3),
+    phi=st.floats(0, 60),
+    share=st.floats(0, 1),
+    c=st.floats(0.01, 2),
+)
+def test_the_return_is_the_closest_point(s, phi, share, c):
+    """On the surface, in order, and by a flow of nonnegative multiples (Koiter 1953).
+
+    The plastic strain D^-1 (trial - new) is a sum of the normals of the planes that are active,
+    with factors that are not negative; at the apex the sum is over all six.
+    """
+    a, b = radians(phi), radians(phi * share)
+    k, sa, sb = c * cos(a), sin(a), sin(b)
+    trial = tuple(sorted(s, reverse=True))
+    if trial[0] - trial[2] + (trial[0] + trial[2]) * sa - 2 * k <= 1e-9:
+        return
+    t = np.array(returned_to_plane(trial, k, sa, sb, G, K))
+    assert t[0] >= t[1] - 1e-12 and t[1] >= t[2] - 1e-12
+    assert t[0] - t[2] + (t[0] + t[2]) * sa - 2 * k == pytest.approx(0, abs=1e-11)
+    gap = np.array(trial) - t
+    mean = gap.mean()
+    flow = (gap - mean) / (2 * G) + mean / (3 * K)
+    if t[0] - t[2] < 1e-9:
+        return  # the apex; which flow leads there has no rule for psi below phi
+    m13 = np.array([1 + sb, 0, sb - 1])
+    m23, m12 = np.array([0, 1 + sb, sb - 1]), np.array([1 + sb, sb - 1, 0])
+    planes = [m13]
+    if t[0] - t[1] < 1e-9:
+        planes.append(m23)
+    if t[1] - t[2] < 1e-9:
+        planes.append(m12)
+    factors, *_ = np.linalg.lstsq(np.array(planes).T, flow, rcond=None)
+    assert np.array(planes).T @ factors == pytest.approx(flow, abs=1e-11)
+    assert factors.min() > -1e-11
+
+
+@pytest.mark.parametrize("make", [mohr, drucker])
+def test_dilatancy(make):
+    """Plastic volume grows by sin(psi) (Mohr-Coulomb, plane strain) of the plastic shear.
+
+    In shear of a constant volume the pressure that this makes is K times it, and J stays: the
+    elastic J takes it.
+    """
+    law, kin = make(c=0.3, phi=0.001, psi=0.001), PlaneStrain()
+    state = stretched(law, kin, start(law, kin), np.diag([1e-4, -1e-4, 0]), 100)
+    assert stress(law, kin, state).trace() == pytest.approx(0, abs=3e-3)
+    law = make(psi=PSI)
+    state = with_stress(law, kin, start(law, kin), (-1.0, -1.0, -1.0, 0.0))
+    j = jacobian(law, kin, state)
+    new = stretched(law, kin, state, np.diag([1e-5, -1e-5, 0]), 1000)
+    assert jacobian(law, kin, new) == pytest.approx(j, rel=1e-6)
+    p = -stress(law, kin, new).trace() / 3
+    elastic = sum(elastic_strain(law, kin, new)[:3])
+    assert p == pytest.approx(K * (1 - np.exp(elastic)), rel=1e-9)
+    plastic_volume = log(j) - elastic
+    assert plastic_volume > 0
+    if make is mohr:
+        full = stress(law, kin, new)
+        shear = (2e-2 - (full[0, 0] - full[1, 1]) / (2 * G)) / 2 * 2
+        assert plastic_volume == pytest.approx(sin(radians(PSI)) * shear, rel=2e-3)
+    none = make(psi=0)
+    state = with_stress(none, kin, start(none, kin), (-1.0, -1.0, -1.0, 0.0))
+    new = stretched(none, kin, state, np.diag([1e-5, -1e-5, 0]), 1000)
+    assert stress(none, kin, new).trace() / 3 == pytest.approx(-1.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("make", [mohr, drucker])
+def test_softening_to_the_residual_strength(make):
+    """Half way the mean of peak and residual, in the end the residual."""
+    law = make(psi=0, residual_cohesion=0.1, residual_phi=20, softening=0.05)
+    peak, rest = make(psi=0), make(c=0.1, phi=20, psi=0)
+    kin = PlaneStrain()
+    state = with_stress(law, kin, start(law, kin), (-1.0, -1.0, -1.0, 0.0))
+    e = 2e-5
+    while plastic_strain(law, kin, state) < 0.025:
+        state = stretched(law, kin, state, np.diag([e, -e, 0]), 1)
+    half = stress(law, kin, state)
+    assert excess(peak, half) < 0 < excess(rest, half)
+    mean = law._replace(
+        strength=peak.strength._replace(
+            cohesion=(peak.strength.cohesion + rest.strength.cohesion) / 2,
+            friction=(peak.strength.friction + rest.strength.friction) / 2,
+        )
+    )
+    assert excess(mean, half) == pytest.approx(0, abs=1e-3)
+    state = stretched(law, kin, state, np.diag([e, -e, 0]), 4000)
+    assert plastic_strain(law, kin, state) > 0.06
+    assert excess(rest, stress(law, kin, state)) == pytest.approx(0, abs=1e-12)
+
+
+def test_softening_converges_with_the_step():
+    law, kin, found = mohr(residual_cohesion=0.05, softening=0.02), PlaneStrain(), []
+    for steps in (50, 100, 200, 1600):
+        state = with_stress(law, kin, start(law, kin), (-1.0, -1.0, -1.0, 0.0))
+        state = stretched(law, kin, state, np.diag([0.01, -0.01, 0]) / steps, steps)
+        found.append(stress(law, kin, state)[0, 0])
+    errors = np.abs(np.array(found[:-1]) - found[-1])
+    assert errors[2] < 0.6 * errors[1] < 0.4 * errors[0]
+
+
+@every_law
+def test_work_is_stored_or_dissipated(law):
+    """Stored + dissipated = work, to the order of the step; nothing is dissipated below 0."""
+    kin, errors = Space(), []
+    loading = np.diag([0.012, -0.015, 0.001]) + 0.004 * np.eye(3, k=1)
+    for steps in (100, 400):
+        begin = with_stress(law, kin, start(law, kin), (-0.5, -0.5, -0.5, 0.0, 0.0, 0.0))
+        state, work = worked(law, kin, begin, loading / steps, steps)
+        stored = energy_density(law, kin, state) - energy_density(law, kin, begin)
+        lost = dissipated_energy(law, kin, state)
+        assert lost > 0
+        errors.append(abs(stored + lost - work) / work)
+    # J and the sum of the strain increments differ by squares of strain: 4e-4 stay.
+    assert errors[1] < 1e-3 and errors[0] < 3e-3
+
+
+@every_law
+def test_a_quarter_turn(law):
+    """The stress turns with the point, and nothing flows.
+
+    The increments I + w swell the volume by w^2, 1 % in all, which takes a pressure of 1.2.
+    """
+    kin, steps = Space(), 200
+    inside = np.array([[-9.2, 0.1, 0.05], [0.1, -9.0, 0.02], [0.05, 0.02, -8.9]])
+    state = with_stress(law, kin, start(law, kin), symmetric_flat(kin, inside))
+    w = np.zeros((3, 3))
+    w[1, 0] = np.pi / 2 / steps
+    turned = stretched(law, kin, state, w - w.T, steps)
+    assert plastic_strain(law, kin, turned) == 0
+    found = stress(law, kin, turned)
+    apart = found - np.trace(found) / 3 * np.eye(3)
+    expected = TURN @ (inside - np.trace(inside) / 3 * np.eye(3)) @ TURN.T
+    assert apart == pytest.approx(expected, abs=1e-6)
+
+
+def test_with_a_nonlinear_equation_of_state():
+    """The return lands on the surface with the pressure that the curve gives its elastic J."""
+    eos = Shock(1 / RHO, K, 1.5, 0.0, 0.0)
+    law, kin = EosStrength(eos, mohr().strength), Space()
+    state = stretched(law, kin, start(law, kin), np.diag([-0.03, 0.02, 0.002]), 4)
+    assert plastic_strain(law, kin, state) > 0
+    full = stress(law, kin, state)
+    assert mohr_excess(full) == pytest.approx(0, abs=1e-12 * np.abs(full).max() * 4)
+
+
+def test_single_precision():
+    kin = Space()
+    for law in LAWS:
+        eos, strength = (type(p)(*(np.float32(x) for x in p)) for p in law[:2])
+        single = EosStrength(eos, strength)
+        state = initial_state(single, kin, np.float32(1))
+        full = np.diag([1e-3, -2e-3, 1e-4]) + 1e-3 * np.eye(3, k=1)
+        dl = tuple(np.float32(x) for x in flat(kin, full))
+        for _ in range(10):
+            state = advance(single, kin, state, dl, np.float32(1))
+        assert all(isinstance(x, np.float32) for x in state)
+        double = stretched(law, kin, start(law, kin), full, 10)
+        assert float(plastic_strain(single, kin, state)) == pytest.approx(
+            plastic_strain(law, kin, double), rel=1e-2
+        )
