@@ -101,14 +101,17 @@ class _NoCollections(event.Listener):
     """While Numba compiles, Python's collector of cycles would walk its many objects in vain."""
 
     depth = 0
+    was_on = False
 
     def on_start(self, event: Any) -> None:
+        if self.depth == 0:
+            self.was_on = gc.isenabled()
         self.depth += 1
         gc.disable()
 
     def on_end(self, event: Any) -> None:
         self.depth -= 1
-        if self.depth == 0:
+        if self.depth == 0 and self.was_on:
             gc.enable()
 
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from karamelo_py import boundary
 from karamelo_py.kernels.arrays import (
-    COURANT,
     DRIFT,
     LIGHTEST,
     SPACING,
@@ -112,10 +111,14 @@ def thread_count(hub: Hub, points: int) -> int:
 
 
 def stable_courant(hub: Hub) -> float:
-    """The stable step as a share of cell size over wave speed, by the scheme and the points."""
-    two, one = hub.update.scheme.courant
+    """The stable step as a share of cell size over wave speed, by scheme, basis and points."""
+    scheme, basis = hub.update.scheme, hub.update.method.basis
+    two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
+    if min(two, one) == 1:
+        return 1.0
     sparse = any(2 * np.max(solid.half_size) > 0.75 * solid.h for solid in hub.solids.values())
-    return one if sparse else two
+    # Nodes between the corners of cells make the highest frequency higher.
+    return (one if sparse else two) * (0.7 if basis.nodes_per_cell > 1 else 1)
 
 
 def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
@@ -133,7 +136,6 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         method.resume(contact, previous.contact)
     control = Control(hub.values.array, np.zeros(12), np.zeros(4, np.int64))
     control.real[SPACING] = min(lattice.h for lattice in lattices)
-    control.real[COURANT] = stable_courant(hub)
     control.real[DRIFT] = np.inf  # the points are not sorted yet
     needs = Needs(
         moment=transfer.keeps_moment,
@@ -157,7 +159,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         spans=tiles.empty_spans(),
         control=control,
     )
-    if basis.gradient_jumps:
+    if basis.steep_edge:
         lightest = min(float(s.mass.astype(real).min()) for s in hub.solids.values())
         control.real[LIGHTEST] = lightest
     return setup, tiles

@@ -13,44 +13,59 @@ from llvmlite import binding as llvm
 from numba.core import codegen
 
 
-class _Melting(codegen.JITCodeLibrary):
-    """The code of one compiled function and of all that it calls."""
-
-    def _melts(self) -> bool:
-        """Whether all that this library itself defines (not what it links in) is always inlined."""
-        own = [
-            function
-            for function in self._final_module.functions
-            if not function.is_declaration and function.linkage == llvm.Linkage.external
-        ]
-        return bool(own) and all(
-            any(b"alwaysinline" in attribute for attribute in function.attributes)
-            for function in own
-        )
-
-    def _optimize_functions(self, ll_module) -> None:
-        # What callers contain is optimised as a whole there.
-        ll_module.data_layout = self._codegen._data_layout
-
-    def _optimize_final_module(self) -> None:
-        if not self._melts():
-            super()._optimize_final_module()
-
-    def _finalize_final_module(self) -> None:
-        if self._melts():
-            self._finalized = True
-        else:
-            super()._finalize_final_module()
+def _own_functions(library: codegen.JITCodeLibrary) -> list:
+    """What a library itself defines, without what it links in."""
+    functions = library._final_module.functions
+    return [f for f in functions if not f.is_declaration and f.linkage == llvm.Linkage.external]
 
 
-def _set_environment(self, env_name: str, env) -> None:
-    """Tell a function where its Python environment is, if there is machine code of it."""
-    if self._engine.is_symbol_defined(env_name):
-        _plain_set_environment(self, env_name, env)
+def melts(library: codegen.JITCodeLibrary) -> bool:
+    """Whether all that a library itself defines is always inlined: nobody calls its address."""
+    own = _own_functions(library)
+    return bool(own) and all(
+        any(b"alwaysinline" in attribute for attribute in function.attributes) for function in own
+    )
 
 
-_EXPECTED = ("_optimize_functions", "_optimize_final_module", "_finalize_final_module")
-if all(hasattr(codegen.JITCodeLibrary, name) for name in _EXPECTED):
-    _plain_set_environment = codegen.JITCPUCodegen.set_env
-    codegen.JITCPUCodegen.set_env = _set_environment
-    codegen.JITCPUCodegen._library_class = _Melting
+def _use() -> None:
+    """Put the class of libraries below in the place of Numba's."""
+    set_environment = codegen.JITCPUCodegen.set_env
+
+    class Melting(codegen.JITCodeLibrary):
+        """The code of one compiled function and of all that it calls."""
+
+        def _optimize_functions(self, ll_module) -> None:
+            # Left to the optimisation of the whole module, of other packages' functions, too.
+            ll_module.data_layout = self._codegen._data_layout
+
+        def _optimize_final_module(self) -> None:
+            if not melts(self):
+                super()._optimize_final_module()
+
+        def _finalize_final_module(self) -> None:
+            if melts(self):
+                self._finalized = True
+            else:
+                super()._finalize_final_module()
+
+    def set_env(self, env_name: str, env) -> None:
+        """Tell a function where its Python environment is, if there is machine code of it."""
+        if self._engine.is_symbol_defined(env_name):
+            set_environment(self, env_name, env)
+
+    codegen.JITCPUCodegen.set_env = set_env
+    codegen.JITCPUCodegen._library_class = Melting
+
+
+# What the above takes for granted, by class.
+_EXPECTED = {
+    "JITCodeLibrary": ("_optimize_functions", "_optimize_final_module", "_finalize_final_module"),
+    "JITCPUCodegen": ("set_env", "_library_class"),
+    "JitEngine": ("is_symbol_defined",),
+}
+if all(
+    hasattr(getattr(codegen, name, None), member)
+    for name, members in _EXPECTED.items()
+    for member in members
+):
+    _use()

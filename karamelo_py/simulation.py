@@ -45,7 +45,7 @@ from karamelo_py.kernels.step import (
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
 from karamelo_py.laws import can, elastic_law, law_kind
-from karamelo_py.lowering import State, chosen, lower, thread_count
+from karamelo_py.lowering import State, chosen, lower, stable_courant, thread_count
 from karamelo_py.modify import puts_force_on_points
 from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
@@ -266,6 +266,7 @@ class Simulation:
         update = self.hub.update
         control = self.setup.control
         control.real[FIXED_DT] = update.fixed_dt or 0.0
+        control.real[COURANT] = stable_courant(self.hub)
         control.real[DT_FACTOR] = update.dt_factor
         control.real[END_TIME] = end_time
         control.whole[OVER_LIMIT] = 0
@@ -413,8 +414,17 @@ class Simulation:
 
     def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:
         """Return to a snapshot."""
+        s = self.setup
+        # Nodes that were not in use then have to be empty, as they were.
+        spans = s.spans[1 : 1 + s.spans[0, 0]].copy()
+        for begin, end in spans:
+            s.nodes.sums[begin:end] = 0
+            if s.nodes.normal is not None:
+                s.nodes.normal[begin:end] = 0
         for array, copy in snapshot:
             array[...] = copy
+        for marks in self.hub.update.method.remembered(s.contact, spans):
+            marks[np.abs(marks) > self.step] = 0
         self.version += 1
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:

@@ -189,6 +189,45 @@ def test_groups_and_computes_go_on_without_the_deleted(run_interpreted):
     assert len(read_dump(result.folder / "d.28.LAMMPS")) == 1
 
 
+SPLASH = """
+    method(ulmpm/contacts, FLIP, linear, 1)
+    dimension(1, 0, 10, 0.01)
+    boundary(delete)
+    region(block, block, 1.6, 1.7)
+    region(bullet, block, 1, 1.02)
+    region(splash, block, 9.325, 9.335)
+    material(heavy, neo-hookean, 100, 10000, 0)
+    material(light, neo-hookean, 1, 1, 0)
+    solid(block, region, block, 2, heavy, 0.01, 0)
+    solid(bullet, region, bullet, 2, light, 0.01, 0)
+    solid(splash, region, splash, 1, light, 0.01, 0)
+    group(block, particles, region, block, solid, block)
+    group(bullet, particles, region, bullet, solid, bullet)
+    group(splash, particles, region, splash, solid, splash)
+    fix(vb, initial_velocity_particles, bullet, 50)
+    fix(vc, initial_velocity_particles, splash, {v})
+    compute(a, average_velocity, block)
+    compute(b, average_velocity, bullet)
+    compute(c, average_velocity, splash)
+    log_modify(custom, step, a_x, b_x, c_x)
+    set_dt(0.00015)
+    set_output(1000)
+    run(99)
+"""
+
+
+def test_going_back_leaves_no_contact_behind(run_interpreted):
+    """The splash leaves some steps after the bullet has hit; the run goes back to before the hit.
+
+    Nothing of the first try may be left on the nodes. A group without points shows 0.
+    """
+    stays = run_interpreted(SPLASH.format(v=0), folder="stays").log
+    leaves = run_interpreted(SPLASH.format(v=50), folder="leaves").log
+    assert stays.b_x[-1] < 0  # the bullet has hit
+    assert (leaves.a_x[-1], leaves.b_x[-1]) == (stays.a_x[-1], stays.b_x[-1])
+    assert leaves.c_x[0] == 50 and leaves.c_x[-1] == 0
+
+
 def test_nan_is_no_edge(run_interpreted):
     """A point without a place is not deleted: the run ends, as ever."""
     lines = ("fix(g, body_force, all, sqrt(0.02-time), 0)", "run(200)")

@@ -7,15 +7,6 @@ import pandas
 import pytest
 from conftest import INPUTS, read_log
 
-from karamelo_py.compile import point_function
-from karamelo_py.element.point import Point
-from karamelo_py.element.response import Response
-from karamelo_py.points import materials
-from karamelo_py.points.kinematics import Space
-from karamelo_py.points.materials.eos.linear import LinearPressure
-from karamelo_py.points.materials.eos_strength import EosStrength
-from karamelo_py.points.materials.strength.plastic import Plastic
-
 K, G, Y = 160e9, 80e9, 400e6
 E = 9 * K * G / (3 * K + G)
 NU = (3 * K - 2 * G) / (2 * (3 * K + G))
@@ -151,15 +142,20 @@ def test_pure_and_simple_shear_differ_by_a_turn(answer):
     assert t.exy[-1] == pytest.approx(0.35)
 
 
-def test_what_a_law_offers_is_a_column(monkeypatch):
+def test_what_a_law_offers_is_a_column(answer):
     """Scalars that only some laws have: there where the law has them, else not."""
-    damage = point_function()(lambda law, kin, state: None)
-    monkeypatch.setattr(materials, "damage", damage, raising=False)
-    point = Point(EosStrength(LinearPressure(1.0, K), Plastic(G, Y)), Space())
-    assert "damage" not in Response(point).names
-    damage.on(EosStrength)(lambda law, kin, state: 0.25)
-    assert Response(point).last()["damage"] == 0.25
-    assert Response(point).last()["ep"] == 0
+    path = "load_path(a, 20, exx=0.01, syy=0, szz=0)\n"
+    plain = answer(STEEL + path + "element(s, steel, a)", "s")
+    assert "ep" in plain and "T" not in plain and "damage" not in plain
+    hot = (
+        "temperature(heat, plastic_work, 0.9, 500, 50, 0, 300, 1800)\n"
+        "damage(cracks, damage_johnson_cook, 0.05, 3.44, -2.12, 0.002, 0.61, 1, 300, 1800)\n"
+        "material(hot, eos-strength, bulk, mild, cracks, heat)\n"
+    )
+    t = answer(STEEL + hot + path + "element(s, hot, a)", "s")
+    # Nine tenths of the plastic work become heat.
+    assert t.T[-1] == pytest.approx(300 + 0.9 * t.dissipated[-1] / (7850 * 500), rel=1e-6)
+    assert (t.damage == 0).all()
 
 
 def test_rate_of_the_path(answer):
@@ -183,6 +179,10 @@ def test_a_stress_beyond_yield_is_not_found(run_script):
         ("load_path(a, 2, gxy=1, exy=0)", "gxy and exy are the same strain"),
         ("load_path(a, 2, volumetric=0, sxx=0)", "sxx needs it free"),
         ("load_path(a, 2, volumetric=0, exx=0, eyy=0, ezz=0)", "the volume follows from them"),
+        (
+            "load_path(a, 2, exx=0, volumetric=0)\nelement(b, steel, a, kinematics=1D)",
+            "every normal strain that 1D has",
+        ),
         ("load_path(a, 0, exx=0)", "'increments' must be a whole number above 0"),
         ("load_path(a, 2, exx=0)\nelement(b, lead, a)", "unknown material 'lead'"),
         ("element(b, steel, a)", "unknown load path 'a'"),
@@ -204,10 +204,11 @@ def test_what_is_refused(run_script, lines, says):
     assert result.err.count("error:") == 1 and "^" in result.err
 
 
-def test_check_drives_nothing(run_script, tmp_path):
+def test_check_writes_nothing(run_script, tmp_path):
     from karamelo_py.cli import main
 
     script = tmp_path / "in.check"
-    script.write_text(STEEL + "load_path(a, 2, exx=1e-3)\nelement(b, steel, a)\n")
+    used = "modulus = value(b_sxx/b_exx)\nmaterial(other, neo-hookean, 1000, modulus, 0.3)\n"
+    script.write_text(STEEL + "load_path(a, 2, exx=1e-3)\nelement(b, steel, a)\n" + used)
     assert main(["check", str(script)]) == 0
     assert not list(tmp_path.glob("element_*"))

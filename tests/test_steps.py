@@ -102,6 +102,12 @@ def test_runs_follow_each_other(run_interpreted):
     assert log.Time[-1] == pytest.approx(0.0325, rel=1e-9)
 
 
+def test_a_scheme_brings_its_stable_step(run_interpreted):
+    """usl with two points a cell takes 0.65 of the steps of the others."""
+    log = run_interpreted(block(1, "set_output(1)", LOG, "run(1)", "scheme(usl)", "run(1)")).log
+    assert log.dt[-1] == pytest.approx(0.65 * log.dt[0], rel=1e-3)
+
+
 def test_conditions(run_interpreted):
     """run_until and run_while look before every step."""
     script = block(1, "set_dt(0.001)", "set_output(100)", LOG, "run_until(timestep >= 5)",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from karamelo_py.element.load_path import COMPONENTS, LoadPath
+from karamelo_py.element.load_path import COMPONENTS, NORMAL, LoadPath
 from karamelo_py.element.point import Point, Unreachable
 from karamelo_py.element.response import Response
 from karamelo_py.laws import law_name
@@ -184,18 +184,17 @@ def element(
         return
     hub.rehearse()
     what = f"element {ID}: {material.id} ({law_name(material.law)}), {kinematics}"
-    if hub.checking:
-        hub.console.say(f"{what}, {sum(p.increments for p in paths)} increments")
-        return
     try:
         _follow(point, paths, response)
     finally:
-        # What was reached before an error shows where the law gives way.
-        response.write(hub.folder / table)
-        response.draw(hub.folder / picture, what)
         for name, value in response.last().items():
             hub.values.set(f"{ID}_{name}", value)
-    hub.console.say(f"{what}, {len(response.rows) - 1} increments: {table}, {picture}")
+        # What was reached before an error shows where the law gives way.
+        if not hub.checking:
+            response.write(hub.folder / table)
+            response.draw(hub.folder / picture, what)
+    files = "" if hub.checking else f": {table}, {picture}"
+    hub.console.say(f"{what}, {len(response.rows) - 1} increments{files}")
 
 
 def _follow(point: Point, paths: tuple[LoadPath, ...], response: Response) -> None:
@@ -239,6 +238,13 @@ def _check_components(path: LoadPath, point: Point, kinematics: str, number: int
                     expected="components of " + " ".join(point.free),
                     hint="kinematics=3D",
                 )
+    if path.volumetric is not None and set(NORMAL) & set(point.free) <= set(path.strain):
+        raise ScriptError(
+            f"load path '{path.id}' prescribes every normal strain that {kinematics} has, and "
+            "volumetric as well",
+            argument=2 + number,
+            hint="leave out volumetric, or one of the strains",
+        )
     if path.turn and "xy" not in point.free:
         raise ScriptError(
             f"load path '{path.id}' turns the point, and {kinematics} cannot turn",

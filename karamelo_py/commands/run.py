@@ -20,7 +20,8 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     dt
-        Time step. Above the stable limit (cell size over wave speed plus velocity) a run warns.
+        Time step. Above the stable limit (cell size over wave speed plus velocity; less with scheme
+        usl) a run warns.
 
     Example
     -------

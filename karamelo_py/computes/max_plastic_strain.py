@@ -32,5 +32,4 @@ class MaxPlasticStrain(Compute):
         members = self.hub.fields.members(self.group)
         for published, field in (("Epmax", "ep"), ("Tmax", "T")):
             values = self.hub.fields.particle(field)[members]
-            if len(values):
-                self.publish(published, float(values.max()))
+            self.publish(published, float(values.max(initial=0)))

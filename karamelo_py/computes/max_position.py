@@ -24,5 +24,5 @@ class MaxPosition(Compute):
     def refresh(self) -> None:
         """Measure and publish."""
         position = self.hub.fields.position[self.hub.fields.members(self.group)]
-        if len(position):
-            self.publish_components(position.max(axis=0))
+        # Without points, 0, as the sums of other computes.
+        self.publish_components(position.max(axis=0) if len(position) else position.sum(axis=0))

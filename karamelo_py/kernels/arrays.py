@@ -114,7 +114,7 @@ class Control(NamedTuple):
 TIME, TIMESTEP, DT = 0, 1, 2
 # Control.real
 FIXED_DT, DT_FACTOR, END_TIME, RATE, NEW_RATE, MOVE, DRIFT, DRIFT_LIMIT, SPACING = range(9)
-LIGHTEST = 9  # mass of the lightest point, where the gradient of the basis jumps
+LIGHTEST = 9  # mass of the lightest point, where the edge of the basis is steep
 NEW_MOVE = 10
 COURANT = 11  # stable step as a share of cell size over the fastest point's rate
 # Control.whole

@@ -22,8 +22,9 @@ least_nodes
     the smallest number of nodes a direction of the grid must have;
 steady_moment
     whether D of the affine transfers stays away from zero everywhere;
-gradient_jumps
-    whether a weight that vanishes may have a gradient that does not: |grad N|^2 / N without bound.
+steep_edge
+    whether |grad N|^2 / N exceeds 2 / h^2 a direction where a weight vanishes: usl then limits what
+    light nodes do to the strain.
 """
 
 from karamelo_py.compile import point_function

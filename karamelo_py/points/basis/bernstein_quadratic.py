@@ -27,7 +27,7 @@ class BernsteinQuadratic(NamedTuple):
     nodes_per_cell = 2
     least_nodes = 3
     steady_moment = False  # D of the affine transfers vanishes at the corners of cells
-    gradient_jumps = True
+    steep_edge = True
 
 
 @along.on(BernsteinQuadratic)

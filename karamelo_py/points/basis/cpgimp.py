@@ -56,7 +56,7 @@ class CPGIMPDet(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = True
 
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
@@ -78,7 +78,7 @@ class CPGIMPDiagonal(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = False  # D of the affine transfers all but vanishes with the box
-    gradient_jumps = False
+    steep_edge = True
 
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
@@ -101,7 +101,7 @@ class CPGIMPStretch(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = True
 
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
@@ -126,7 +126,7 @@ class CPGIMPCorners(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = True
 
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
@@ -156,7 +156,7 @@ class CPGIMP(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = True
 
     variants = MappingProxyType(
         {

@@ -25,7 +25,7 @@ class CubicSpline(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 4
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = False
 
 
 @along.on(CubicSpline)

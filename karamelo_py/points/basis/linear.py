@@ -26,7 +26,7 @@ class Linear(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = False  # D of the affine transfers vanishes at the nodes
-    gradient_jumps = True
+    steep_edge = True
 
 
 @along.on(Linear)

@@ -33,7 +33,7 @@ class UGIMP(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 3
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = True
 
     @staticmethod
     def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:

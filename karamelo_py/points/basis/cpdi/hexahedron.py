@@ -35,7 +35,7 @@ class H8(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = False
     element = "hexahedron"  # of a mesh
 
     @staticmethod

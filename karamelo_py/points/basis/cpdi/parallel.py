@@ -30,7 +30,7 @@ class R4(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = False
     element = None  # of a mesh
 
     @staticmethod
@@ -52,7 +52,7 @@ class R8(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = False
     element = None  # of a mesh
 
     @staticmethod

@@ -31,7 +31,7 @@ class Q4(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = False
     element = "quad"  # of a mesh
 
     @staticmethod

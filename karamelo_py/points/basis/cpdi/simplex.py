@@ -26,7 +26,7 @@ class T3(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = False
     element = "triangle"  # of a mesh
 
     @staticmethod
@@ -53,7 +53,7 @@ class Tet4(NamedTuple):
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
-    gradient_jumps = False
+    steep_edge = False
     element = "tetra"  # of a mesh
 
     @staticmethod
