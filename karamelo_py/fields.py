@@ -21,6 +21,7 @@ from karamelo_py.kernels.export import (
     Temperature,
     export,
     export_state,
+    export_velocity_moment,
 )
 from karamelo_py.laws import can
 from karamelo_py.points.materials import dissipated_energy, energy_density, plastic_strain
@@ -131,11 +132,21 @@ class Fields:
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
-        """(N, d d) moment of velocity of affine transfers, or None."""
+        """(N, d d) moment of velocity, sum N v (X - x), of transfers that keep it, or None."""
         simulation = self._simulation
         if simulation.setup.blocks[0].points.moment is None:
             return None
-        return simulation.by_id(lambda block: block.points.moment)
+        return simulation.by_id(self._velocity_moment)
+
+    def _velocity_moment(self, block: Any) -> np.ndarray:
+        s = self._simulation.setup
+        kept = block.points.moment
+        if not getattr(s.transfer, "keeps_gradient", False):
+            return kept
+        where = block.x[self._simulation.now] if block.home is None else block.home
+        moment = np.zeros_like(kept)
+        export_velocity_moment(s.basis, s.kin, s.grids, block.grid, where, kept, moment)
+        return moment
 
     @property
     def has_point_forces(self) -> bool:

@@ -72,7 +72,7 @@ class Group:
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Group:
         """The group that `argument` names; the word ``all`` is the group of everything."""
-        if argument.word() == ALL:
+        if ALL in (argument.text, argument.word()):
             return cls(hub, everything=True)
         group = look_up(hub.groups, argument)
         if not isinstance(group, cls):
@@ -191,7 +191,7 @@ class AnyGroup:
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> ParticleGroup | NodeGroup:
         """The group that `argument` names."""
-        if argument.word() == ALL:
+        if ALL in (argument.text, argument.word()):
             return ParticleGroup(hub, everything=True)
         return look_up(hub.groups, argument)
 

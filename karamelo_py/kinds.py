@@ -12,6 +12,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
+from karamelo_py import registry
 from karamelo_py.arguments import NULL, NUMBER, Argument
 from karamelo_py.script.errors import Place, ScriptError, nearest
 from karamelo_py.script.expressions import Expression, Formula, Value, number_text
@@ -191,6 +192,20 @@ def _to_text(hub: Any, argument: Argument) -> str:
     if not word:
         raise Unfit("an empty text")
     return word
+
+
+@dataclass(frozen=True)
+class StyleOf:
+    """Annotation of a word that names a style: the name of one wins over a variable."""
+
+    family: str
+    script_kind = "a word"
+
+    def from_script(self, hub: Any, argument: Argument) -> str:
+        """The name as it stands, or what a text variable of another name holds."""
+        return (
+            argument.text if registry.knows(self.family, argument.text) else _to_text(hub, argument)
+        )
 
 
 def _to_expression(hub: Any, argument: Argument) -> Expression:

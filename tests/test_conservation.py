@@ -151,3 +151,20 @@ def test_order_of_the_schemes(run_script):
     assert totals["usf"] > totals["musl"] > totals["usl"]
     assert totals["usl"] < 2.6
     assert totals["musl"] == pytest.approx(2.602315, abs=0.001 * 2.6)  # Ek + Es of Karamelo
+
+
+def test_mls_conserves_angular_momentum(run_interpreted):
+    """What is measured has the part within the surroundings of points, by their gradients."""
+    log = run_interpreted("""
+        method(ulmpm, MLS, quadratic-spline)
+        dimension(2, -2, 2, -2, 2, 0.5)
+        region(disk, cylinder, 0, 0, 0.6)
+        material(rubber, neo-hookean, 1, 100, 0.3)
+        solid(disk, region, disk, 2, rubber, 0.5, 0)
+        fix(spin, initial_velocity_particles, all, -y0, x0)
+        compute(L, angular_momentum, all)
+        set_output(5)
+        log_modify(custom, step, L_z)
+        run(20)
+    """).log
+    assert log.L_z == pytest.approx(np.full(len(log.L_z), log.L_z[0]), rel=1e-9)

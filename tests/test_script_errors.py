@@ -1,6 +1,7 @@
 """Wrong scripts: each ends with one message that marks the place and says what to do."""
 
 import pytest
+from scenes import block
 
 from karamelo_py.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
@@ -327,3 +328,17 @@ def test_print_shows_values(tmp_path, capsys):
     out = capsys.readouterr().out
     assert 'a = 2, f = 2*time = 0, w = "linear", done' in out
     assert "x0 = x0" in out
+
+
+def test_the_name_of_a_style_wins_over_a_variable(run_interpreted):
+    words = [
+        f'{word} = "nothing"'
+        for word in ("ulmpm", "FLIP", "linear", "block", "kinetic_energy", "all")
+    ]
+    text = block(1, "compute(E, kinetic_energy, all)", "log_modify(custom, step, E)", "run(1)")
+    assert run_interpreted("\n".join([*words, text])).log.Step[-1] == 1
+
+
+def test_a_compute_does_not_hide_the_time(run_interpreted):
+    said = run_interpreted(block(1, "compute(time, kinetic_energy, all)", "run(1)"), status=1).err
+    assert "would publish its value as 'time', which is the time of the run" in said

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from karamelo_py import registry, signature
 from karamelo_py.domain import Domain, require_domain
 from karamelo_py.forms import Forms, number, place_of
+from karamelo_py.kinds import StyleOf
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.signature import Argument
 
@@ -179,7 +180,7 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
     hub.update.boundary_place = hub.place
 
 
-def region(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) -> None:
     """Name a part of space, to be filled by a solid or to choose the members of a group.
 
     Parameters

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from karamelo_py import registry, signature
+from karamelo_py.kinds import StyleOf
 from karamelo_py.signature import Argument
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Catalogue, Hub
 
 
-def eos(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+def eos(hub: Hub, ID: str, style: StyleOf("eos"), *arguments: Argument) -> None:
     """Define an equation of state: the pressure of a material, and its density.
 
     Parameters
@@ -34,7 +35,7 @@ def eos(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     define(hub, hub.eos, ID, style, arguments)
 
 
-def strength(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+def strength(hub: Hub, ID: str, style: StyleOf("strength"), *arguments: Argument) -> None:
     """Define a strength: the deviatoric stress of a material.
 
     Parameters
@@ -58,7 +59,7 @@ def strength(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     define(hub, hub.strengths, ID, style, arguments)
 
 
-def damage(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+def damage(hub: Hub, ID: str, style: StyleOf("damage"), *arguments: Argument) -> None:
     """Define a damage: how a material loses its strength.
 
     Parameters
@@ -81,7 +82,7 @@ def damage(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     define(hub, hub.damages, ID, style, arguments)
 
 
-def temperature(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+def temperature(hub: Hub, ID: str, style: StyleOf("temperature"), *arguments: Argument) -> None:
     """Define a temperature: how a material heats, and what heat does to its pressure.
 
     Parameters

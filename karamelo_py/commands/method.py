@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
 from karamelo_py import registry
+from karamelo_py.kinds import StyleOf
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.tflip import TFLIP
 from karamelo_py.script.errors import ScriptError, nearest
@@ -16,7 +17,13 @@ if TYPE_CHECKING:
 OPTIONS = ("mechanical", "thermo-mechanical", "gradient-enhanced")
 
 
-def method(hub: Hub, kind: str, transfer: str, basis: str, *options: Argument) -> None:
+def method(
+    hub: Hub,
+    kind: StyleOf("method"),
+    transfer: StyleOf("transfer"),
+    basis: StyleOf("basis"),
+    *options: Argument,
+) -> None:
     """Choose the method, the transfer of velocity, and the basis functions.
 
     Parameters

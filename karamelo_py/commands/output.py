@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from karamelo_py import registry, signature
 from karamelo_py.arguments import NUMBER
 from karamelo_py.dumps.files import picture_format
+from karamelo_py.kinds import StyleOf
 from karamelo_py.plots import Curve
 from karamelo_py.quantity import Quantity
 from karamelo_py.script.errors import ScriptError
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
 
-def dump(hub: Hub, ID: str, group: Literal["all"], style: str, *arguments: Argument) -> None:
+def dump(
+    hub: Hub, ID: str, group: Literal["all"], style: StyleOf("dump"), *arguments: Argument
+) -> None:
     """Write snapshots of the points or the nodes to files, again and again while the scene runs.
 
     Parameters

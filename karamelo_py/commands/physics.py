@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Literal
 
 from karamelo_py import registry, signature
 from karamelo_py.commands.materials import define
+from karamelo_py.kinds import StyleOf
 from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.expressions import SEEDS
+from karamelo_py.script.interpreter import MEANINGS
 from karamelo_py.signature import Argument
 
 if TYPE_CHECKING:
@@ -14,7 +17,7 @@ if TYPE_CHECKING:
     from karamelo_py.modify import Fix
 
 
-def scheme(hub: Hub, style: str) -> None:
+def scheme(hub: Hub, style: StyleOf("scheme")) -> None:
     """Choose when in a step the stress is updated.
 
     Parameters
@@ -54,7 +57,7 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
     hub.settings.precision = kind
 
 
-def material(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument) -> None:
     """Define a material.
 
     Parameters
@@ -77,7 +80,7 @@ def material(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     define(hub, hub.materials, ID, style, arguments)
 
 
-def fix(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     """Define something that acts on the run: a support, a load, an initial state.
 
     Parameters
@@ -100,6 +103,7 @@ def fix(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     _refuse_forgotten_id("fix", ID, style)
     target = registry.find("fix", style)
     _refuse_shared_id(ID, target, "compute", hub.computes)
+    _check_names(hub, "fix", ID, target)
     new = signature.call(target, hub, list(arguments), f"fix {style}")
     new.style = style
     hub.fixes.add(ID, new, replace=True)
@@ -127,7 +131,7 @@ def delete_fix(hub: Hub, ID: str) -> None:
     hub.fixes.remove(ID)
 
 
-def compute(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
+def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) -> None:
     """Define something to measure whenever the log is written.
 
     Parameters
@@ -150,6 +154,7 @@ def compute(hub: Hub, ID: str, style: str, *arguments: Argument) -> None:
     _refuse_forgotten_id("compute", ID, style)
     target = registry.find("compute", style)
     _refuse_shared_id(ID, target, "fix", hub.fixes)
+    _check_names(hub, "compute", ID, target)
     new = signature.call(target, hub, list(arguments), f"compute {style}")
     new.style = style
     hub.computes.add(ID, new)
@@ -194,6 +199,26 @@ def _refuse_shared_id(ID: str, style: type, other: str, catalogue: Catalogue) ->
             argument="ID",
             expected=f"another ID: {ID}_x and the like would mean two things",
         )
+
+
+def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
+    """A value that is published must not hide what a name means already."""
+    for suffix in style.published:
+        name = f"{ID}_{suffix}" if suffix else ID
+        if name in MEANINGS or name in SEEDS:
+            raise ScriptError(
+                f"{kind} '{ID}' would publish its value as '{name}', which is "
+                + MEANINGS.get(name, "a coordinate of points"),
+                argument="ID",
+                expected="an ID that means nothing else",
+                hint=f"choose another ID, such as {ID}_1",
+            )
+        if name in (getattr(hub.interpreter, "variables", None) or {}):
+            hub.warn(
+                f"{kind} '{ID}' publishes its value as '{name}', which is a variable, too: "
+                "formulas will use the variable",
+                hint=f"choose another ID, such as {ID}_1",
+            )
 
 
 def _warn_if_idle(hub: Hub, style: str, item: Fix) -> None:

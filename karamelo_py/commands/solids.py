@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from karamelo_py import registry, signature
 from karamelo_py.domain import require_domain
 from karamelo_py.group import ALL, KINDS, NOTHING_THERE
+from karamelo_py.kinds import StyleOf
 from karamelo_py.regions.base import Region
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.signature import Argument
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
 
-def solid(hub: Hub, ID: str, kind: str, *arguments: Argument) -> None:
+def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> None:
     """Make a body of material points: fill a region with them, or put them into a mesh.
 
     Parameters

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import kernel, point_function
+from karamelo_py.compile import index, kernel, point_function
+from karamelo_py.kernels.stages import place_at
+from karamelo_py.points.basis import entry, locate, reach, support
+from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
 from karamelo_py.points.materials import (
     cauchy_stress,
     damage,
@@ -19,7 +22,7 @@ from karamelo_py.points.materials import (
     temperature,
     with_stress,
 )
-from karamelo_py.tensors import put_at, record, row
+from karamelo_py.tensors import put_at, record, row, scale
 
 STRAIN, JACOBIAN, ENERGY = 6, 12, 13
 EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point
@@ -122,3 +125,23 @@ def impose_stress(kin, like, points, laws, chosen, given, stress):
             if not given[k]:
                 stress[p, k] = old[k]
         put_at(points.state, p, 0, with_stress(law, kin, state, row(stress, p, 0, old)))
+
+
+@kernel
+def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
+    """The moments ``out`` (n, d d) sum N v (X - x) of velocity fields with these gradients.
+
+    ``where`` (n, w) are the places that the weights belong to, on the grids ``grid_of`` (n,).
+    """
+    flat = planar(kin)
+    for p in range(out.shape[0]):
+        grid = record(grids, index(grid_of[p]))
+        place = place_at(basis, kin, where, p)
+        stencil = locate(basis, kin, grid, place)
+        total = zero_tensor(flat, place[0])
+        gradient = row(gradients, p, 0, total)
+        for k in range(support(basis, kin)):
+            weight = entry(basis, kin, grid, stencil, k)[1]
+            arm = reach(basis, kin, grid, stencil, k)
+            total = add_outer(flat, total, scale(weight, tensor_dot(flat, gradient, arm)), arm)
+        put_at(out, p, 0, total)

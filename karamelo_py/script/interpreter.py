@@ -28,7 +28,7 @@ from karamelo_py.script.syntax import (
 )
 
 _LARGEST_SCRIPT = 100_000_000
-_MEANINGS = {
+MEANINGS = {
     "time": "the time of the run",
     "timestep": "the number of the step",
     "dt": "the time step",
@@ -517,8 +517,8 @@ def _check_name(name: str) -> None:
     """Refuse to assign what already means something else."""
     if name in ("and", "or", "not"):
         what = "a logical operator"
-    elif name in _MEANINGS:
-        what = _MEANINGS[name]
+    elif name in MEANINGS:
+        what = MEANINGS[name]
     elif name in SEEDS:
         what = "a coordinate of points"
     elif name in WORDS or name == "quit":

@@ -17,6 +17,7 @@ from karamelo_py.tensors import add_scaled, scale
 
 def register(transfer: type) -> None:
     """Let the points of `transfer` keep the moment of velocity and map it with their velocity."""
+    transfer.keeps_gradient = False
 
     @add_momentum.on(transfer)
     def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):

@@ -16,6 +16,7 @@ from karamelo_py.tensors import add, add_scaled
 
 def register(transfer: type) -> None:
     """Let the points of `transfer` keep the gradient of velocity and map it with their velocity."""
+    transfer.keeps_gradient = True
 
     @add_momentum.on(transfer)
     def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
