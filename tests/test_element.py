@@ -91,7 +91,7 @@ def test_the_table_is_read_as_the_log_is(run_script):
     ).folder
     path = folder / "element_one.txt"
     frame = pandas.read_csv(path, sep=r"\s+")
-    columns = "time exx eyy ezz sxx syy szz p q J stored work ep"
+    columns = "time exx eyy ezz sxx syy szz p q J stored work ep dissipated"
     assert list(frame) == columns.split()
     assert np.loadtxt(path, skiprows=1) == pytest.approx(frame.to_numpy())
 
