@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from karamelo_py.compile import by_type, define, point_function, real, shared
 from karamelo_py.points.grid import Grid, in_cells, pick
 from karamelo_py.tensors import multiply_each
@@ -59,37 +61,26 @@ def mirror(grid, direction, y):
     return edge + (edge - y) if abs(side) > 0 else y
 
 
-def mirrored(grid, y):
-    """`mirror` in every direction."""
-    return tuple(mirror(grid, k, y[k]) for k in range(len(y)))
+def in_every_direction(function: Callable) -> Callable:
+    """Make ``f(grid, y, ...)``, the tuple of function(grid, k, y[k], ...) over the directions k."""
+
+    def of_all(grid, *vectors):
+        count = len(vectors[0])
+        return tuple(function(grid, k, *(vector[k] for vector in vectors)) for k in range(count))
+
+    def written_out(grid, *vectors):
+        names = [f"a{m}" for m in range(len(vectors))]
+        items = (", ".join(f"{name}[{k}]" for name in names) for k in range(len(vectors[0])))
+        calls = "".join(f"function(grid, {k}, {item}), " for k, item in enumerate(items))
+        return define(f"grid, {', '.join(names)}", f"return ({calls})", function=function)
+
+    by_type(of_all)(written_out)
+    return of_all
 
 
-@by_type(mirrored)
-def _mirrored(grid, y):
-    items = "".join(f"mirror(grid, {k}, y[{k}]), " for k in range(len(y)))
-    return define("grid, y", f"return ({items})", mirror=mirror)
-
-
-def hits(grid, y):
-    """`hit` in every direction."""
-    return tuple(hit(grid, k, y[k]) for k in range(len(y)))
-
-
-@by_type(hits)
-def _hits(grid, y):
-    items = "".join(f"hit(grid, {k}, y[{k}]), " for k in range(len(y)))
-    return define("grid, y", f"return ({items})", hit=hit)
-
-
-def turns(grid, y, v):
-    """`turn` in every direction."""
-    return tuple(turn(grid, k, y[k], v[k]) for k in range(len(y)))
-
-
-@by_type(turns)
-def _turns(grid, y, v):
-    items = "".join(f"turn(grid, {k}, y[{k}], v[{k}]), " for k in range(len(y)))
-    return define("grid, y, v", f"return ({items})", turn=turn)
+mirrored = in_every_direction(mirror)
+hits = in_every_direction(hit)
+turns = in_every_direction(turn)
 
 
 def rows_times(signs, moment):
