@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from textwrap import dedent
 
@@ -16,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from comparisons.results import Result
 from karamelo_py.cli import main
 
 TESTS = Path(__file__).parent
@@ -26,76 +25,6 @@ REFERENCE = TESTS / "data"
 # No test asserts a time, and a failure is the same in every run.
 settings.register_profile("tests", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("tests")
-
-
-class Table(dict):
-    """Columns by name: a log or one snapshot of a dump."""
-
-    def __getattr__(self, name: str) -> np.ndarray:
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(f"no column {name}; there are {', '.join(self)}") from None
-
-
-def read_log(path: Path) -> Table:
-    """The table of log.mpm; lines that begin with # repeat headers."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    rows = [line.split() for line in lines[1:] if not line.startswith("#")]
-    columns = np.array(rows, float).reshape(len(rows), -1).T
-    return Table(zip(lines[0].split(), columns, strict=True))
-
-
-def read_dump(path: Path) -> list[Table]:
-    """The snapshots of a LAMMPS dump, each with TIMESTEP, TIME and its columns in order of ids."""
-    opener = gzip.open if path.suffix == ".gz" else open
-    with opener(path, "rt", encoding="utf-8") as file:
-        lines = file.read().splitlines()
-    snapshots = []
-    k = 0
-    while k < len(lines):
-        assert lines[k].startswith("ITEM: "), lines[k]
-        item = lines[k][len("ITEM: ") :]
-        if item == "TIMESTEP":
-            snapshot = Table(TIMESTEP=int(lines[k + 1]))
-            snapshots.append(snapshot)
-            k += 2
-        elif item == "TIME":
-            snapshot["TIME"] = float(lines[k + 1])
-            k += 2
-        elif item.startswith("NUMBER OF ATOMS"):
-            count = int(lines[k + 1])
-            k += 2
-        elif item.startswith("BOX BOUNDS"):
-            k += 4
-        elif item.startswith("ATOMS"):
-            names = item.split()[1:]
-            rows = np.array([line.split() for line in lines[k + 1 : k + 1 + count]], float)
-            rows = rows[np.argsort(rows[:, 0])]
-            snapshot.update(zip(names, rows.T, strict=True))
-            k += 1 + count
-        else:
-            k += 2
-    return snapshots
-
-
-@dataclass
-class Result:
-    """What a run left behind."""
-
-    status: int
-    out: str
-    err: str
-    folder: Path
-
-    @property
-    def log(self) -> Table:
-        """The table in log.mpm."""
-        return read_log(self.folder / "log.mpm")
-
-    def dump(self, name: str) -> Table:
-        """The last (or only) snapshot in a dump."""
-        return read_dump(self.folder / name)[-1]
 
 
 def _prepared(folder: Path, script: str | Path) -> Path:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import read_dump, read_log
 from scenes import SCHEMES, TRANSFERS, block
 from states import final_state, same_bits
+
+from comparisons.results import read_dump, read_log
 
 MASS = {1: 2 * 0.3, 2: 2 * 0.3 * 0.2, 3: 2 * 0.3 * 0.2 * 0.1}
 COUNT = {1: 6, 2: 24, 3: 48}

@@ -9,8 +9,9 @@ import textwrap
 
 import numpy as np
 import pytest
-from conftest import read_dump
 from scenes import H, block
+
+from comparisons.results import read_dump
 
 MASS = 2 * 0.3 * 0.2  # density times the block's area
 

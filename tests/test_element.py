@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas
 import pytest
-from conftest import INPUTS, read_log
+from conftest import INPUTS
+
+from comparisons.results import read_log
 
 K, G, Y = 160e9, 80e9, 400e6
 E = 9 * K * G / (3 * K + G)

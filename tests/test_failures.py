@@ -12,8 +12,9 @@ import time
 
 import numpy as np
 import pytest
-from conftest import read_dump, read_log
 from scenes import block
+
+from comparisons.results import read_dump, read_log
 
 OUTPUT = (
     "set_output(5)",

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import INPUTS, REFERENCE, read_dump
+from conftest import INPUTS, REFERENCE
+
+from comparisons.results import read_dump
 
 # 416 points of 1/1600 each weigh 260, and move at sqrt(0.1^2 + 0.1^2).
 INITIAL_ENERGY = 0.5 * 260 * 0.02

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import read_dump
 from verification import LINEAR, QUADRATIC, TOTAL, errors_on, frequency, run_scene, table
 
+from comparisons.results import read_dump
 from karamelo_py.schemes.usl import USL
 
 SIGMA = 3.0

@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import INPUTS, Result, Table, read_dump
+from conftest import INPUTS
+
+from comparisons.results import Result, Table, read_dump
 
 # Transfers that take a share of FLIP.
 BLENDS = ("FLIP", "AFLIP", "ASFLIP")

@@ -1,0 +1,13 @@
+"""The scenes of inputs/ beside the numbers that others found.
+
+A scene is a script inputs/in.NAME and, if there is something to compare, a file NAME.py here. It
+has
+
+- a docstring, whose first line says what is compared with whom;
+- ``SMALL``, the variables that make a scene small enough for the tests;
+- ``compare(run, axes, full)``, which calls ``run(**variables)`` (a `Result`) as often as it likes,
+  draws its result beside the reference on Matplotlib axes, and yields a `Row` for each number.
+
+``python -m comparisons`` runs them all at full size and writes the table and the pictures of the
+documentation; the tests run them small and ask each row whether it agrees.
+"""

@@ -1,0 +1,134 @@
+"""python -m comparisons [SCENE ...] [--small]: run scenes, write docs/comparison.md and pictures.
+
+Scenes that are not named keep what the table said about them before. Runs work in a temporary
+folder, or below ``--folder``, where their logs and dumps stay.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+import comparisons
+from comparisons.results import Result
+from comparisons.row import Row
+
+HERE = Path(__file__).parent
+DOCS = HERE.parent / "docs"
+INPUTS = HERE.parent / "inputs"
+TOOLS = ("__main__", "results", "row")
+
+
+def scenes() -> list[str]:
+    """Names of the scenes that have something to compare."""
+    return sorted(m.name for m in iter_modules(comparisons.__path__) if m.name not in TOOLS)
+
+
+def scene(name: str) -> ModuleType:
+    """The comparison of a scene."""
+    return import_module(f"comparisons.{name}")
+
+
+def runner(name: str, folder: Path, size: dict[str, Any]) -> Callable[..., Result]:
+    """``run(**variables)`` for a scene: the script by the command line, in a folder of its own."""
+
+    def run(**variables: Any) -> Result:
+        words = {**size, **variables}
+        place = folder / "_".join([name, *(f"{k}={v}" for k, v in words.items())]).replace("/", "-")
+        place.mkdir(parents=True, exist_ok=True)
+        options = [part for k, v in words.items() for part in ("-var", k, str(v))]
+        command = [sys.executable, "-m", "karamelo_py.cli", str(INPUTS / f"in.{name}"), *options]
+        done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
+        if done.returncode:
+            sys.exit(f"{' '.join(command[3:])}\n{done.stderr}")
+        return Result(done.returncode, done.stdout, done.stderr, place)
+
+    return run
+
+
+def compare(name: str, folder: Path, full: bool) -> list[Row]:
+    """Run a scene, save its picture, return its rows."""
+    module = scene(name)
+    figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+    run = runner(name, folder, {} if full else module.SMALL)
+    rows = list(module.compare(run, axes, full))
+    axes.set_title(f"in.{name}", fontsize=9)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=7)
+    figure.savefig((DOCS / "_static" if full else folder) / f"{name}.png", dpi=110)
+    plt.close(figure)
+    return rows
+
+
+HEAD = """# Published and computed
+
+Written by `python -m comparisons`, which runs every scene at its published size and draws the
+pictures; `python -m comparisons SCENE ...` does some of them again. Differences are relative to the
+published number, or to the nearer end of a range.
+"""
+
+
+def section(name: str, rows: list[Row]) -> str:
+    """The part of docs/comparison.md about a scene."""
+    title = (scene(name).__doc__ or name).splitlines()[0]
+    lines = [f"## `in.{name}`", "", title, ""]
+    lines += ["| quantity | published | computed | difference | source |", "|---|---|---|---|---|"]
+    for row in rows:
+        if isinstance(row.published, tuple):
+            published = " to ".join(f"{p:.4g}" for p in row.published)
+        else:
+            published = f"{row.published:.4g}"
+        # Relative to zero there is nothing to divide by.
+        difference = f"{100 * row.difference:+.1f} %" if row.published else f"{row.difference:+.2g}"
+        cells = (row.quantity, published, f"{row.computed:.4g}", difference, row.source)
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join([*lines, "", f"![{title}](_static/{name}.png)", ""])
+
+
+def sections(text: str) -> dict[str, str]:
+    """The parts of docs/comparison.md by the names of their scenes."""
+    parts = ["## " + part for part in text.split("\n## ")[1:]]
+    return {part.split("`")[1].removeprefix("in."): part.rstrip() + "\n" for part in parts}
+
+
+def main() -> None:
+    """Run scenes, write the page and the pictures."""
+    parser = argparse.ArgumentParser(prog="python -m comparisons", description=__doc__)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="all, if none is named")
+    parser.add_argument("--small", action="store_true", help="at the size of the tests, to look at")
+    parser.add_argument("--folder", type=Path, help="where logs and dumps stay")
+    options = parser.parse_args()
+    if unknown := set(options.scenes) - set(scenes()):
+        parser.error(f"unknown scene '{unknown.pop()}'; there are {', '.join(scenes())}")
+    page = DOCS / "comparison.md"
+    found = sections(page.read_text(encoding="utf-8")) if page.exists() else {}
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = (options.folder or Path(temporary)).resolve()
+        for name in options.scenes or scenes():
+            print(f"in.{name}", flush=True)
+            rows = compare(name, folder, not options.small)
+            for row in rows:
+                mark = "" if row.agrees else f"  NOT within {row.within:g}"
+                print(f"  {row.quantity}: {row.published} | {row.computed:.5g}{mark}", flush=True)
+            if options.small:
+                continue
+            found[name] = section(name, rows)
+            text = "\n".join([HEAD, *(found[key] for key in sorted(found))])
+            page.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

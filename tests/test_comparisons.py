@@ -1,0 +1,52 @@
+"""Every scene that has a published number meets it, at a small size (``-m full``: at its own)."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import pytest
+from conftest import INPUTS
+
+from comparisons.__main__ import scene, scenes
+from comparisons.row import Row
+
+
+def found(run_script, name: str, full: bool) -> list[Row]:
+    """The rows of a scene, run in this process."""
+    size = {} if full else scene(name).SMALL
+
+    def run(**variables):
+        words = {**size, **variables}
+        options = ["--threads", "1"]
+        options += [part for key, value in words.items() for part in ("-var", key, str(value))]
+        folder = "_".join([name, *(str(value) for value in words.values())]).replace("/", "-")
+        return run_script(INPUTS / f"in.{name}", *options, folder=folder)
+
+    figure, axes = plt.subplots()
+    rows = list(scene(name).compare(run, axes, full))
+    plt.close(figure)
+    return rows
+
+
+@pytest.mark.parametrize("name", scenes())
+def test_scene(run_script, name):
+    """Each row says what is allowed."""
+    rows = found(run_script, name, full=False)
+    assert rows
+    assert not [row for row in rows if not row.agrees]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", scenes())
+def test_scene_full(run_script, name):
+    """At the published size."""
+    assert not [row for row in found(run_script, name, full=True) if not row.agrees]
+
+
+def test_differences():
+    """Differences are relative, to the nearer end of a range, absolute where zero is published."""
+    assert Row("", 2.0, 2.1, 0.06, "").agrees
+    assert not Row("", 2.0, 2.1, 0.04, "").agrees
+    assert Row("", (2.0, 3.0), 2.7, 0.0, "").agrees
+    assert Row("", (2.0, 3.0), 3.3, 0.2, "").difference == pytest.approx(0.1)
+    assert Row("", 0.0, 0.01, 0.02, "").agrees
+    assert not Row("", 1.0, float("nan"), 1e9, "").agrees
