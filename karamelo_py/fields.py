@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from karamelo_py.kernels.arrays import SUPPLY
 from karamelo_py.kernels.export import (
     ENERGY,
     EXPORTED,
@@ -57,6 +58,7 @@ NODE_NAMES = (
 ABSENT_AT_POINTS = (
     "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
 )  # fmt: skip
+
 # What only some materials have: the number, and the function that shows that a law has it.
 OF_SOME = {
     "ep": (PlasticStrain(), plastic_strain),
@@ -187,7 +189,14 @@ class Fields:
         """Names that `particle` knows, but that are 0 because no material has them."""
         laws = [material.law for material in self.hub.materials.values()]
         present = {name for name, (_, has) in OF_SOME.items() if any(can(law, has) for law in laws)}
+        if self.hub.update.thermal:
+            present.add("gamma")
         return [name for name in ABSENT_AT_POINTS if name not in present]
+
+    def absent_at_nodes(self) -> list[str]:
+        """Names that `node` knows, but that are 0 in this scene."""
+        present = {"T"} if self.hub.update.thermal else set()
+        return [name for name in ABSENT_AT_NODES if name not in present]
 
     def particle(self, name: str) -> np.ndarray:
         """A field of the points that there are, (n,), by id.
@@ -225,6 +234,8 @@ class Fields:
             return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
         if name in ("bx", "by", "bz") and self.has_point_forces:
             return _column(simulation.by_id(lambda b: b.points.force), AXES.index(name[1]))
+        if name == "gamma" and self.hub.update.thermal:
+            return _column(simulation.by_id(lambda b: b.points.heat), SUPPLY)
         return np.zeros(simulation.count)
 
     def node(self, name: str) -> np.ndarray:
@@ -243,6 +254,9 @@ class Fields:
             return np.concatenate([lattice.positions()[:, axis] for lattice in self.hub.lattices])
         if name == "mass":
             return mass
+        if name == "T" and self.hub.update.thermal:
+            heat = self._simulation.setup.heat.nodes
+            return np.where(heat.sums[:, 0] > 0, heat.update[:, 0], 0.0)
         if name in ABSENT_AT_NODES:
             return np.zeros(self.node_count)
         axis = AXES.index(name[1])

@@ -14,6 +14,7 @@ import numpy as np
 from karamelo_py import boundary
 from karamelo_py.kernels.arrays import (
     DRIFT,
+    GRADIENT,
     LIGHTEST,
     SPACING,
     Block,
@@ -22,7 +23,8 @@ from karamelo_py.kernels.arrays import (
     Points,
     Setup,
 )
-from karamelo_py.kernels.step import FBar
+from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.step import FBar, Insulated
 from karamelo_py.lattice import table
 from karamelo_py.laws import can, elastic_law, law_in, law_kind, law_on, law_table
 from karamelo_py.methods.base import NoContact
@@ -30,7 +32,16 @@ from karamelo_py.modify import puts_force_on_points
 from karamelo_py.points.basis import carried, deformed
 from karamelo_py.points.boundary import ReflectingGrid
 from karamelo_py.points.kinematics import identity, planar
-from karamelo_py.points.materials import deformation, driven, initial_state, with_temperature
+from karamelo_py.points.materials import (
+    conductivity,
+    deformation,
+    driven,
+    heat_capacity,
+    initial_state,
+    specific_volume,
+    with_temperature,
+)
+from karamelo_py.points.materials.temperatures import initial_heat
 from karamelo_py.points.transfers import terms
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.state.tiles import Tiles
@@ -53,6 +64,7 @@ class State(NamedTuple):
     deformation: np.ndarray | None  # (N, t) F, where it has an array of its own
     present: np.ndarray  # (N,) bool, False for points that were deleted
     bounces: np.ndarray | None  # (N, d) reflections, where they are counted
+    heat: np.ndarray | None  # (N, ...) what points keep of heat, where it flows
     contact: NamedTuple  # how solids touch, with what it remembers
 
 
@@ -74,6 +86,7 @@ def check_scene(hub: Hub) -> None:
     method = hub.update.method
     try:
         method.check(hub)
+        check_heat(hub)
     except ScriptError as error:
         if error.place is None:
             error.place, error.command = method.place, "method"
@@ -121,6 +134,37 @@ def stable_courant(hub: Hub) -> float:
     return (one if sparse else two) * (0.7 if basis.nodes_per_cell > 1 else 1)
 
 
+def stable_conduction(hub: Hub) -> float:
+    """The stable step of conduction: h^2 / (4 d) times capacity over conductivity, of the worst.
+
+    The bound of lumped finite elements is h^2 / (2 d); a body that is squeezed to seven tenths of
+    its thickness in the total frame needs the rest.
+    """
+    if not hub.update.thermal:
+        return np.inf
+    limits = [np.inf]
+    per_cell = hub.update.method.basis.nodes_per_cell
+    for solid in hub.solids.values():
+        law = solid.material.law
+        kappa = conductivity(law, 1.0)
+        if kappa > 0:
+            capacity = heat_capacity(law, 1.0) / specific_volume(law)
+            limits.append((solid.h / per_cell) ** 2 / (4 * solid.x0.shape[1]) * capacity / kappa)
+    return min(limits)
+
+
+def check_heat(hub: Hub) -> None:
+    """Heat needs a body that it can flow in."""
+    if hub.update.thermal and not any(
+        can(solid.material.law, initial_heat) for solid in hub.solids.values()
+    ):
+        raise ScriptError(
+            "the method is thermo-mechanical, and no solid has a temperature",
+            hint="give a material one: material(ID, linear, rho, E, nu, cp, kappa), or "
+            "temperature(...) with eos-strength",
+        )
+
+
 def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     """Make the arrays of a run from the scene, taking over the state of points that exist."""
     check_scene(hub)
@@ -134,7 +178,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
-    control = Control(hub.values.array, np.zeros(12), np.zeros(4, np.int64))
+    control = Control(hub.values.array, np.zeros(13), np.zeros(4, np.int64))
     control.real[SPACING] = min(lattice.h for lattice in lattices)
     control.real[DRIFT] = np.inf  # the points are not sorted yet
     needs = Needs(
@@ -144,7 +188,9 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         series=terms(transfer) > 1,
         normal=not isinstance(contact, NoContact),
         bounces=hub.update.boundary == "reflect",
+        heat=hub.update.thermal,
     )
+    count = sum(lattice.node_count for lattice in lattices)
     grids = table(lattices, real)
     setup = Setup(
         frame=method.frame,
@@ -154,7 +200,8 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         averaging=method.averaging(hub),
         contact=contact,
         grids=ReflectingGrid(*grids) if needs.bounces else grids,
-        nodes=lower_nodes(sum(lattice.node_count for lattice in lattices), kin, needs, real),
+        nodes=lower_nodes(count, kin.dimension, needs, real),
+        heat=Conducting(lower_nodes(count, 1, OF_HEAT, real)) if needs.heat else Insulated(),
         blocks=lower_blocks(hub, kin, needs, tiles, real, previous),
         spans=tiles.empty_spans(),
         control=control,
@@ -174,11 +221,18 @@ class Needs(NamedTuple):
     series: bool
     normal: bool
     bounces: bool
+    heat: bool
 
 
-def lower_nodes(count: int, kin, needs: Needs, real: type) -> Nodes:
-    """Node fields, zero; the system gives memory to pages only when they are touched."""
-    d = kin.dimension
+# Nodes of heat have levels in the place of volumes.
+OF_HEAT = Needs(*(False for _ in Needs._fields))._replace(growth=True)
+
+
+def lower_nodes(count: int, d: int, needs: Needs, real: type) -> Nodes:
+    """Fields of `count` nodes with vectors of `d` components, zero.
+
+    The system gives memory to pages only when they are touched.
+    """
     return Nodes(
         sums=np.zeros((count, 1 + 2 * d), real),
         update=np.zeros((count, 2 * d), real),
@@ -232,6 +286,7 @@ def lower_block(
     x = np.stack([here, here])
     v = np.zeros((n, d), real)
     bounces = np.zeros((n, d), real) if needs.bounces else None
+    heat = np.zeros((n, GRADIENT + d), real) if needs.heat else None
     present = np.ones(n, np.bool_)
     if previous is not None:
         old = ids < previous.count
@@ -246,6 +301,8 @@ def lower_block(
             f[old] = previous.deformation[ids[old]]
         if bounces is not None and previous.bounces is not None:
             bounces[old] = previous.bounces[ids[old]]
+        if heat is not None and previous.heat is not None:
+            heat[old] = previous.heat[ids[old]]
         present[old] = previous.present[ids[old]]
     points = Points(
         v=v,
@@ -263,6 +320,7 @@ def lower_block(
         growth=np.ones(n, real) if needs.growth else None,
         echo=np.zeros((n, d), real) if needs.series else None,
         bounces=bounces,
+        heat=heat,
     )
     block = Block(
         x=x,

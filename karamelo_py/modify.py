@@ -9,6 +9,9 @@ A fix overrides the hooks it needs, by the names of Karamelo:
 ``post_grid_to_point``         the points have their new velocity and place; :class:`PointsView`
 ``post_advance_particles``     the same moment, after all ``post_grid_to_point``
 ``post_velocities_to_grid``    the velocity that will deform the points; :class:`NodesView`
+``post_heat_to_grid``          the temperature of the nodes is known (thermo-mechanical)
+``supply_heat``                heat flows, points may get heat
+``post_update_grid_heat``      the temperature of the nodes after the step is known
 ``final_integrate``            the end of the step; :class:`PointsView`
 =============================  =================================================================
 
@@ -23,7 +26,7 @@ from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 from karamelo_py.group import ParticleGroup
-from karamelo_py.kernels.hooks import STAGES, CompiledHook, node_hook, point_hook
+from karamelo_py.kernels.hooks import STAGES, CompiledHook, heat_hook, node_hook, point_hook
 from karamelo_py.script.errors import Place
 from karamelo_py.script.faults import told
 from karamelo_py.script.values import SUFFIXES
@@ -35,7 +38,7 @@ if TYPE_CHECKING:
     from karamelo_py.hub import Hub
     from karamelo_py.solid import Solid
 
-__all__ = ["Compute", "Fix", "NodesView", "PointsView", "node_hook", "point_hook"]
+__all__ = ["Compute", "Fix", "NodesView", "PointsView", "heat_hook", "node_hook", "point_hook"]
 
 
 class Fix:

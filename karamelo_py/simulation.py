@@ -15,6 +15,7 @@ from karamelo_py.kernels.arrays import (
     DT_FACTOR,
     END_TIME,
     FIXED_DT,
+    HEAT_LIMIT,
     INITIAL_INTEGRATE,
     NOW,
     OVER_LIMIT,
@@ -27,6 +28,7 @@ from karamelo_py.kernels.arrays import (
     NoHooks,
 )
 from karamelo_py.kernels.export import impose_stress
+from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, show_heat
 from karamelo_py.kernels.hooks import ON_VELOCITY, POINT_STAGES, STAGES, CompiledHook
 from karamelo_py.kernels.stages import Everything, SumsToVelocity
 from karamelo_py.kernels.step import (
@@ -45,7 +47,14 @@ from karamelo_py.kernels.step import (
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
 from karamelo_py.laws import can, elastic_law, law_kind
-from karamelo_py.lowering import State, chosen, lower, stable_courant, thread_count
+from karamelo_py.lowering import (
+    State,
+    chosen,
+    lower,
+    stable_conduction,
+    stable_courant,
+    thread_count,
+)
 from karamelo_py.modify import puts_force_on_points
 from karamelo_py.points.kinematics import identity
 from karamelo_py.points.materials import with_stress
@@ -67,6 +76,7 @@ def scene_key(hub: Hub) -> tuple:
         update.method,
         update.transfer,
         type(update.transfer),
+        update.thermal,
         update.anti_locking,
         update.boundary,
         puts_force_on_points(hub),
@@ -115,6 +125,20 @@ def _(hooks, stage, then, s):
             hooks.simulation.sort()
         elif view.moved:
             s.control.real[DRIFT] = np.inf
+
+
+@at_heat_nodes.on(PythonHooks)
+def _(hooks, stage, target, s):
+    at_heat_nodes(hooks.compiled, stage, target, s)
+    # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
+    for fix, hook in hooks.by_stage.get(stage, ()):
+        heat = s._replace(nodes=s.heat.nodes)
+        hook(NodesView(heat, fix.group, stage, before_update=target == ON_VELOCITY))
+
+
+@at_heated_points.on(PythonHooks)
+def _(hooks, s):
+    at_heated_points(hooks.compiled, s)
 
 
 class Simulation:
@@ -200,7 +224,11 @@ class Simulation:
         bounces = self.by_id(lambda block: block.points.bounces) if counts else None
         f = self._deformation()
         contact = self.setup.contact
-        return State(self.count, places, self.v, laws, moment, f, self.present, bounces, contact)
+        conducts = self.setup.blocks[0].points.heat is not None
+        heat = self.by_id(lambda block: block.points.heat) if conducts else None
+        return State(
+            self.count, places, self.v, laws, moment, f, self.present, bounces, heat, contact
+        )
 
     def _deformation(self) -> np.ndarray | None:
         """F of all points, where a block has an array for it; others are left undeformed."""
@@ -267,6 +295,7 @@ class Simulation:
         control = self.setup.control
         control.real[FIXED_DT] = update.fixed_dt or 0.0
         control.real[COURANT] = stable_courant(self.hub)
+        control.real[HEAT_LIMIT] = stable_conduction(self.hub)
         control.real[DT_FACTOR] = update.dt_factor
         control.real[END_TIME] = end_time
         control.whole[OVER_LIMIT] = 0
@@ -304,9 +333,8 @@ class Simulation:
     def limit(self) -> float:
         """The stable step of the present state."""
         control = self.setup.control.real
-        if control[RATE] == 0:
-            return np.inf
-        return control[COURANT] * control[SPACING] / control[RATE]
+        of_waves = control[COURANT] * control[SPACING] / control[RATE] if control[RATE] else np.inf
+        return min(of_waves, control[HEAT_LIMIT])
 
     def above_limit(self) -> bool:
         """Whether the chosen step is above the stable limit already."""
@@ -393,6 +421,7 @@ class Simulation:
             dt = step_size(s)
             map_to_nodes(s, self.mode, Everything())
             sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
+            show_heat(s.heat, s, self.mode)
             self._mapped = True
 
     # --- state that can be returned to --------------------------------------------------------
@@ -421,6 +450,8 @@ class Simulation:
             s.nodes.sums[begin:end] = 0
             if s.nodes.normal is not None:
                 s.nodes.normal[begin:end] = 0
+            if isinstance(s.heat, Conducting):
+                s.heat.nodes.sums[begin:end] = 0
         for array, copy in snapshot:
             array[...] = copy
         for marks in self.hub.update.method.remembered(s.contact, spans):

@@ -22,6 +22,8 @@ class Update:
         The method style, or None as long as there is none.
     transfer
         The transfer's NamedTuple (PIC, FLIP, APIC ...).
+    thermal
+        Whether heat flows between points.
     anti_locking
         Whether changes of volume are averaged against volumetric locking.
     scheme
@@ -43,6 +45,7 @@ class Update:
         self.method: Any = None
         self.transfer: NamedTuple | None = None
         self.scheme: NamedTuple = MUSL()
+        self.thermal = False
         self.anti_locking = False
         self.fixed_dt: float | None = None
         self.dt_factor = DEFAULT_DT_FACTOR

@@ -53,7 +53,7 @@ def test_hindered_expansion_makes_pressure(style, kin):
     assert kirchhoff_stress(law, kin, state) == pytest.approx(expected)
     assert elastic_strain(law, kin, state)[:3] == pytest.approx([-ALPHA * 10] * 3)
     assert temperature(law, kin, state) == 310 and len(state) == len(warm(style, kin, T0)[1])
-    assert heat_capacity(law) == 0.5 and conductivity(law) == 0.1
+    assert heat_capacity(law, 1.0) == 0.5 and conductivity(law, 1.0) == 0.1
 
 
 @styles

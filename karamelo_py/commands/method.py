@@ -37,7 +37,8 @@ def method(
         ``cpgimp``; with the cpdi methods ``linear``.
     options
         What the transfer asks for (the share of FLIP from 0 to 1, the order of XPIC); then, in any
-        order, ``mechanical``, ``gradient-enhanced`` (FLIP maps the gradient of velocity too), and
+        order, ``mechanical`` (the default) or ``thermo-mechanical`` (heat flows between points,
+        too), ``gradient-enhanced`` (FLIP maps the gradient of velocity too), and
         the variant of the basis (cpgimp: ``det``, ``diagonal``, ``stretch`` or ``corners``; the
         cpdi methods: ``R4``, ``Q4``, ``R8``, ``H8``, ``T3``, ``Tet4``).
 
@@ -47,14 +48,24 @@ def method(
     method(ulmpm, APIC, quadratic-spline)
     method(ulmpm, FLIP, cpgimp, 1, stretch)
     method(ulcpdi, FLIP, linear, 0.99, Q4)
+    method(tlmpm, FLIP, linear, 0.99, thermo-mechanical)
 
     Notes
     -----
     Comes before the first solid.
 
+    ``thermo-mechanical``: before each update of momentum, heat flows between the points of
+    materials with a temperature (``linear`` and ``neo-hookean`` with cp and kappa,
+    ``eos-strength`` with a temperature; others take no part). Points take changes of the nodes'
+    temperature (FLIP, whatever the transfer of velocity): nothing is smeared but by conduction.
+    Without it points only heat by their own work. Conduction has a stable step of its own,
+    h^2/(4 d) rho cp/kappa in d dimensions, which `dt` keeps too. Heat leaves a body only where a
+    fix says so.
+
     See Also
     --------
-    scheme, solid
+    scheme, solid, temperature, temperature_nodes, temperature_particles, heat_flux_particles,
+    convection_particles
     """
     method_class = registry.find("method", kind)
     transfer_class = registry.find("transfer", transfer)
@@ -67,10 +78,6 @@ def method(
     basis_class, chosen = _basis(call, basis_class, variants, words)
     for argument in words:
         word = argument.word() or argument.text
-        if word == "thermo-mechanical":
-            raise ScriptError(
-                "temperature is not there yet", place=argument.place, hint="mechanical"
-            )
         if chosen is not None and argument is not chosen and word in variants:
             raise ScriptError(
                 f"'{chosen.text}' was chosen already", place=argument.place, expected="one of them"
@@ -78,7 +85,7 @@ def method(
         if word == "gradient-enhanced":
             transfer_class = _enhanced(transfer_class, argument)
         elif argument is not chosen and word not in OPTIONS:
-            known = [*(o for o in OPTIONS if o != "thermo-mechanical"), *call.fitting(variants)]
+            known = [*OPTIONS, *call.fitting(variants)]
             close = nearest(word, known)
             raise ScriptError(
                 f"'{argument.text}' is not an option of method({kind}, {transfer}, {basis})",
@@ -95,6 +102,7 @@ def method(
     hub.update.method = method_class(hub, basis_class())
     hub.update.method.place = hub.place
     hub.update.transfer = transfer_class(*parameters)
+    hub.update.thermal = any(argument.word() == "thermo-mechanical" for argument in words)
 
 
 class _Call(NamedTuple):

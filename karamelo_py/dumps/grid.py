@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from karamelo_py.dumps.lammps import LammpsDump
-from karamelo_py.fields import ABSENT_AT_NODES
 from karamelo_py.signature import OutputFile, Positive
 
 if TYPE_CHECKING:
@@ -35,7 +34,8 @@ class Grid(LammpsDump):
         other in one file.
     columns
         What to write of each node: x y z (position), vx vy vz (velocity), vx_update ... (velocity
-        after the momentum update), fx fy fz (total force), mass. ``x, y, z`` by default.
+        after the momentum update), fx fy fz (total force), mass, T where heat flows. ``x, y, z`` by
+        default.
     occupied
         true: leave out nodes without mass, which makes the files of a large and sparsely filled
         domain small.
@@ -45,7 +45,6 @@ class Grid(LammpsDump):
     dump(d2, all, grid, 100, dump_g.*.LAMMPS, x, y, z, vx, vy, mass)
     """
 
-    absent = ABSENT_AT_NODES
     rows_are = "nodes"
 
     def __init__(
@@ -59,6 +58,11 @@ class Grid(LammpsDump):
         super().__init__(hub, every, file, *columns)
         self.occupied = occupied
         self._rows: np.ndarray | slice = slice(None)
+
+    @property
+    def absent(self) -> Sequence[str]:
+        """Columns that are 0 in this scene."""
+        return self.hub.fields.absent_at_nodes()
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:

@@ -34,6 +34,11 @@ class Points(NamedTuple):
     growth: np.ndarray | None  # (n,) ratio of volumes of the trial increment, for F-bar
     echo: np.ndarray | None  # (n, d) term of the series of XPIC
     bounces: np.ndarray | None  # (n, d) how often the edge of the domain has reflected the point
+    heat: np.ndarray | None  # (n, GRADIENT + d), see the columns below, where heat flows
+
+
+# Columns of Points.heat; behind them the gradient of temperature, which alone outlives a step.
+TEMPERATURE, CAPACITY, CONDUCTANCE, FACE, SUPPLY, SHARE, GRADIENT = range(7)
 
 
 class Tiling(NamedTuple):
@@ -101,13 +106,16 @@ POST_GRID_TO_POINT = 3
 POST_ADVANCE_PARTICLES = 4
 POST_VELOCITIES_TO_GRID = 5
 FINAL_INTEGRATE = 6
+POST_HEAT_TO_GRID = 7
+SUPPLY_HEAT = 8
+POST_UPDATE_GRID_HEAT = 9
 
 
 class Control(NamedTuple):
     """What the compiled loop reads and writes beside the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
-    real: np.ndarray  # (12,) float64, see the names below
+    real: np.ndarray  # (13,) float64, see the names below
     whole: np.ndarray  # (4,) int64, see the names below
 
 
@@ -117,6 +125,7 @@ FIXED_DT, DT_FACTOR, END_TIME, RATE, NEW_RATE, MOVE, DRIFT, DRIFT_LIMIT, SPACING
 LIGHTEST = 9  # mass of the lightest point, where the edge of the basis is steep
 NEW_MOVE = 10
 COURANT = 11  # stable step as a share of cell size over the fastest point's rate
+HEAT_LIMIT = 12  # stable step of conduction, infinite where there is none
 # Control.whole
 NOW, WRONG, OVER_LIMIT, WATCH_LIMIT = range(4)
 
@@ -130,6 +139,7 @@ class Setup(NamedTuple):
     transfer: NamedTuple
     averaging: NamedTuple  # whether changes of volume are averaged (F-bar)
     contact: NamedTuple  # how solids with fields of their own touch
+    heat: NamedTuple  # whether heat flows between points, and the nodes it flows through
     grids: NamedTuple  # points.grid.Grid with an array (g,) for each number
     nodes: Nodes
     blocks: tuple  # of Block, one for each constitutive law

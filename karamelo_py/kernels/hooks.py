@@ -8,6 +8,11 @@ Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star
     `value` and `before` are the formula at the time of the step and one step earlier, `share` is
     one over the number of members with mass; the totals are summed and published.
 Point function ``(mass, v, x_old, x, value, before, dt) -> (v, x, total)``
+Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``
+    acts on points where heat flows: `value` and `other` are the first and the second formula,
+    `face` is the area that the point shows, `supply` the heat it gets per time, `share` how much it
+    takes of the change of the nodes' temperature. The total is of what it supplies.
+The node functions of heat see capacity, temperature before and after the step, and heat flow.
 """
 
 from __future__ import annotations
@@ -18,21 +23,29 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compile import caller_of, kernel
+from karamelo_py.compile import caller_of, kernel, point_function
 from karamelo_py.kernels.arrays import (
     ADDRESS,
     BEFORE,
+    CAPACITY,
     CODE,
+    FACE,
     FINAL_INTEGRATE,
     FROM,
     INITIAL_INTEGRATE,
     POST_ADVANCE_PARTICLES,
     POST_GRID_TO_POINT,
+    POST_HEAT_TO_GRID,
     POST_PARTICLES_TO_GRID,
+    POST_UPDATE_GRID_HEAT,
     POST_UPDATE_GRID_STATE,
     POST_VELOCITIES_TO_GRID,
+    SHARE,
     SLOT,
     STAGE,
+    SUPPLY,
+    SUPPLY_HEAT,
+    TEMPERATURE,
     TIME,
     TO,
     USES_BEFORE,
@@ -64,7 +77,12 @@ POINT_STAGES = {
     "post_advance_particles": POST_ADVANCE_PARTICLES,
     "final_integrate": FINAL_INTEGRATE,
 }
-STAGES = NODE_STAGES | POINT_STAGES
+HEAT_STAGES = {
+    "post_heat_to_grid": POST_HEAT_TO_GRID,
+    "supply_heat": SUPPLY_HEAT,
+    "post_update_grid_heat": POST_UPDATE_GRID_HEAT,
+}
+STAGES = NODE_STAGES | POINT_STAGES | HEAT_STAGES
 
 
 class CompiledHook(NamedTuple):
@@ -89,6 +107,11 @@ def point_hook(
 ) -> CompiledHook:
     """A compiled hook on points: `function` as described at the head of this file."""
     return CompiledHook(function, False, publishes, uses_before, False)
+
+
+def heat_hook(function: Callable, *, publishes: bool = False) -> CompiledHook:
+    """A compiled hook for ``supply_heat``: `function` as described at the head of this file."""
+    return CompiledHook(function, False, publishes, False, False)
 
 
 @kernel
@@ -186,16 +209,22 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, h, count, sha
 
 
 @kernel
+def clear_total(hooks, h, control):
+    """The totals of a hook start from zero."""
+    slot = hooks.table[h, SLOT]
+    for c in range(3):
+        if slot >= 0 and hooks.table[h, CODE + 4 * c] >= 0:
+            control.values[slot + c] = 0.0
+
+
+@kernel
 def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt):
     """Call the node functions of `stage` on the members that have mass."""
     dt = float(dt)
     for h in range(len(hooks.table)):
         if hooks.table[h, STAGE] != stage:
             continue
-        slot = hooks.table[h, SLOT]
-        if slot >= 0:
-            for c in range(3):
-                control.values[slot + c] = 0.0
+        clear_total(hooks, h, control)
         share = 1.0
         # The first pass only counts the members with mass, for those that share a total.
         for counting in (True, False):
@@ -229,17 +258,37 @@ def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt):
                 _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, h, count, share)
 
 
-@kernel
-def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y, corners):
-    """Act on the chosen points and, as far as they move, their corners; add to the totals."""
+class Motion(NamedTuple):
+    """What point functions change: velocity, and the places y that follow from x.
+
+    Behind the d coordinates of a point, `y` has those of `corners` corners of its domain.
+    """
+
+    v: np.ndarray
+    mass: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    corners: int
+
+
+class Warmth(NamedTuple):
+    """What heat functions change: the heat that points get."""
+
+    heat: np.ndarray
+    mass: np.ndarray
+    x: np.ndarray
+
+
+@point_function()
+def act_on_points(what, kin, hooks, control, dt, h, count):
+    """Call a function for the chosen points; add to the totals."""
+
+
+@act_on_points.on(Motion)
+def _(what, kin, hooks, control, dt, h, count):
+    v, y = what.v, what.y
     step_back = min(dt, control.values[TIME])
-    where = hooks.scratch
     d = dimension(kin)
-    for q in range(count):
-        p = hooks.chosen[q]
-        for c in range(d):
-            where[c, q] = x[p, c]
-            where[3 + c, q] = hooks.x0[ids[p], c]
     for c in range(d):
         if hooks.table[h, CODE + 4 * c] < 0:
             continue
@@ -251,16 +300,17 @@ def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y, corn
             p = hooks.chosen[q]
             velocity, place, part = _call_point_function(
                 hooks.table[h, ADDRESS],
-                mass[p],
+                what.mass[p],
                 v[p, c],
-                x[p, c],
+                what.x[p, c],
                 y[p, c],
                 hooks.scratch[VALUE, q],
                 hooks.scratch[BEFORE, q],
                 dt,
             )
             v[p, c] = velocity
-            for corner in range(corners):
+            # As far as a point moves, its corners do.
+            for corner in range(what.corners):
                 y[p, d + d * corner + c] += place - y[p, c]
             y[p, c] = place
             total += part
@@ -269,22 +319,58 @@ def _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y, corn
             control.values[slot + c] += total
 
 
+@act_on_points.on(Warmth)
+def _(what, kin, hooks, control, dt, h, count):
+    heat = what.heat
+    _evaluate(hooks, h, 0, count, control, np.int64(VALUE), 0.0)
+    if hooks.table[h, CODE + 4] >= 0:
+        _evaluate(hooks, h, 1, count, control, np.int64(BEFORE), 0.0)
+    total = 0.0
+    for q in range(count):
+        p = hooks.chosen[q]
+        before = heat[p, SUPPLY]
+        share, supply, T = _call_point_function(
+            hooks.table[h, ADDRESS],
+            heat[p, CAPACITY],
+            heat[p, TEMPERATURE],
+            heat[p, FACE],
+            before,
+            hooks.scratch[VALUE, q],
+            hooks.scratch[BEFORE, q],
+            dt,
+        )
+        heat[p, SHARE] = min(heat[p, SHARE], share)
+        heat[p, SUPPLY] = supply
+        heat[p, TEMPERATURE] = T
+        total += supply - before
+    slot = hooks.table[h, SLOT]
+    if slot >= 0:
+        control.values[slot] += total
+
+
 @kernel
-def clear_point_totals(stage, hooks, control):
+def _apply_at_points(what, kin, ids, hooks, control, dt, h, count):
+    """Act on the chosen points, where they are before the step."""
+    where = hooks.scratch
+    for q in range(count):
+        p = hooks.chosen[q]
+        for c in range(dimension(kin)):
+            where[c, q] = what.x[p, c]
+            where[3 + c, q] = hooks.x0[ids[p], c]
+    act_on_points(what, kin, hooks, control, dt, h, count)
+
+
+@kernel
+def clear_totals(stage, hooks, control):
     """Totals of point functions start from zero: they are summed over the blocks."""
     for h in range(len(hooks.table)):
-        slot = hooks.table[h, SLOT]
-        if hooks.table[h, STAGE] == stage and slot >= 0:
-            for c in range(3):
-                control.values[slot + c] = 0.0
+        if hooks.table[h, STAGE] == stage:
+            clear_total(hooks, h, control)
 
 
 @kernel
-def point_hooks(stage, kin, v, mass, ids, hooks, control, dt, x, y, corners):
-    """Call the point functions of `stage` on the members in a block.
-
-    Behind the d coordinates of a point, `y` has those of `corners` corners of its domain.
-    """
+def point_hooks(stage, what, kin, ids, hooks, control, dt):
+    """Call the point functions of `stage` on the members in a block."""
     dt = float(dt)
     for axis in range(6):
         for q in range(BLOCK):
@@ -294,13 +380,13 @@ def point_hooks(stage, kin, v, mass, ids, hooks, control, dt, x, y, corners):
             continue
         count = np.int64(0)
         begin = hooks.table[h, FROM]
-        for p in range(mass.size):
+        for p in range(ids.size):
             if begin >= 0 and hooks.members[begin + ids[p]] == 0:
                 continue
             hooks.chosen[count] = p
             count += 1
             if count == BLOCK:
-                _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y, corners)
+                _apply_at_points(what, kin, ids, hooks, control, dt, h, count)
                 count = np.int64(0)
         if count > 0:
-            _apply_at_points(kin, v, mass, ids, hooks, control, dt, h, count, x, y, corners)
+            _apply_at_points(what, kin, ids, hooks, control, dt, h, count)

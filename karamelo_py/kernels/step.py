@@ -19,6 +19,7 @@ from karamelo_py.kernels.arrays import (
     DT_FACTOR,
     END_TIME,
     FIXED_DT,
+    HEAT_LIMIT,
     LIGHTEST,
     MOVE,
     NEW_MOVE,
@@ -42,7 +43,8 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.hooks import (
     ON_SUMS,
     ON_UPDATE,
-    clear_point_totals,
+    Motion,
+    clear_totals,
     node_hooks,
     point_hooks,
 )
@@ -156,6 +158,12 @@ def _survey_all(s):
 
 
 @shared
+def visit_here(s, mode, gather, scatter, dt):
+    """Visit all points at their positions now, where nothing can go wrong."""
+    _sweep_blocks_here(s, mode, gather, scatter, dt)
+
+
+@shared
 def sweep(s, mode, gather, scatter, dt):
     """Visit all points, moving from the positions now to the next; whether all went well."""
     _sweep_blocks(s, mode, gather, scatter, dt)
@@ -213,6 +221,7 @@ def choose_dt(control):
     """
     real_, whole = control.real, control.whole
     limit = real_[COURANT] * real_[SPACING] / real_[RATE] if real_[RATE] > 0 else inf
+    limit = min(limit, real_[HEAT_LIMIT])
     fixed = real_[FIXED_DT]
     dt = fixed if fixed > 0 else real_[DT_FACTOR] * limit
     whole[OVER_LIMIT] = whole[OVER_LIMIT] + 1 if dt > limit else 0
@@ -268,10 +277,9 @@ def corners_that_move(s):
 def _point_hooks(block, s, hooks, stage, now, then):
     x = block.x[now]
     y = block.x[then]
-    points, ids = block.points, block.id
-    corners = corners_that_move(s)
-    dt = step_size(s)
-    point_hooks(stage, s.kin, points.v, points.mass, ids, hooks, s.control, dt, x, y, corners)
+    points = block.points
+    motion = Motion(points.v, points.mass, x, y, corners_that_move(s))
+    point_hooks(stage, motion, s.kin, block.id, hooks, s.control, step_size(s))
 
 
 hook_points = over_blocks(_point_hooks)
@@ -289,7 +297,7 @@ def _(hooks, stage, then, s):
 
 @at_points.on(Hooks)
 def _(hooks, stage, then, s):
-    clear_point_totals(stage, hooks, s.control)
+    clear_totals(stage, hooks, s.control)
     now = s.control.whole[NOW]
     hook_points(s, hooks, stage, now, 1 - now if then else now)
 
@@ -319,7 +327,8 @@ def map_to_nodes(s, mode, scatter):
 
 @shared
 def accelerate_nodes(s, mode, hooks):
-    """v* = v + dt f / m, with what the fixes add and prescribe."""
+    """v* = v + dt f / m, with what the fixes add and prescribe; and heat flows."""
+    conduct(s.heat, s, mode, hooks)
     at_nodes(hooks, POST_PARTICLES_TO_GRID, ON_SUMS, s)
     sweep_nodes(mode, Update(), s.kin, s.nodes, s.spans, step_size(s))
     at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_UPDATE, s)
@@ -331,6 +340,20 @@ def update_nodes(s, mode, hooks):
     """All of the nodes' update: what points gather is ready then."""
     accelerate_nodes(s, mode, hooks)
     sum_series(s.transfer, s, mode)
+
+
+class Insulated(NamedTuple):
+    """No heat flows between points."""
+
+
+@point_function()
+def conduct(heat, s, mode, hooks):
+    """Let heat flow between points for the length of a step; by default none does."""
+
+
+@conduct.otherwise
+def _(heat, s, mode, hooks):
+    return None
 
 
 @point_function()
@@ -374,7 +397,7 @@ def _(transfer, s, mode):
     factor = float(order)
     sweep_nodes(mode, StartSeries(real(factor - 1, dt)), s.kin, s.nodes, s.spans, dt)
     for k in range(2, order + 1):
-        _sweep_blocks_here(s, mode, Series(), Echo(), dt)
+        visit_here(s, mode, Series(), Echo(), dt)
         factor *= -float(order - k + 1) / k
         sweep_nodes(mode, ExtendSeries(real(factor, dt)), s.kin, s.nodes, s.spans, dt)
 
@@ -420,7 +443,7 @@ def _(averaging, s, mode, gather, scatter, dt):
 @strain.on(FBar)
 def _(averaging, s, mode, gather, scatter, dt):
     sweep_nodes(mode, ClearGrowth(), s.kin, s.nodes, s.spans, dt)
-    _sweep_blocks_here(s, mode, Trial(), Growth(), dt)
+    visit_here(s, mode, Trial(), Growth(), dt)
     sweep_nodes(mode, AverageGrowth(), s.kin, s.nodes, s.spans, dt)
     return sweep(s, mode, averaged(gather), scatter, dt)
 

@@ -23,8 +23,10 @@ from karamelo_py.points.kinematics import (
     largest_row_sum,
     left_cauchy_green,
     nominal,
+    planar,
+    zero_tensor,
 )
-from karamelo_py.tensors import add_scaled, scale
+from karamelo_py.tensors import add_scaled, leading, scale, subtract
 
 
 class Updated(NamedTuple):
@@ -98,6 +100,27 @@ def _(frame, kin, total, stress, gradient):
 @add_force.on(Total)
 def _(frame, kin, total, stress, gradient):
     return add_tensor_dot(kin, total, stress, gradient)
+
+
+@point_function()
+def drawn_back(frame, kin, g, f):
+    """What a flux against the gradient `g` of the frame is proportional to, in the frame.
+
+    Per deformed volume: in space that is g, and C^-1 g with respect to reference positions, which
+    C^-1 = F^-1 F^-T takes to space and back.
+    """
+
+
+@drawn_back.on(Updated)
+def _(frame, kin, g, f):
+    return g
+
+
+@drawn_back.on(Total)
+def _(frame, kin, g, f):
+    flat = planar(kin)
+    inside = inverse(flat, leading(f, zero_tensor(flat, g[0])))
+    return add_symmetric_dot(flat, subtract(g, g), left_cauchy_green(flat, inside), g)
 
 
 @point_function()

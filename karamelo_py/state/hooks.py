@@ -59,9 +59,11 @@ class _Builder:
     def add(self, fix: Any, stage: int, hook: CompiledHook) -> None:
         """Add one compiled hook of a fix."""
         begin, end = self._members(fix.group, hook)
-        slot = (
-            self.hub.values.slot(f"{fix.id}_x") if hook.publishes and "x" in fix.published else -1
-        )
+        slot = -1
+        if hook.publishes and fix.published:
+            # Components lie one after another, from x on; a total without direction stands alone.
+            first = "x" if "x" in fix.published else fix.published[0]
+            slot = self.hub.values.slot(f"{fix.id}_{first}")
         signature = NODE_FUNCTION if hook.on_nodes else POINT_FUNCTION
         address = address_of(hook.function, signature)
         row = [address, stage, begin, end, slot, int(hook.uses_before), int(hook.uses_share)]

@@ -8,7 +8,7 @@ be composed of parts, NamedTuples among its parameters (`eos_strength`).
 
 from typing import NamedTuple
 
-from karamelo_py.compile import point_function
+from karamelo_py.compile import point_function, real
 
 
 class Whole(NamedTuple):
@@ -106,7 +106,12 @@ def damage_initiation(law, kin, state):
 
 @point_function()
 def temperature(law, kin, state):
-    """Temperature; left out by laws without."""
+    """Temperature; 0 of laws without."""
+
+
+@temperature.otherwise
+def _(law, kin, state):
+    return specific_volume(law) - specific_volume(law)
 
 
 @point_function()
@@ -120,13 +125,23 @@ def _(law, kin, state, T):
 
 
 @point_function()
-def heat_capacity(law):
-    """Heat per mass and kelvin; left out by laws without temperature."""
+def heat_capacity(law, like):
+    """Heat per mass and kelvin; 0 of laws without temperature."""
+
+
+@heat_capacity.otherwise
+def _(law, like):
+    return real(0, like)
 
 
 @point_function()
-def conductivity(law):
-    """Heat flux per gradient of temperature; left out by laws without temperature."""
+def conductivity(law, like):
+    """Heat flux per gradient of temperature; 0 of laws without temperature."""
+
+
+@conductivity.otherwise
+def _(law, like):
+    return real(0, like)
 
 
 @point_function()

@@ -538,10 +538,10 @@ def _(law, kin, state, T):
 
 
 @heat_capacity.on(EosStrength)
-def _(law):
-    return heat_capacity(law.temperature)
+def _(law, like):
+    return heat_capacity(law.temperature, like)
 
 
 @conductivity.on(EosStrength)
-def _(law):
-    return conductivity(law.temperature)
+def _(law, like):
+    return conductivity(law.temperature, like)

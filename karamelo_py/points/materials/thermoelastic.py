@@ -166,10 +166,10 @@ def _(law, kin, state, T):
 
 
 @heat_capacity.on(Thermoelastic)
-def _(law):
+def _(law, like):
     return law.heat.cp
 
 
 @conductivity.on(Thermoelastic)
-def _(law):
+def _(law, like):
     return law.heat.kappa

@@ -37,10 +37,10 @@ def _(temperature, heat):
 
 
 @heat_capacity.on(PlasticWork)
-def _(law):
+def _(law, like):
     return law.cp
 
 
 @conductivity.on(PlasticWork)
-def _(law):
+def _(law, like):
     return law.kappa

@@ -1,0 +1,51 @@
+"""fix convection_particles: heat exchanged with a surrounding fluid."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from karamelo_py.fixes.heat import HeatFix
+from karamelo_py.group import ParticleGroup
+from karamelo_py.modify import heat_hook
+from karamelo_py.script.expressions import Expression
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+def exchange(capacity, T, face, supply, value, other, dt):
+    """Newton's law of cooling, through one face of the point."""
+    return 1.0, supply + face * value * (other - T), T
+
+
+class ConvectionParticles(HeatFix):
+    """Cool or heat points at the surface of a body by a fluid around it: q = h (T_inf - T).
+
+    Parameters
+    ----------
+    group
+        Group of points: one layer of them along the surface.
+    h
+        Heat transfer coefficient, heat per area, time and kelvin: a number or a formula of x, y, z,
+        x0, y0, z0, time and published values.
+    T_inf
+        Temperature of the fluid; a number or a formula likewise.
+
+    Example
+    -------
+    fix(air, convection_particles, surface, 25, 293)
+
+    Notes
+    -----
+    A point shows one face to what is around it, the side of a cube of its volume; in one dimension
+    that is the whole section. Publishes the heat per time that all points get as ID_s.
+
+    See Also
+    --------
+    heat_flux_particles, temperature_nodes, temperature_particles, method
+    """
+
+    supply_heat = heat_hook(exchange, publishes=True)
+
+    def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):
+        super().__init__(hub, group, h, T_inf)

@@ -1,0 +1,50 @@
+"""fix heat_flux_particles: heat that flows into points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from karamelo_py.fixes.heat import HeatFix
+from karamelo_py.group import ParticleGroup
+from karamelo_py.modify import heat_hook
+from karamelo_py.script.expressions import Expression
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
+
+
+def heat(capacity, T, face, supply, value, other, dt):
+    """The flux goes through one face of the point."""
+    return 1.0, supply + face * value, T
+
+
+class HeatFluxParticles(HeatFix):
+    """Let heat flow into points at the surface of a body: lasers, flames, friction.
+
+    Parameters
+    ----------
+    group
+        Group of points: one layer of them along the surface.
+    q
+        Heat per area and time, negative where it leaves the body: a number or a formula of x, y, z,
+        x0, y0, z0, time and published values.
+
+    Example
+    -------
+    fix(laser, heat_flux_particles, top, 1e6*exp(-(x/0.01)^2))
+
+    Notes
+    -----
+    A point shows one face to what is around it, the side of a cube of its volume; in one dimension
+    that is the whole section. Publishes the heat per time (in two dimensions per thickness, per
+    radian where axisymmetric) as ID_s.
+
+    See Also
+    --------
+    convection_particles, temperature_nodes, temperature_particles, method
+    """
+
+    supply_heat = heat_hook(heat, publishes=True)
+
+    def __init__(self, hub: Hub, group: ParticleGroup, q: Expression):
+        super().__init__(hub, group, q)

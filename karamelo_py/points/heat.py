@@ -1,0 +1,37 @@
+"""Heat at one point."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from karamelo_py.compile import point_function, real
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+
+
+@point_function()
+def face(kin, volume, x):
+    """Area that a point of this volume shows to what is around it: the side of a cube.
+
+    Per length across the plane, per radian where axisymmetric.
+    """
+
+
+@face.on(Line)
+def _(kin, volume, x):
+    return real(1, volume)
+
+
+@face.on(PlaneStrain)
+def _(kin, volume, x):
+    return sqrt(volume)
+
+
+@face.on(Axisymmetric)
+def _(kin, volume, x):
+    # r times the side of the square volume / r
+    return sqrt(volume * x[0])
+
+
+@face.on(Space)
+def _(kin, volume, x):
+    return volume ** real(2 / 3, volume)

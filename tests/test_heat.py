@@ -1,0 +1,259 @@
+"""Heat that flows between points, against solutions of the heat equation."""
+
+from __future__ import annotations
+
+from math import erfc, exp, log, sqrt
+
+import numpy as np
+import pytest
+from states import same_bits
+
+from comparisons.results import read_dump
+from karamelo_py.points.frames import Total, drawn_back
+from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
+
+# Heat capacity per volume and conductivity are one: the diffusivity is.
+SLAB = """
+    N = 10
+    h = 1/N
+    kind = "ulmpm"
+    method(kind, FLIP, linear, 1, thermo-mechanical)
+    dimension(1, 0, 1, h)
+    region(slab, block, 0, 1)
+    material(m, linear, 2, 1, 0, 0.5, 1)
+    solid(slab, region, slab, 2, m, h, 300)
+    compute(T, average_temperature, all)
+    region(end, block, 0, h/2)
+    set_output(1)
+    {lines}
+    log_modify(custom, step, dt, time, T{columns})
+    dump(d, all, particle, 100000, d.*.txt, x, T, gamma)
+    dump(g, all, grid, 100000, g.*.txt, x, T)
+    {run}
+"""
+HOT = "group(end, nodes, region, end, all)\n    fix(hot, temperature_nodes, end, {})"
+FIRST = "group(first, particles, region, end, all)\n    "
+
+
+def slab(lines: str = "", columns: str = "", run: str = "run_time(0.02)") -> str:
+    return SLAB.format(lines=lines, columns=columns, run=run)
+
+
+def last(result, name="d"):
+    files = sorted(result.folder.glob(f"{name}.*.txt"), key=lambda f: int(f.name.split(".")[1]))
+    return read_dump(files[-1])[-1]
+
+
+@pytest.mark.parametrize("kind", ["ulmpm", "tlmpm"])
+def test_slab(run_interpreted, kind):
+    """Half space whose face is heated at once (Carslaw & Jaeger 1959, 2.4): second order."""
+    errors = []
+    for N in (10, 20):
+        text = slab(HOT.format(301), ", hot_s")
+        words = ("-var", "N", str(N), "-var", "kind", kind)
+        result = run_interpreted(text, *words, folder=f"run{N}")
+        points = last(result)
+        exact = [300 + erfc(x / (2 * sqrt(0.02))) for x in points.x]
+        errors.append(sqrt(np.mean((points["T"] - exact) ** 2)))
+        # The heat through the face: conductivity times its gradient there.
+        assert result.log.hot_s[-1] == pytest.approx(1 / sqrt(np.pi * 0.02), rel=0.01)
+        # What the nodes show is the same curve.
+        nodes = last(result, "g")
+        assert nodes["T"][0] == 301
+        assert nodes["T"][1] == pytest.approx(300 + erfc(1 / N / (2 * sqrt(0.02))), abs=0.2 / N)
+    assert errors[0] < 0.008
+    assert errors[1] < errors[0] / 3
+
+
+def test_ramp(run_interpreted):
+    """A temperature that rises from the start (Carslaw & Jaeger 1959, 2.5)."""
+    result = run_interpreted(slab(HOT.format("300 + 10*time")))
+    points = last(result)
+    t = 0.02
+
+    def exact(x):
+        # i^2 erfc, Carslaw & Jaeger 1959, 2.5 (4) with n = 2.
+        z = x / (2 * sqrt(t))
+        part = (1 + 2 * z**2) * erfc(z) - 2 / sqrt(np.pi) * z * exp(-(z**2))
+        return 300 + 10 * t * part
+
+    # Values of fixes are of the beginning of a step: up to 10 dt = 0.02 behind at the face.
+    assert points["T"] == pytest.approx([exact(x) for x in points.x], abs=0.02)
+
+
+def test_step_of_conduction(run_interpreted):
+    """h^2 / (4 d) times capacity over conductivity, where waves allow more."""
+    result = run_interpreted(slab("dt_factor(1)", run="run(1)"))
+    assert result.log.dt[0] == pytest.approx(1 / 10**2 / 4)
+    warned = run_interpreted(slab("set_dt(0.01)", run="run(1)"))
+    assert "above the stable" in warned.err + warned.out
+
+
+def test_heat_flux(run_interpreted):
+    """What flows in is in the body: T0 + q t / (rho cp L), to the last digits."""
+    lines = FIRST + "fix(lamp, heat_flux_particles, first, 7)"
+    result = run_interpreted(slab(lines, ", lamp_s"))
+    assert result.log["T"][-1] == pytest.approx(300 + 7 * 0.02, rel=1e-12)
+    assert result.log.lamp_s[-1] == pytest.approx(7)
+    points = last(result)
+    assert points["gamma"][0] == 7 and not points["gamma"][1:].any()
+    # Carslaw & Jaeger 1959, 2.9: 2 q sqrt(t/pi) at the face of a half space.
+    z = points.x[0] / (2 * sqrt(0.02))
+    rise = 2 * 7 * sqrt(0.02) * (exp(-(z**2)) / sqrt(np.pi) - z * erfc(z))
+    # The heat enters at points, a quarter of a cell behind the face, which is a tenth of the rise.
+    assert points["T"][0] == pytest.approx(300 + rise, abs=0.15 * rise)
+
+
+def test_convection(run_interpreted):
+    """A fluid cools a body that conducts well: exp(-h t / (rho cp L)) (Biot number 0.01)."""
+    lines = FIRST + "fix(air, convection_particles, first, 0.01, 200)"
+    result = run_interpreted(slab(lines, ", air_s", "run_time(2)"), "-var", "N", "4")
+    assert result.log["T"][-1] == pytest.approx(200 + 100 * exp(-0.02), rel=2e-5)
+    assert result.log.air_s[-1] == pytest.approx(-0.01 * 100 * exp(-0.02), rel=0.01)
+
+
+def test_temperature_of_points(run_interpreted):
+    """Points have what they are told, and heat the others."""
+    lines = FIRST + "fix(hot, temperature_particles, first, 301)"
+    result = run_interpreted(slab(lines))
+    points = last(result)
+    assert points["T"][0] == 301
+    centre = points.x[0]
+    exact = [300 + erfc((x - centre) / (2 * sqrt(0.02))) for x in points.x[1:]]
+    # First order: what is held is a point, and not the face of a half space. No points swing.
+    assert points["T"][1:] == pytest.approx(exact, abs=0.12)
+    assert (np.diff(points["T"]) < 0).all()
+
+
+@pytest.mark.parametrize("scheme", ["musl", "usl", "usf", "usavg"])
+def test_two_bodies(run_interpreted, scheme):
+    """Bodies that touch share their heat, whatever the scheme; none is lost, nor motion made."""
+    steps = 200 if scheme == "musl" else 5
+    text = f"""
+    method(ulmpm, FLIP, linear, 0.9, thermo-mechanical)
+    scheme({scheme})
+    dimension(2, 0, 1, 0, 0.25, 0.25)
+    region(left, block, 0, 0.5, 0, 0.25)
+    region(right, block, 0.5, 1, 0, 0.25)
+    material(copper, neo-hookean, 2, 1, 0.3, 0.5, 1)
+    material(iron, linear, 4, 1, 0.3, 0.75, 0.5)
+    material(wood, linear, 1, 1, 0.3)
+    solid(left, region, left, 2, copper, 0.25, 10)
+    solid(right, region, right, 2, iron, 0.25, 20)
+    group(left, particles, region, left, solid, left)
+    group(right, particles, region, right, solid, right)
+    compute(left, average_temperature, left)
+    compute(right, average_temperature, right)
+    compute(Ek, kinetic_energy, all)
+    log_modify(custom, step, time, left, right, Ek)
+    set_output(100)
+    run({steps})
+    """
+    log = run_interpreted(text).log
+    heat = 1.0 * log.left + 3.0 * log.right
+    assert heat == pytest.approx(70, rel=1e-9)  # the log has ten digits
+    assert not log.Ek.any()
+    if scheme == "musl":
+        assert log.left[-1] == pytest.approx(17.5, rel=0.01)
+
+
+def test_ring(run_interpreted):
+    """Between r = 1 and 2, steady: T = ln(r/2) / ln(1/2), and 2 pi / ln 2 flow through."""
+    text = """
+    h = 0.25
+    method(ulmpm, FLIP, linear, 1, thermo-mechanical)
+    dimension(2, 0, 2, 0, h, h)
+    axisymmetric(true)
+    region(ring, block, 1, 2, 0, h)
+    material(m, linear, 1, 1, 0, 1, 1)
+    solid(ring, region, ring, 2, m, h, 0)
+    region(inside, block, 0.99, 1.01, INF, INF)
+    region(outside, block, 1.99, 2.01, INF, INF)
+    group(inside, nodes, region, inside, all)
+    group(outside, nodes, region, outside, all)
+    fix(hot, temperature_nodes, inside, 1)
+    fix(cold, temperature_nodes, outside, 0)
+    log_modify(custom, step, time, hot_s, cold_s)
+    set_output(100000)
+    dump(d, all, particle, 100000, d.*.txt, x, T)
+    run_time(1)
+    """
+    result = run_interpreted(text)
+    # Per radian, for the height h.
+    assert result.log.hot_s[-1] == pytest.approx(0.25 / log(2), rel=0.01)
+    assert result.log.cold_s[-1] == pytest.approx(-0.25 / log(2), rel=0.01)
+    points = last(result)
+    assert points["T"] == pytest.approx(np.log(points.x / 2) / log(0.5), abs=0.01)
+
+
+def test_flux_in_the_total_frame():
+    """C^-1 g: with F = R U it does not depend on R, and a stretch s divides by s^2."""
+    rng = np.random.default_rng(5)
+    for kin, d in ((PlaneStrain(), 2), (Space(), 3)):
+        F = np.eye(d) + 0.3 * rng.normal(size=(d, d))
+        g = rng.normal(size=d)
+        found = drawn_back(Total(), kin, tuple(g), tuple(F.ravel()))
+        assert found == pytest.approx(np.linalg.inv(F.T @ F) @ g)
+    F = (2.0, 0.0, 0.0, 0.5, 1.7)  # the last is the stretch around the axis
+    assert drawn_back(Total(), Axisymmetric(), (1.0, 1.0), F) == pytest.approx((0.25, 4.0))
+
+
+@pytest.mark.parametrize("kind, speed, ppc", [("tlmpm", "x0", 2), ("ulmpm", "x0/(1+time)", 4)])
+def test_stretched(run_interpreted, kind, speed, ppc):
+    """A bar pulled to twice its length: heat diffuses as far as in a bar at rest in ln 2.
+
+    In reference coordinates dT/dt = kappa/(rho cp (1 + t)) d2T/dX2.
+    """
+    text = f"""
+    h = 0.125
+    method({kind}, FLIP, linear, 1, thermo-mechanical)
+    dimension(1, 0, 2.25, h)
+    region(bar, block, 0, 1)
+    material(m, linear, 1, 1e-6, 0, 1, 0.05)
+    solid(bar, region, bar, {ppc}, m, h, 0)
+    fix(pull, velocity_nodes, all, {speed})
+    region(end, block, 0, h/4)
+    group(end, nodes, region, end, all)
+    fix(hot, temperature_nodes, end, 1)
+    dump(d, all, particle, 100000, d.*.txt, x, x0, T)
+    dt_factor(0.5)
+    run_time(1)
+    """
+    points = last(run_interpreted(text))
+    assert points.x == pytest.approx(2 * points.x0, rel=0.02)
+    exact = [erfc(X / (2 * sqrt(0.05 * log(2)))) for X in points.x0]
+    assert points["T"] == pytest.approx(exact, abs=0.02)
+
+
+def test_runs_in_pieces(state_interpreted):
+    """A run in pieces is the run as a whole, with fixes that begin in the first."""
+    lines = HOT.format("300 + cos(time)")
+    whole = state_interpreted(slab(lines, ", hot_s", "run(12)"))
+    pieces = state_interpreted(slab(lines, ", hot_s", "run(5)\n    run(7)"))
+    assert same_bits(whole, pieces)
+
+
+@pytest.mark.parametrize(
+    "lines, message",
+    [
+        ("material(n, linear, 1, 1, 0)\n    solid(cold, region, slab, 2, n, h, 0)", None),
+        (FIRST + "fix(f, heat_flux_particles, first)", "heat_flux_particles, group, q"),
+        (FIRST + "fix(f, temperature_nodes, first, 1)", "node"),
+    ],
+)
+def test_messages(run_interpreted, lines, message):
+    """A body without temperature is fine beside one that has it; wrong arguments are told."""
+    result = run_interpreted(slab(lines, run="run(1)"), status=int(message is not None))
+    if message:
+        assert message in result.err
+
+
+def test_messages_of_methods(run_interpreted):
+    """Heat needs the method and a material."""
+    mechanical = slab(FIRST + "fix(f, heat_flux_particles, first, 1)").replace(
+        "thermo-mechanical", "mechanical"
+    )
+    said = run_interpreted(mechanical, status=1).err
+    assert "no heat flows" in said and "thermo-mechanical" in said
+    said = run_interpreted(slab().replace("0, 0.5, 1)", "0)"), status=1).err
+    assert "no solid has a temperature" in said
