@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from karamelo_py.console import Console
-from karamelo_py.fields import ABSENT_AT_POINTS
+from karamelo_py.fields import ABSENT_AT_NODES, ABSENT_AT_POINTS
 
 
 class FakeValues(dict):
@@ -45,6 +45,9 @@ class FakeFields:
 
     def absent_at_points(self):
         return list(ABSENT_AT_POINTS)
+
+    def absent_at_nodes(self):
+        return list(ABSENT_AT_NODES)
 
     def particle_names(self):
         return list(self.points)

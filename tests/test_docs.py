@@ -101,8 +101,8 @@ def _scene(dimension, folder, method="ulmpm"):
     interpreter = Interpreter(hub)
     domain, disk, wall = STAGES[dimension]
     interpreter.run_text(
-        f"method({method}, FLIP, linear, 1)\ndimension({domain})\nregion(disk, {disk})\n"
-        f"region(wall, {wall})\nmaterial(steel, linear, 1000, 1000, 0.3)\n"
+        f"method({method}, FLIP, linear, 1, thermo-mechanical)\ndimension({domain})\nregion(disk, {disk})\n"
+        f"region(wall, {wall})\nmaterial(steel, linear, 1000, 1000, 0.3, 1, 1)\n"
         f"solid(s1, region, disk, 2, steel, {domain.split()[-1]}, 0)"
     )
     return interpreter

@@ -64,8 +64,8 @@ def method(
 
     See Also
     --------
-    scheme, solid, temperature, temperature_nodes, temperature_particles, heat_flux_particles,
-    convection_particles
+    scheme, solid, temperature, fix temperature_nodes, fix temperature_particles,
+    fix heat_flux_particles, fix convection_particles
     """
     method_class = registry.find("method", kind)
     transfer_class = registry.find("transfer", transfer)
