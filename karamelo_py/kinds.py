@@ -186,7 +186,7 @@ def _to_text(hub: Any, argument: Argument) -> str:
     word = argument.words()
     if word == argument.text:
         if NUMBER.fullmatch(word):
-            raise Unfit(f"the number {word}")
+            raise Unfit(f"the number {word}", hint=f"begin it with a letter, such as n{word}")
         if re.search(r"[(),=]", word):
             raise Unfit(word, hint="a word with such signs needs quotes")
     if not word:

@@ -15,6 +15,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.lammps import instead
 
 PREFIX = "karamelo_py."
 
@@ -102,7 +103,7 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
     raise ScriptError(
         f"unknown {family if family == 'command' else family + ' style'} '{name}'",
         expected="one of " + ", ".join(names(family)) if styles else f"no {family} is installed",
-        hint=f"did you mean '{close}'?" if close else None,
+        hint=instead(family, name) or (f"did you mean '{close}'?" if close else None),
     )
 
 

@@ -1,9 +1,13 @@
 """Wrong scripts: each ends with one message that marks the place and says what to do."""
 
+import re
+
 import pytest
 from scenes import block
 
+from karamelo_py import registry
 from karamelo_py.hub import Hub
+from karamelo_py.script import lammps
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
 from karamelo_py.script.interpreter import Interpreter
 
@@ -151,6 +155,29 @@ COMMANDS = [
     ("fix(f, body_force, all, 0, null)", 28, "write NULL"),
     ("run_until(0.01)", 11, "run_until(time >= 0.01)"),
     ("run_while(1)", 11, "run_while(time < 1)"),
+    ("fix(f, all, body_force, 0, 1)", 13, "fix(f, body_force, all, ...)"),
+    ("compute(k, p, kinetic_energy)", 15, "compute(k, kinetic_energy, p, ...)"),
+    ("fix(1, all, body_force, 0, 1)", 5, "such as n1"),
+]
+
+# As LAMMPS says it.
+LAMMPS = [
+    ("timestep 0.001", 10, "set_dt(dt)"),
+    ("timestep(0.001)", 1, "set_dt(dt)"),
+    ("timestep = 0.001", 1, "set_dt(dt)"),
+    ("dt = 0.001", 1, "set_dt(dt)"),
+    ("unfix f", 7, "delete_fix(ID)"),
+    ("undump(d)", 1, "delete_dump(ID)"),
+    ("thermo 100", 8, "set_output(N)"),
+    ("thermo_style custom step pe", 14, "log_modify(custom, "),
+    ("velocity(all, set, 1, 0)", 1, "initial_velocity_particles"),
+    ("variable a equal 3", 10, "name = expression"),
+    ("units si", 7, "leave it out"),
+    ("lattice", 1, "solid(ID, region, "),
+    ("fix(f, all, nve)", 13, "points move without a fix"),
+    ("fix(f, nve, all)", 8, "points move without a fix"),
+    ("compute(k, all, ke)", 17, "kinetic_energy"),
+    ("dump(d, all, custom, 10, d.*.gz, x)", 14, "particle"),
 ]
 
 
@@ -194,6 +221,21 @@ def test_names_and_values(text, column, part, tmp_path):
 @pytest.mark.parametrize(("text", "column", "part"), COMMANDS)
 def test_commands(text, column, part, tmp_path):
     check(SCENE + text, 7, column, part, tmp_path)
+
+
+@pytest.mark.parametrize(("text", "column", "part"), LAMMPS)
+def test_words_of_lammps(text, column, part, tmp_path):
+    check(f"{SCENE}{text}\n", 7, column, part, tmp_path)
+
+
+def test_hints_for_words_of_lammps_are_words_of_ours():
+    for family, words in lammps.INSTEAD.items():
+        for word, hint in words.items():
+            assert not registry.knows(family, word)
+            for command in re.findall(r"(\w+)\(", hint):
+                assert registry.knows("command", command), hint
+            style = re.fullmatch("the style (.*)", hint)
+            assert not style or registry.knows(family, style[1]), hint
 
 
 @pytest.mark.parametrize("text", ["a = 1/0", "run(10"])

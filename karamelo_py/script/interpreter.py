@@ -14,6 +14,7 @@ from karamelo_py.script import expressions
 from karamelo_py.script.errors import Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
+from karamelo_py.script.lammps import instead
 from karamelo_py.script.parser import parse, parse_expression, parse_text
 from karamelo_py.script.syntax import (
     Assignment,
@@ -205,7 +206,7 @@ class Interpreter:
         return ScriptError(
             f"'{name}' is neither a command nor a variable",
             expected="name = expression, or command(arguments)",
-            hint=f"did you mean '{close}'?" if close else None,
+            hint=instead("command", name) or _meant(close),
         )
 
     # -- assignments ------------------------------------------------------------------------------
@@ -339,7 +340,8 @@ class Interpreter:
     def _unknown_call(self, name: str, place: Any, statement: bool) -> ScriptError:
         commands = registry.names("command")
         what = "command" if statement else "function"
-        if name in self.variables or name in SEEDS or name in CONSTANTS or name in self.hub.values:
+        other = instead("command", name) if statement else None
+        if self.knows(name) and not other:
             return ScriptError(
                 f"'{name}' is not a {what} but a variable",
                 place=place,
@@ -353,7 +355,7 @@ class Interpreter:
             f"unknown {what} '{name}'",
             place=place,
             expected="one of " + ", ".join(shown),
-            hint=f"did you mean '{close}'?" if close else None,
+            hint=other or _meant(close),
         )
 
     # -- expressions ------------------------------------------------------------------------------
@@ -513,6 +515,10 @@ def read_script(path: Path) -> str:
         return data.decode("latin-1")
 
 
+def _meant(close: str | None) -> str | None:
+    return f"did you mean '{close}'?" if close else None
+
+
 def _check_name(name: str) -> None:
     """Refuse to assign what already means something else."""
     if name in ("and", "or", "not"):
@@ -529,10 +535,12 @@ def _check_name(name: str) -> None:
         what = "a function"
     else:
         return
+    free = f"another name, such as {name}_1 or my_{name}"
+    other = instead("command", name)
     raise ScriptError(
         f"'{name}' is {what} and cannot be assigned",
         expected="a name that is free",
-        hint=f"choose another name, such as {name}_1 or my_{name}",
+        hint=f"{other}; or choose {free}" if other else f"choose {free}",
     )
 
 

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.lammps import instead
 from karamelo_py.script.syntax import Source
 
 
@@ -400,22 +401,12 @@ def _is_call(tokens: list[_Token]) -> bool:
 _BLOCKS = ("for", "while", "if", "else", "elif", "def", "do", "import", "loop", "next", "jump")
 
 
-def _block_or_call(name: str, words: list[str]) -> str | None:
+def _block_or_call(name: str, words: list[str]) -> str:
     """What to write instead of ``name word word``."""
-    if name in (
-        "for",
-        "while",
-        "if",
-        "else",
-        "elif",
-        "def",
-        "do",
-        "import",
-        "loop",
-        "next",
-        "jump",
-    ):
+    if name in _BLOCKS:
         return "there are no loops and blocks; if(condition, a, b) chooses a value"
+    if other := instead("command", name):
+        return other
     if all(re.fullmatch(r"[\w.*/+-]+", word) for word in words):
         return f"arguments go in parentheses: {name}({', '.join(words)})"
     return f"arguments go in parentheses: {name}(...)"
