@@ -158,6 +158,10 @@ COMMANDS = [
     ("fix(f, all, body_force, 0, 1)", 13, "fix(f, body_force, all, ...)"),
     ("compute(k, p, kinetic_energy)", 15, "compute(k, kinetic_energy, p, ...)"),
     ("fix(1, all, body_force, 0, 1)", 5, "such as n1"),
+    ("method(ulmpm, MLS, quadratic-spline, 0.9)", 38, "MLS takes no share of FLIP"),
+    ("a = 1\nmethod(ulmpm, PIC, linear, a, mechanical)", 28, "method(ulmpm, PIC, linear, mech"),
+    ("method(ulmpm, XPIC, linear, 2, 0.9)", 32, "XPIC takes order and no further number"),
+    ("method(ulmpm, APIC, linear, mechanicl)", 29, "did you mean 'mechanical'?"),
 ]
 
 # As LAMMPS says it.
