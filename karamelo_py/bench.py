@@ -298,6 +298,24 @@ def bandwidth(threads: int, mebibytes: int = 256) -> float:
     return 24 * n / best
 
 
+def explanation() -> str:
+    """How the subcommand is called, and what it can measure."""
+    width = max(map(len, WORKLOADS))
+    workloads = "".join(f"  {name:<{width}}  {w.title}\n" for name, w in WORKLOADS.items())
+    return f"""\
+karamelo-py bench [WORKLOAD ...] [--threads N] [--seconds S]
+
+Measures the speed of this machine on known scenes, all or those that are named: particle-steps per
+second of the fastest of five repetitions, bytes per particle, and the time of each stage of a step.
+
+workloads:
+{workloads}
+options:
+  --threads N        threads to use (default: 1)
+  --seconds S        how long each scene is measured (default: 2)
+"""
+
+
 def main(arguments: list[str]) -> int:
     """The subcommand."""
     parser = CommandLine(prog="karamelo-py bench", add_help=False, allow_abbrev=False)

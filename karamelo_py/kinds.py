@@ -135,12 +135,17 @@ class Unfit(Exception):
 
 @dataclass(frozen=True)
 class Kind:
-    """What an argument has to be: said in words, and how to make it from an argument."""
+    """What an argument has to be: said in words, and how to make it from an argument.
+
+    `words` are the only ones that fit, where there are such; `family` is that of styles that it
+    names.
+    """
 
     text: str
     convert: Callable[[Any, Argument], Any]
     words: tuple[str, ...] = ()
     nullable: bool = False
+    family: str | None = None
 
 
 def _shown(value: Value) -> str:
@@ -271,7 +276,8 @@ def kind_of(annotation: Any) -> Kind:
     except (KeyError, TypeError):
         pass
     if hasattr(annotation, "from_script"):
-        return Kind(_class_kind(annotation), annotation.from_script)
+        family = getattr(annotation, "family", None)
+        return Kind(_class_kind(annotation), annotation.from_script, family=family)
     raise TypeError(f"a signature cannot have the annotation {annotation!r}")
 
 

@@ -67,6 +67,10 @@ class Quantity:
         except ScriptError as error:
             if error.place is None:
                 error.place = argument.place
+            if error.message == f"unknown name '{text}'":
+                error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
+                close = nearest(text, KEYWORDS)
+                error.hint = f"did you mean '{close}'?" if close else error.hint
             raise
 
     @staticmethod

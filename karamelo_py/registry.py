@@ -58,6 +58,15 @@ def knows(family: str, name: str) -> bool:
     return name in _families().get(family, {})
 
 
+def name_of(family: str, style: type) -> str:
+    """What a script calls a class; the name of the class where it calls it nothing."""
+    value = f"{style.__module__}:{style.__qualname__}"
+    for name, entries in _families().get(family, {}).items():
+        if any(entry.value == value for entry in entries):
+            return name
+    return style.__name__
+
+
 def origin(family: str, name: str) -> str:
     """The package that offers a style, with its version."""
     return " and ".join(_origin(entry) for entry in _entries(family, name))

@@ -29,12 +29,11 @@ def method(
     Parameters
     ----------
     kind
-        Method style: ``ulmpm``, ``tlmpm``, ``ulcpdi``, ``tlcpdi``, ``ulmpm/contacts``.
+        Which grids there are, and whether points move through them.
     transfer
-        ``PIC``, ``FLIP``, ``APIC``, ``AFLIP``, ``ASFLIP``, ``MLS``, ``TPIC`` or ``XPIC``.
+        How velocity goes from the nodes to the points.
     basis
-        ``linear``, ``quadratic-spline``, ``cubic-spline``, ``Bernstein-quadratic``, ``ugimp`` or
-        ``cpgimp``; with the cpdi methods ``linear``.
+        The functions of the nodes; with the cpdi methods ``linear``.
     options
         What the transfer asks for (the share of FLIP from 0 to 1, the order of XPIC); then, in any
         order, ``mechanical``, ``gradient-enhanced`` (FLIP maps the gradient of velocity too), and
@@ -87,6 +86,8 @@ def method(
         )
     hub.update.method = method_class(hub, basis_class())
     hub.update.method.place = hub.place
+    variant = next((name for name, other in variants.items() if other is basis_class), "")
+    hub.update.method.basis_name = f"{basis} {variant}".strip()
     hub.update.transfer = transfer_class(*parameters)
 
 

@@ -24,7 +24,7 @@ def scheme(hub: Hub, style: StyleOf("scheme")) -> None:
     Parameters
     ----------
     style
-        ``musl`` (the default), ``usl``, ``usf`` or ``usavg``.
+        ``musl`` when there is no such command.
 
     Example
     -------
@@ -66,7 +66,7 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
     ID
         Name of the material.
     style
-        ``linear``, ``neo-hookean``, ``eos-strength``, ``rigid``, or the style of a plug-in.
+        The law.
     arguments
         What the style asks for; see its page.
 
@@ -89,7 +89,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     ID
         Name of the fix. A name that is in use replaces the fix.
     style
-        Style of the fix; ``karamelo-py styles`` lists them.
+        What it does.
     arguments
         What the style asks for, beginning with the group it acts on; see its page.
 
@@ -145,7 +145,7 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
     ID
         Name of the compute.
     style
-        Style of the compute; ``karamelo-py styles`` lists them.
+        What it measures.
     arguments
         What the style asks for, beginning with the group it measures; see its page.
 

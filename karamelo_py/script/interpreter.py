@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -408,21 +408,33 @@ class Interpreter:
         later = self._later(name)
         if later:
             return later(place)
-        known = [*self.variables, *self.hub.values.names(), *SEEDS, *CONSTANTS]
-        close = nearest(name, known)
+        published = [value for value in self.hub.values.names() if value not in SEEDS]
+        known = [*self.variables, *published, *SEEDS, *CONSTANTS]
+        by_style = self._values_by_style()
+        close = nearest(name, known) or by_style.get(nearest(name, by_style) or "")
         hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
         if name.upper() in WORDS:
             hint = f"write {name.upper()}"
         if name.lower() in ("true", "false"):
             hint = f"write {int(name.lower() == 'true')}"
-        defined = ", ".join(self.variables) or "none so far"
         return ScriptError(
             f"unknown name '{name}'",
             place=place,
-            expected=f"a variable that is set ({_shortened(defined)}), a value of a fix or a "
-            "compute, or x, y, z, x0, y0, z0, time, timestep, dt, PI",
+            expected=f"a variable that is set ({_listed(self.variables)}), a value of a fix or a "
+            f"compute ({_listed(published)}), or x, y, z, x0, y0, z0, time, timestep, dt, PI",
             hint=hint,
         )
+
+    def _values_by_style(self) -> dict[str, str]:
+        """For each style of a fix or compute that publishes: the first value of the last one."""
+        items = [
+            *getattr(self.hub, "fixes", {}).items(), *getattr(self.hub, "computes", {}).items()
+        ]  # fmt: skip
+        return {
+            item.style: f"{ID}_{item.published[0]}" if item.published[0] else ID
+            for ID, item in items
+            if item.published
+        }
 
     def _not_published(self, name: str, place: Any) -> ScriptError | None:
         """The error for a value that the fix or compute of this ID does not set."""
@@ -551,5 +563,6 @@ def _same(a: Path, b: Path) -> bool:
         return False
 
 
-def _shortened(text: str) -> str:
+def _listed(names: Iterable[str]) -> str:
+    text = ", ".join(names) or "none so far"
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."
