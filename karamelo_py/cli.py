@@ -133,7 +133,7 @@ def _explanation(subcommand: str) -> str:
 
         return HELP
     if subcommand == "bench":
-        from karamelo_py.bench import explanation
+        from karamelo_py.bench.command import explanation
 
         return explanation()
     return {"run": RUN, "check": CHECK, "styles": STYLES}[subcommand]
@@ -230,7 +230,7 @@ def _help(arguments: list[str]) -> int:
 
 
 def _bench(arguments: list[str]) -> int:
-    from karamelo_py.bench import main as bench
+    from karamelo_py.bench.command import main as bench
 
     return bench(arguments)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from karamelo_py.bench import WORKLOADS
+from karamelo_py.bench.workloads import WORKLOADS
 from karamelo_py.cli import main
 
 
