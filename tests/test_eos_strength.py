@@ -315,7 +315,8 @@ def test_check_names_the_parts(tmp_path, capsys):
     script.write_text(BLOCK + "solid(s, region, box, 1, steel, 0.1, 0)\nrun(1)\n")
     assert main(["check", str(script)]) == 0
     out = capsys.readouterr().out
-    assert re.search(r"^  state \(EosStrength\(LinearPressure, Plastic\)\) +7 +56$", out, re.M)
+    assert "a point of steel (eos-strength: linear, plastic)" in out
+    assert re.search(r"^  state +7 +56$", out, re.M)
 
 
 def test_values_of_a_replaced_compute_are_forgotten():
