@@ -208,9 +208,12 @@ class StyleOf:
 
     def from_script(self, hub: Any, argument: Argument) -> str:
         """The name as it stands, or what a text variable of another name holds."""
-        return (
-            argument.text if registry.knows(self.family, argument.text) else _to_text(hub, argument)
-        )
+        if registry.knows(self.family, argument.text):
+            return argument.text
+        joined = "-".join(argument.text.split())
+        if registry.knows(self.family, joined):
+            raise Unfit(f"'{argument.text}'", hint=f"did you mean '{joined}'?")
+        return _to_text(hub, argument)
 
 
 def _to_expression(hub: Any, argument: Argument) -> Expression:

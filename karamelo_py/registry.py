@@ -14,8 +14,8 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError, nearest
-from karamelo_py.script.lammps import instead
 
 PREFIX = "karamelo_py."
 

@@ -222,11 +222,13 @@ def _bind(
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
         gap = next((argument for argument in given if _GAP.search(argument.text)), None)
-        count = f"{len(given)} argument" + ("" if len(given) == 1 else "s")
+        missing = [p.shown for p in slots[len(given) : needed]] or [f"{m}=..." for m in missing]
         raise ScriptError(
-            f"{missing[0]}=... is missing"
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
             if missing
-            else f"got {count}, which is too {'few' if len(given) < needed else 'many'}",
+            else "one argument too many"
+            if len(given) == len(slots) + 1
+            else f"{len(given) - len(slots)} arguments too many",
             place=gap.place if gap else surplus.place if surplus else None,
             expected=syntax(target, name),
             hint=f"is a comma missing in '{gap.text}'?" if gap else None,

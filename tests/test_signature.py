@@ -210,9 +210,9 @@ def test_classes_defaults_varargs_and_keywords(hub):
 @pytest.mark.parametrize(
     ("text", "message", "column"),
     [
-        ("g", "got 1 argument, which is too few", None),
-        ("", "got 0 arguments", None),
-        ("g 1", "got 1 argument", 3),
+        ("g", "vx is missing", None),
+        ("", "group, vx are missing", None),
+        ("g 1", "vx is missing", 3),
         ("g, 1, vz=2", "no argument to be given as 'vz = ...'", 9),
         ("g, 1, glue=a, glue=b", "glue is given twice", 17),
         ("broken, 1", "it is broken", 11),

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Literal
 from karamelo_py import registry, signature
 from karamelo_py.commands.materials import define
 from karamelo_py.kinds import StyleOf
+from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.interpreter import MEANINGS
-from karamelo_py.script.lammps import instead
 from karamelo_py.signature import Argument
 
 if TYPE_CHECKING:

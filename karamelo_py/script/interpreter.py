@@ -11,10 +11,10 @@ from typing import Any
 
 from karamelo_py import registry, signature
 from karamelo_py.script import expressions
+from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
-from karamelo_py.script.lammps import instead
 from karamelo_py.script.parser import parse, parse_expression, parse_text
 from karamelo_py.script.syntax import (
     Assignment,
@@ -548,7 +548,7 @@ def _check_name(name: str) -> None:
     else:
         return
     free = f"another name, such as {name}_1 or my_{name}"
-    other = instead("command", name)
+    other = f"{name}(...) calls it" if what == "a command" else instead("command", name)
     raise ScriptError(
         f"'{name}' is {what} and cannot be assigned",
         expected="a name that is free",

@@ -1,4 +1,4 @@
-"""Words of LAMMPS, whose scripts look much like ours, and what says the same here."""
+"""Words of other programs, above all of LAMMPS, and what says the same here."""
 
 from __future__ import annotations
 
@@ -57,6 +57,18 @@ INSTEAD = {
         "temp": "the style average_temperature",
         "angmom": "the style angular_momentum",
     },
+    "region": {
+        "box": "the style block",
+        "rectangle": "the style block",
+        "circle": "the style cylinder",
+        "disk": "the style cylinder",
+        "ball": "the style sphere",
+    },
+    "material": {
+        "elastic": "the style linear",
+        "plastic": "the style eos-strength, of an eos and a strength",
+        "fluid": "the style eos-strength, of an eos and a strength",
+    },
     "dump": {
         "atom": "the style particle",
         "custom": "the style particle",
@@ -69,5 +81,5 @@ INSTEAD = {
 
 
 def instead(family: str, name: str) -> str | None:
-    """What to write here for a command of LAMMPS, or a style of one; None for other words."""
+    """What to write here for a command or style of another program; None for other words."""
     return INSTEAD.get(family, {}).get(name)
