@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from karamelo_py import registry
 from karamelo_py.points.basis import carried
 from karamelo_py.script.errors import ScriptError
 
@@ -20,7 +21,7 @@ def check(hub: Hub) -> None:
     if update.boundary == "error":
         return
     if not update.method.frame.moves:
-        name = type(update.method).__name__.lower()
+        name = registry.name_of("method", type(update.method))
         raise ScriptError(
             f"boundary({update.boundary}) has no meaning here: the grids of {name} belong to "
             "the solids and go with them, so that no point can leave one",

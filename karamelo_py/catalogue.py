@@ -87,7 +87,8 @@ def describe_parameter(parameter: Parameter) -> str:
     """Kind and default of a parameter, in words: ``a number above 0, 0.9 when left out``."""
     if parameter.kind.text == "anything":  # whatever the command or style makes of it
         return ""
-    parts = [parameter.kind.text]
+    family = parameter.kind.family
+    parts = ["one of " + ", ".join(registry.names(family)) if family else parameter.kind.text]
     if parameter.variadic:
         parts.append("any number of them")
     if parameter.keyword:
@@ -217,7 +218,6 @@ def _summary(family: str, name: str) -> tuple[str, bool]:
 
 def _explain(family: str, name: str) -> int:
     help_ = help_of(family, name)
-    styles = registry.names(name) if family == COMMAND else []
     page = _Page()
     page.title(help_.name)
     page.line(f"from {registry.origin(family, name)}")
@@ -231,6 +231,8 @@ def _explain(family: str, name: str) -> int:
             page.line(f"  {parameter.name}")
             page.paragraph(describe_parameter(parameter), indent=6)
             page.paragraph(parameter.description, indent=6)
+            if parameter.kind.family:
+                page.line(f"      karamelo-py help {parameter.kind.family} NAME explains one.")
     for title, content in help_.sections.items():
         page.heading(title)
         if title == "Example":
@@ -238,9 +240,6 @@ def _explain(family: str, name: str) -> int:
                 page.line(f"  {line}")
         else:
             page.paragraph(content, indent=2)
-    if styles:
-        page.heading("Styles")
-        page.paragraph(", ".join(styles), indent=2)
     return 0
 
 

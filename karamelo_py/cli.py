@@ -7,9 +7,13 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from karamelo_py import __version__
 from karamelo_py.script.errors import ScriptError, nearest, render_message
+
+if TYPE_CHECKING:
+    from karamelo_py.hub import Hub
 
 ERROR = 1
 INTERRUPTED = 130  # as a shell reports a program that SIGINT ended
@@ -20,13 +24,32 @@ karamelo-py check SCRIPT [options]     read and build a scene, print what it nee
 karamelo-py styles [FAMILY]            list commands and styles, and where they come from
 karamelo-py help [FAMILY] STYLE        explain a command or style
 karamelo-py bench [WORKLOAD ...]       measure the speed of this machine on known scenes
-
-options of run and check:
-  -var NAME VALUE    set a variable; the script's own assignment of it then yields
+"""
+OPTIONS = """
+options:
+  -var NAME VALUE    (or -v) set a variable; the script's own assignment of it then yields
   --threads N        threads to use (default: all cores where the scene is large enough)
   --quiet            write warnings and errors only
   --debug            show the traceback of an error
-  --version          print the version
+"""
+RUN = f"""\
+karamelo-py SCRIPT [options]
+karamelo-py run SCRIPT [options]       where a script is called check, styles, help or bench
+
+Runs a script. The log goes to the terminal and to log.mpm; files are written to the current folder.
+{OPTIONS}"""
+CHECK = f"""\
+karamelo-py check SCRIPT [options]
+
+Reads a script, builds its scene, and prints what its first run needs: points and nodes, memory,
+the first time step and the stable one, the stages of a step. Mistakes further down are found, too.
+Nothing runs, and nothing is written.
+{OPTIONS}"""
+STYLES = """\
+karamelo-py styles [FAMILY]
+
+Lists commands and styles, all or those of a family (fix, compute, region, ...), with the packages
+they come from.
 """
 
 RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
@@ -74,7 +97,9 @@ def _complain(text: str) -> None:
 
 def _dispatch(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help"):
-        print(f"karamelo-py {__version__}: the material point method\n\n{USAGE}", end="")
+        version = "  --version          print the version\n"
+        title = f"karamelo-py {__version__}: the material point method"
+        print(f"{title}\n\n{USAGE}{OPTIONS}{version}", end="")
         return 0
     if arguments[0] == "--version":
         print(f"karamelo-py {__version__}")
@@ -88,7 +113,8 @@ def _dispatch(arguments: list[str]) -> int:
     }
     if arguments[0] in commands:
         if any(word in ("-h", "--help") for word in arguments[1:]):
-            return _dispatch(["--help"])
+            print(_explanation(arguments[0]), end="")
+            return 0
         return commands[arguments[0]](arguments[1:])
     close = nearest(arguments[0], commands)
     if close and len(arguments) > 1 and not Path(arguments[0]).exists():
@@ -100,18 +126,31 @@ def _dispatch(arguments: list[str]) -> int:
     return _run(arguments)
 
 
+def _explanation(subcommand: str) -> str:
+    """What a subcommand does, and how it is called."""
+    if subcommand == "help":
+        from karamelo_py.catalogue import HELP
+
+        return HELP
+    if subcommand == "bench":
+        from karamelo_py.bench.command import explanation
+
+        return explanation()
+    return {"run": RUN, "check": CHECK, "styles": STYLES}[subcommand]
+
+
 class CommandLine(argparse.ArgumentParser):
     """A command line whose errors are messages in our own form."""
 
     def error(self, message: str):
-        raise ScriptError(message, expected=USAGE.partition("\n\n")[0])
+        raise ScriptError(message, expected=USAGE.rstrip())
 
 
 def _script_parser() -> CommandLine:
     parser = CommandLine(prog="karamelo-py", add_help=False, allow_abbrev=False)
     parser.add_argument("script", nargs="?")
     parser.add_argument("-i", "-in", dest="input")
-    parser.add_argument("-var", "--var", nargs=2, action="append", default=[])
+    parser.add_argument("-var", "--var", "-v", nargs=2, action="append", default=[])
     parser.add_argument("--threads", type=threads_option)
     parser.add_argument("--quiet", action="store_true")
     parser.add_argument("--debug", action="store_true")
@@ -152,15 +191,23 @@ def _run(arguments: list[str], *, checking: bool = False) -> int:
     except Interrupted:
         _complain("interrupted: the log and the dumps are complete up to here")
         return INTERRUPTED
-    if checking and not hub.rehearsed:
-        raise ScriptError(
-            f"{script} runs nothing: there is no run command in it",
-            hint=RUN_COMMANDS,
-        )
-    if not hub.rehearsed and (hub.domain is not None or not interpreter.variables):
-        hub.place = None
-        hub.warn(f"{script} runs nothing: there is no run command in it", hint=RUN_COMMANDS)
+    if not hub.rehearsed:
+        _tell_of_no_run(hub, script)
     return 0
+
+
+def _tell_of_no_run(hub: Hub, script: str) -> None:
+    """A script of calculations needs no run; one that makes a scene may have forgotten it."""
+    message = f"{script} runs nothing: there is no run command in it"
+    if hub.checking:
+        if hub.solids:
+            from karamelo_py.report import report
+
+            report(hub)
+        hub.console.say(render_message("note", message, hint=RUN_COMMANDS))
+    elif hub.domain is not None or not hub.interpreter.variables:
+        hub.place = None
+        hub.warn(message, hint=RUN_COMMANDS)
 
 
 def _check(arguments: list[str]) -> int:
@@ -174,13 +221,16 @@ def _styles(arguments: list[str]) -> int:
 
 
 def _help(arguments: list[str]) -> int:
+    if arguments in (["check"], ["styles"], ["help"], ["bench"]):
+        print(_explanation(arguments[0]), end="")
+        return 0
     from karamelo_py.catalogue import print_help
 
     return print_help(arguments)
 
 
 def _bench(arguments: list[str]) -> int:
-    from karamelo_py.bench import main as bench
+    from karamelo_py.bench.command import main as bench
 
     return bench(arguments)
 

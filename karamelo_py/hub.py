@@ -41,12 +41,17 @@ class Catalogue(dict):
 
     def __missing__(self, ID: str) -> Any:
         always = ["all"] if self.kind == "group" else []
-        known = ", ".join([*always, *self]) or f"none: no {self.kind} is defined yet"
+        known = ", ".join([*always, *self])
         close = nearest(ID, [*always, *self])
+        other = next((c.kind for c in self.hub.catalogues if ID in c and c.kind != self.kind), None)
         raise ScriptError(
-            f"unknown {self.kind} '{ID}'",
-            expected=f"one of {known}" if self or always else known,
-            hint=f"did you mean '{close}'?" if close else None,
+            f"unknown {self.kind} '{ID}'" + (f"; '{ID}' is a {other}" if other else ""),
+            expected=f"one of {known}" if known else f"no {self.kind} is defined yet",
+            hint=f"did you mean '{close}'?"
+            if close
+            else f"group({ID}, particles, region, regionID, solid, {ID}) makes one of a solid"
+            if (self.kind, other) == ("group", "solid")
+            else None,
         )
 
     def remove(self, ID: str) -> None:
@@ -117,6 +122,11 @@ class Hub:
         self._lattices: tuple[tuple, list[Lattice]] | None = None
 
     @property
+    def catalogues(self) -> list[Catalogue]:
+        """All that has names."""
+        return [item for item in vars(self).values() if isinstance(item, Catalogue)]
+
+    @property
     def simulation(self) -> Simulation:
         """The arrays of the scene as it is now, made when first asked for."""
         from karamelo_py.simulation import Simulation, scene_key
@@ -175,14 +185,11 @@ class Hub:
         """A copy on which the rest of the script can be tried without consequences."""
         other = copy.copy(self)
         other.rehearsing = True
-        for name in (
-            "regions", "eos", "strengths", "damages", "temperatures", "materials", "load_paths",
-            "elements", "solids",
-            "groups", "fixes", "computes", "dumps",
-        ):  # fmt: skip
-            catalogue = Catalogue(getattr(self, name).kind, other)
-            catalogue.update(getattr(self, name))
-            setattr(other, name, catalogue)
+        for name, mine in vars(self).items():
+            if isinstance(mine, Catalogue):
+                catalogue = Catalogue(mine.kind, other)
+                catalogue.update(mine)
+                setattr(other, name, catalogue)
         other.settings = copy.copy(self.settings)
         other.values = copy.deepcopy(self.values)
         other.update = copy.copy(self.update)

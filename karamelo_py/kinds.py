@@ -135,12 +135,17 @@ class Unfit(Exception):
 
 @dataclass(frozen=True)
 class Kind:
-    """What an argument has to be: said in words, and how to make it from an argument."""
+    """What an argument has to be: said in words, and how to make it from an argument.
+
+    `words` are the only ones that fit, where there are such; `family` is that of styles that it
+    names.
+    """
 
     text: str
     convert: Callable[[Any, Argument], Any]
     words: tuple[str, ...] = ()
     nullable: bool = False
+    family: str | None = None
 
 
 def _shown(value: Value) -> str:
@@ -186,7 +191,7 @@ def _to_text(hub: Any, argument: Argument) -> str:
     word = argument.words()
     if word == argument.text:
         if NUMBER.fullmatch(word):
-            raise Unfit(f"the number {word}")
+            raise Unfit(f"the number {word}", hint=f"begin it with a letter, such as n{word}")
         if re.search(r"[(),=]", word):
             raise Unfit(word, hint="a word with such signs needs quotes")
     if not word:
@@ -203,9 +208,12 @@ class StyleOf:
 
     def from_script(self, hub: Any, argument: Argument) -> str:
         """The name as it stands, or what a text variable of another name holds."""
-        return (
-            argument.text if registry.knows(self.family, argument.text) else _to_text(hub, argument)
-        )
+        if registry.knows(self.family, argument.text):
+            return argument.text
+        joined = "-".join(argument.text.split())
+        if registry.knows(self.family, joined):
+            raise Unfit(f"'{argument.text}'", hint=f"did you mean '{joined}'?")
+        return _to_text(hub, argument)
 
 
 def _to_expression(hub: Any, argument: Argument) -> Expression:
@@ -271,7 +279,8 @@ def kind_of(annotation: Any) -> Kind:
     except (KeyError, TypeError):
         pass
     if hasattr(annotation, "from_script"):
-        return Kind(_class_kind(annotation), annotation.from_script)
+        family = getattr(annotation, "family", None)
+        return Kind(_class_kind(annotation), annotation.from_script, family=family)
     raise TypeError(f"a signature cannot have the annotation {annotation!r}")
 
 

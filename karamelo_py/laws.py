@@ -21,15 +21,6 @@ def law_kind(law: NamedTuple) -> tuple[type, ...]:
     return type(law), *(kind for part in parts for kind in part)
 
 
-def law_name(law: NamedTuple) -> str:
-    """The names of a law and of its parts, such as EosStrength(LinearPressure, Plastic).
-
-    Parts that are absent, tags without parameters, are left out.
-    """
-    parts = ", ".join(law_name(part) for part in law if isinstance(part, tuple) and part)
-    return type(law).__name__ + (f"({parts})" if parts else "")
-
-
 def law_in(law: NamedTuple, real: type) -> NamedTuple:
     """The law with its numbers in the type `real`."""
     return type(law)(*(law_in(p, real) if isinstance(p, tuple) else real(p) for p in law))

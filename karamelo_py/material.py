@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from karamelo_py.part import Part
@@ -10,10 +11,17 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Material(Part):
-    """Base of the material styles; `law` is the whole law."""
+    """Base of the material styles; `law` is the whole law, of `parts` where it has any."""
 
     script_kind = "the ID of a material"
     catalogue = "materials"
+    parts: Sequence[Part] = ()
+
+    @property
+    def words(self) -> str:
+        """ID, style, and the styles of its parts: ``steel (eos-strength: linear, plastic)``."""
+        parts = ", ".join(part.style for part in self.parts)
+        return f"{self.id} ({self.style}{': ' if parts else ''}{parts})"
 
 
 class LameParameters(NamedTuple):

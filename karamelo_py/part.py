@@ -19,6 +19,8 @@ class Part:
     ----------
     catalogue
         The attribute of the hub that holds parts of this kind.
+    style
+        The style that made it.
     law
         The NamedTuple of numbers; its class selects the point functions
         (:mod:`karamelo_py.points.materials`).
@@ -26,6 +28,7 @@ class Part:
 
     catalogue: ClassVar[str]
     id: str = ""
+    style: str = ""
     place: Any = None
     law: NamedTuple
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from karamelo_py.fields import PARTICLE_NAMES
 from karamelo_py.script.errors import ScriptError, nearest
 
 if TYPE_CHECKING:
@@ -67,6 +68,12 @@ class Quantity:
         except ScriptError as error:
             if error.place is None:
                 error.place = argument.place
+            if error.message == f"unknown name '{text}'":
+                error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
+                close = nearest(text, KEYWORDS)
+                error.hint = f"did you mean '{close}'?" if close else error.hint
+                if text in PARTICLE_NAMES:
+                    error.hint = f"{text} differs from point to point: dump(...) writes it"
             raise
 
     @staticmethod

@@ -14,6 +14,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError, nearest
 
 PREFIX = "karamelo_py."
@@ -55,6 +56,15 @@ def names(family: str) -> list[str]:
 def knows(family: str, name: str) -> bool:
     """Whether `family` has a style of this name (which may still be broken)."""
     return name in _families().get(family, {})
+
+
+def name_of(family: str, style: type) -> str:
+    """What a script calls a class; the name of the class where it calls it nothing."""
+    value = f"{style.__module__}:{style.__qualname__}"
+    for name, entries in _families().get(family, {}).items():
+        if any(entry.value == value for entry in entries):
+            return name
+    return style.__name__
 
 
 def origin(family: str, name: str) -> str:
@@ -102,7 +112,7 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
     raise ScriptError(
         f"unknown {family if family == 'command' else family + ' style'} '{name}'",
         expected="one of " + ", ".join(names(family)) if styles else f"no {family} is installed",
-        hint=f"did you mean '{close}'?" if close else None,
+        hint=instead(family, name) or (f"did you mean '{close}'?" if close else None),
     )
 
 

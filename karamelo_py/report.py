@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from karamelo_py.kernels.step import Fused, Staged
-from karamelo_py.laws import law_name
+from karamelo_py.laws import law_kind
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
+    from karamelo_py.material import Material
     from karamelo_py.simulation import Simulation
 
 
-def report(hub: Hub, simulation: Simulation) -> None:
-    """Print fields with bytes, kernels, stages, tiles, memory and the first dt."""
+def report(hub: Hub, end_time: float = inf) -> None:
+    """Print fields with bytes, stages, tiles, memory and the first dt of a run to `end_time`."""
+    simulation = hub.simulation
+    simulation.begin(end_time)
+    simulation.sort_if_due()
     say = hub.console.say
     s = simulation.setup
-    say(f"dimension      {s.kin.dimension}, kinematics {type(s.kin).__name__}")
+    say(f"dimension      {s.kin.dimension} ({s.kin.word})")
+    say(f"method         {hub.update.words}")
     say(f"precision      {hub.settings.precision}")
     say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")
     lattices = hub.lattices
@@ -33,14 +39,16 @@ def report(hub: Hub, simulation: Simulation) -> None:
     say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
     say(f"threads        {simulation.threads}")
     say("")
-    say("fields of a point                 shape       bytes")
+    say(f"{'':<34}numbers     bytes")
     total = 0
     for block in s.blocks:
-        law = law_name(block.laws)
+        say(f"fields of a point of {', '.join(m.words for m in materials(hub, block))}")
+        of_one = 0
         for name, shape, size in point_fields(block):
-            say(f"  {name + ' (' + law + ')':<30}  {shape:<10} {size:>6}")
-            total += size * len(block.id)
-    say(f"  {'together, per point':<30}  {'':<10} {total / max(simulation.count, 1):>6.0f}")
+            say(f"  {name:<30}  {shape:<10} {size:>6}")
+            of_one += size
+        say(f"  {'together':<30}  {'':<10} {of_one:>6}")
+        total += of_one * len(block.id)
     say("fields of a node")
     per_node = 0
     for name, array in zip(s.nodes._fields, s.nodes, strict=True):
@@ -51,13 +59,15 @@ def report(hub: Hub, simulation: Simulation) -> None:
         say(f"  {name:<30}  {array.shape[1]!s:<10} {size:>6}")
     say(f"memory         {(total + per_node * nodes) / 2**20:.3g} MiB touched")
     say("")
-    visits = "stage by stage" if simulation.staged else "fused"
-    kernels = [type(x).__name__ for x in (s.kin, s.basis, s.transfer, hub.update.scheme)]
-    laws = [law_name(block.laws) for block in s.blocks]
-    say(f"kernels        {', '.join(kernels + laws)}; {visits}")
-    say("stages of a step")
+    say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")
     for stage in stages(hub, simulation):
         say(f"  {stage}")
+
+
+def materials(hub: Hub, block: Any) -> list[Material]:
+    """The materials of the points of this block: those in use whose laws are of its kind."""
+    used = dict.fromkeys(solid.material for solid in hub.solids.values())
+    return [material for material in used if law_kind(material.law) == law_kind(block.laws)]
 
 
 def point_fields(block: Any) -> list[tuple[str, str, int]]:

@@ -56,16 +56,13 @@ class Runner:
         if hub.rehearsing:
             return
         hub.rehearse()
-        simulation = hub.simulation
         if hub.checking:
             from karamelo_py.report import report
 
-            simulation.begin(self.end_time)
-            simulation.sort_if_due()
-            report(hub, simulation)
+            report(hub, self.end_time)
             raise Quit
         with self._telling_of_compilation():
-            self._run(simulation)
+            self._run(hub.simulation)
 
     def _check_condition(self) -> None:
         names = self.condition.names if self.condition is not None else frozenset()
@@ -224,22 +221,10 @@ class Runner:
 
     def _banner(self, simulation: Simulation) -> None:
         hub = self.hub
-        update = hub.update
-        parameters = ", ".join(
-            f"{name} {value:g}" for name, value in update.transfer._asdict().items()
-        )
-        method = " ".join(
-            [
-                type(update.method).__name__.lower(),
-                type(update.transfer).__name__ + (f" ({parameters})" if parameters else ""),
-                type(simulation.setup.basis).__name__.lower(),
-                type(update.scheme).__name__.lower(),
-            ]
-        )
         hub.console.banner(
             "Run",
             {
-                "method": method,
+                "method": hub.update.words,
                 "points": int(simulation.present.sum()),
                 "nodes": hub.fields.node_count,
                 "dt": simulation.dt,

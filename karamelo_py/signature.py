@@ -222,9 +222,13 @@ def _bind(
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
         gap = next((argument for argument in given if _GAP.search(argument.text)), None)
-        count = f"{len(given)} argument" + ("" if len(given) == 1 else "s")
+        missing = [p.shown for p in slots[len(given) : needed]] or [f"{m}=..." for m in missing]
         raise ScriptError(
-            f"expects {_arguments(target) or 'no arguments'}; got {count}",
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+            if missing
+            else "one argument too many"
+            if len(given) == len(slots) + 1
+            else f"{len(given) - len(slots)} arguments too many",
             place=gap.place if gap else surplus.place if surplus else None,
             expected=syntax(target, name),
             hint=f"is a comma missing in '{gap.text}'?" if gap else None,
@@ -294,34 +298,27 @@ def _guilty(
     return None
 
 
-def _syntax_parts(target: Callable) -> list[tuple[str, bool]]:
-    """Arguments as they are written, and whether each may be left out."""
-    parts = []
-    for parameter in parameters(target):
-        if parameter.variadic:
-            parts.append((f"{parameter.shown}, ...", True))
-        else:
-            parts.append((parameter.shown, parameter.optional))
-    return parts
-
-
-def _joined(parts: Any) -> str:
-    """``a, b[, c[, d]]``."""
+def _joined(expected: list[Parameter]) -> str:
+    """``a, b[, c[, d]][, e=...]``: arguments as they are written."""
     text, open_brackets = "", 0
-    for shown, optional in parts:
+    for parameter in expected:
         comma = ", " if text else ""
-        if optional:
-            text += f"[{comma}{shown}"
+        shown = comma + parameter.shown + (", ..." if parameter.variadic else "")
+        if parameter.keyword:
+            text += "]" * open_brackets + (f"[{shown}]" if parameter.optional else shown)
+            open_brackets = 0
+        elif parameter.optional or parameter.variadic:
+            text += f"[{shown}"
             open_brackets += 1
         else:
-            text += f"{comma}{shown}"
+            text += shown
     return text + "]" * open_brackets
 
 
 def _arguments(target: Callable) -> str:
     """The arguments as they are written: the target's own `syntax`, or from its signature."""
     own = getattr(target, "syntax", None)
-    return own if isinstance(own, str) else _joined(_syntax_parts(target))
+    return own if isinstance(own, str) else _joined(parameters(target))
 
 
 def syntax(target: Callable, name: str) -> str:

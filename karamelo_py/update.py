@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from karamelo_py import registry
 from karamelo_py.schemes.musl import MUSL
 
 if TYPE_CHECKING:
@@ -52,6 +53,20 @@ class Update:
         self.boundary = "error"
         self.boundary_place: Place | None = None
         self.told_of_bounces = False
+
+    @property
+    def words(self) -> str:
+        """Method, transfer, basis and scheme, as a script calls them."""
+        numbers = ", ".join(f"{name} {value:g}" for name, value in self.transfer._asdict().items())
+        transfer = registry.name_of("transfer", type(self.transfer))
+        return " ".join(
+            [
+                registry.name_of("method", type(self.method)),
+                transfer + (f" ({numbers})" if numbers else ""),
+                self.method.basis_name,
+                registry.name_of("scheme", type(self.scheme)),
+            ]
+        )
 
     @property
     def step(self) -> int:

@@ -79,6 +79,7 @@ class FakeHub:
 
     _lattices = None
     lattices = Hub.lattices
+    catalogues = Hub.catalogues
 
     def warn(self, message, place=None, hint=None):
         self.warnings.append(message)

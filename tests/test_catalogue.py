@@ -62,7 +62,14 @@ def test_help_of_a_command_comes_before_styles_of_that_name_and_lists_its_styles
     status, out, _ = call(capsys, "help", "material")
     assert status == 0
     assert "material(ID, style[, arguments, ...])" in out
-    assert "linear, neo-hookean" in out
+    assert "one of eos-strength, linear, neo-hookean" in out
+    assert "karamelo-py help material NAME" in out
+
+
+def test_help_of_method_names_all_that_there_is(capsys):
+    words = call(capsys, "help", "method")[1].replace(",", " ").split()
+    for family in ("method", "transfer", "basis"):
+        assert set(registry.names(family)) <= set(words)
 
 
 def test_help_of_a_part_of_the_method(capsys):

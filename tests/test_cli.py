@@ -2,6 +2,7 @@
 
 import pytest
 
+from karamelo_py.bench.workloads import WORKLOADS
 from karamelo_py.cli import main
 
 
@@ -21,7 +22,23 @@ def test_an_unknown_subcommand(capsys):
     assert "did you mean 'karamelo-py check'?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("subcommand", ["bench", "help", "styles", "check"])
+@pytest.mark.parametrize("subcommand", ["bench", "help", "styles", "check", "run"])
 def test_help_of_subcommands(subcommand, capsys):
     assert main([subcommand, "-h"]) == 0
-    assert "karamelo-py bench" in capsys.readouterr().out
+    explained = capsys.readouterr().out
+    assert f"karamelo-py {subcommand} " in explained
+    assert main(["help", subcommand]) == 0
+    command_of_scripts = subcommand == "run"
+    assert (capsys.readouterr().out == explained) is not command_of_scripts
+
+
+def test_help_of_bench_lists_what_it_measures(capsys):
+    assert main(["bench", "--help"]) == 0
+    explained = capsys.readouterr().out
+    for name, workload in WORKLOADS.items():
+        assert f"  {name} " in explained and workload.title in explained
+
+
+@pytest.mark.parametrize("option", ["-var", "--var", "-v"])
+def test_variables(run_script, option):
+    assert "a = 4" in run_script("a = 3\nprint(a)\n", option, "a", "4").out

@@ -281,7 +281,8 @@ def test_messages(run_interpreted, line, said):
 
 def test_an_id_again_replaces_the_friction(run_interpreted):
     lines = "fix(f, contact/friction, a, b, 0.1)", "fix(f, contact/friction, b, a, 0.2)"
-    assert not run_interpreted(bars(0, *lines, "log_modify(custom, step)", "run(1)")).err
+    err = run_interpreted(bars(0, *lines, "log_modify(custom, step)", "run(1)")).err
+    assert err.count("warning") == 1 and "fix 'f' replaces the one of line 17" in err
 
 
 @pytest.mark.parametrize("method", ["ulmpm", "tlmpm"])

@@ -50,6 +50,17 @@ def test_snippets_of_pages_parse_and_name_what_exists(page, snippet):
                 assert registry.knows(name, style), style
 
 
+def test_the_house_has_all_rooms():
+    page = (ROOT / "docs" / "house.md").read_text("utf-8")
+    for room in (ROOT / "karamelo_py").iterdir():
+        if room.is_dir() and len(list(room.glob("*.py"))) > 1:
+            assert f"`{room.name}/`" in page
+        elif room.suffix == ".py" and room.stem != "__init__":
+            assert f"`{room.name}`" in page
+    for named in re.findall(r"`([\w/]+\.py)`", page):
+        assert list((ROOT / "karamelo_py").rglob(named)) or (ROOT / named).exists(), named
+
+
 def test_readme_tells_the_whole_script():
     """The tour of README, put together, is inputs/in.two_disks without its comments."""
     tour = "".join(blocks(ROOT / "README.md", "karamelo"))
@@ -101,7 +112,8 @@ def _scene(dimension, folder, method="ulmpm"):
     interpreter = Interpreter(hub)
     domain, disk, wall = STAGES[dimension]
     interpreter.run_text(
-        f"method({method}, FLIP, linear, 1, thermo-mechanical)\ndimension({domain})\nregion(disk, {disk})\n"
+        f"method({method}, FLIP, linear, 1, thermo-mechanical)\n"
+        f"dimension({domain})\nregion(disk, {disk})\n"
         f"region(wall, {wall})\nmaterial(steel, linear, 1000, 1000, 0.3, 1, 1)\n"
         f"solid(s1, region, disk, 2, steel, {domain.split()[-1]}, 0)"
     )

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from itertools import pairwise
+
 import numpy as np
 import pandas
 import pytest
 from conftest import INPUTS
 
 from comparisons.results import read_log
+from karamelo_py.element import response
 
 K, G, Y = 160e9, 80e9, 400e6
 E = 9 * K * G / (3 * K + G)
@@ -34,8 +38,10 @@ def test_the_example(run_script):
     result = run_script(INPUTS / "in.element")
     assert result.err == ""
     assert "Young's modulus of steel, E = 205714285714" in result.out
+    assert "element shear: steel (eos-strength: linear, plastic), plane-strain" in result.out
 
     def table(ID):
+        assert not re.search(r"-0\s", (result.folder / f"element_{ID}.txt").read_text())
         assert (result.folder / f"element_{ID}.png").read_bytes().startswith(b"\x89PNG")
         return read_log(result.folder / f"element_{ID}.txt")
 
@@ -214,3 +220,17 @@ def test_check_writes_nothing(run_script, tmp_path):
     script.write_text(STEEL + "load_path(a, 2, exx=1e-3)\nelement(b, steel, a)\n" + used)
     assert main(["check", str(script)]) == 0
     assert not list(tmp_path.glob("element_*"))
+
+
+def test_labels_of_pictures_do_not_touch(run_script, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(response, "savefig", lambda figure, path: drawn.append(figure))
+    run_script(INPUTS / "in.element")
+    assert len(drawn) == 6
+    for figure in drawn:
+        figure.canvas.draw()
+        for axes in figure.axes:
+            lo, hi = axes.get_xlim()
+            shown = [t for t in axes.get_xticklabels() if lo <= t.get_position()[0] <= hi]
+            boxes = [label.get_window_extent() for label in shown]
+            assert all(a.x1 < b.x0 for a, b in pairwise(boxes))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from scenes import SCHEMES, block
@@ -30,6 +32,23 @@ def test_body_force(run_interpreted, scheme):
     assert log.v_x == pytest.approx(2 * log.Time, rel=1e-9, abs=1e-15)
     assert log.v_y == pytest.approx(-3 * log.Time, rel=1e-9, abs=1e-15)
     assert log.u_s[-1] < 1e-14
+
+
+def test_an_id_that_is_in_use_replaces_the_fix_and_says_so(run_interpreted):
+    """As in Karamelo: the second force acts alone, at once and after a run."""
+    result = run_interpreted(
+        block(
+            2, "fix(g, body_force, all, 1, 0)", "fix(g, body_force, all, 0, 2)",
+            "log_modify(custom, step, g_x, g_y)", "set_dt(0.001)", "run(1)",
+            "fix(g, body_force, all, 3, 0)", "run(1)",
+        )
+    )  # fmt: skip
+    assert result.log.g_x == pytest.approx([0, 0, 3 * MASS], rel=1e-9)
+    assert result.log.g_y == pytest.approx([0, 2 * MASS, 0], rel=1e-9)
+    lines = re.findall(
+        r"in.script:(\d+):1: warning: fix 'g' replaces the one of line (\d+)", result.err
+    )
+    assert [int(new) - int(old) for new, old in lines] == [1, 4]
 
 
 def test_force_nodes_applies_its_total_once(run_interpreted):

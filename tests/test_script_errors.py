@@ -1,9 +1,13 @@
 """Wrong scripts: each ends with one message that marks the place and says what to do."""
 
+import re
+
 import pytest
 from scenes import block
 
+from karamelo_py import registry
 from karamelo_py.hub import Hub
+from karamelo_py.script import elsewhere
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
 from karamelo_py.script.interpreter import Interpreter
 
@@ -54,6 +58,9 @@ SYNTAX = [
     ("a = ()", 5, "nothing in these parentheses"),
     ("a = max(1,)", 11, "missing after ','"),
     ("run(1) run(2)", 8, "two statements stand on two lines"),
+    ("if (3 > 2) run(1)", 12, "there are no loops and blocks"),
+    ("E = 2.1e11 Pa", 12, "numbers stand without units"),
+    ('print "a b"', 7, "arguments go in parentheses"),
     ("a = 2(3)", 6, "operator is missing"),
     ("a = 1e400", 5, "too large"),
     ("a = \x01", 5, "control character"),
@@ -111,14 +118,14 @@ COMMANDS = [
     ("fix(v, velocity_node, n, 1, 0)", 8, "did you mean 'velocity_nodes'?"),
     ("fix(v, velocity_nodes, nn, 1, 0)", 24, "did you mean 'n'?"),
     ("fix(v, velocity_nodes, p, 1, 0)", 24, "a group of particles"),
-    ("fix(v, velocity_nodes)", 1, "got 0 arguments"),
-    ("fix(v)", 1, "got 1 argument"),
+    ("fix(v, velocity_nodes)", 1, "group is missing"),
+    ("fix(v)", 1, "style is missing"),
     ("fix(f, body_force, all, 0, -9.81*)", 33, "ends after '*'"),
     ("fix(f, body_force, all, 0, 1/0)", 30, "division by zero"),
     ("fix(f, body_force, all, 0, dt=3)", 28, "leave out 'dt ='"),
-    ("material(m2, linear, 1000, 1000)", 1, "got 2 arguments"),
+    ("material(m2, linear, 1000, 1000)", 1, "nu is missing"),
     ("material(m2, linear, 1000, 1000, 0.3, 4)", 39, "kappa is needed"),
-    ("material(m2, linear, 1000, 1000, 0.3, 4, 1, 0, 5)", 48, "got 7 arguments"),
+    ("material(m2, linear, 1000, 1000, 0.3, 4, 1, 0, 5)", 48, "one argument too many"),
     ("material(m2, linear, 0, 1000, 0.3)", 22, "above 0"),
     ("material(m2, linear, NULL, 1000, 0.3)", 22, "not NULL"),
     ("material(m2, linear, time, 1000, 0.3)", 22, "value(time)"),
@@ -136,8 +143,14 @@ COMMANDS = [
     ("group(g, nodes region, b, all)", 10, "is a comma missing"),
     ("group(g,\n  nodes,\n  region, bb, all)", 11, "unknown region 'bb'"),
     ("log_modify(custom, step, Ekk)", 26, "unknown"),
+    ("log_modify(custom, stp)", 20, "did you mean 'step'?"),
+    ("log_modify(custom, step, ke)", 26, "expected: one of step, dt, time, timestep\n"),
+    ("compute(Ek, kinetic_energy, all)\nlog_modify(custom, kinetic_energy)", 20, "mean 'Ek'?"),
+    ("compute(Ek, kinetic_energy, all)\na = kinetic + 1", 5, "mean 'Ek'?"),
+    ("compute(v, average_velocity, all)\na = w_x", 5, "a compute (v_x, v_y, v_z)"),
+    ("group(p, particles, region, b)", 1, "all|solid is missing"),
     ("include(nofile.in)", 9, "no file"),
-    ("print()", 1, "got 0 arguments"),
+    ("print()", 1, "first is missing"),
     ('run_while("abc")', 11, "not the text 'abc'"),
     ("scheme(mus)", 8, "did you mean 'musl'?"),
     ("compute(v, average_velocity, all)\nlog_modify(custom, v)", 20, "v_x, v_y, v_z, not v"),
@@ -151,6 +164,41 @@ COMMANDS = [
     ("fix(f, body_force, all, 0, null)", 28, "write NULL"),
     ("run_until(0.01)", 11, "run_until(time >= 0.01)"),
     ("run_while(1)", 11, "run_while(time < 1)"),
+    ("fix(f, all, body_force, 0, 1)", 13, "fix(f, body_force, all, ...)"),
+    ("compute(k, p, kinetic_energy)", 15, "compute(k, kinetic_energy, p, ...)"),
+    ("fix(1, all, body_force, 0, 1)", 5, "such as n1"),
+    ("method(ulmpm, MLS, quadratic-spline, 0.9)", 38, "MLS takes no share of FLIP"),
+    ("a = 1\nmethod(ulmpm, PIC, linear, a, mechanical)", 28, "method(ulmpm, PIC, linear, mech"),
+    ("method(ulmpm, FLIP, cubic, 1)", 21, "did you mean 'cubic-spline'?"),
+    ("method(ulmpm, FLIP, quadratic spline, 1)", 21, "did you mean 'quadratic-spline'?"),
+    ("region(r, circle, 0, 0, 1)", 11, "the style cylinder"),
+    ("fix(v, initial_velocity_particles, s, 1, 0)", 36, "'s' is a solid"),
+    ("solid(s2, region, n, 1, m, 0.1)", 19, "'n' is a group"),
+    ("delete_fix(g)", 12, "expected: no fix is defined yet"),
+    ("set_dt = 0.1", 1, "set_dt(...) calls it"),
+    ("log_modify(custom, step, s11)", 26, "s11 differs from point to point"),
+    ("method(ulmpm, XPIC, linear, 2, 0.9)", 32, "XPIC takes order and no further number"),
+    ("method(ulmpm, APIC, linear, mechanicl)", 29, "did you mean 'mechanical'?"),
+]
+
+# As LAMMPS says it.
+LAMMPS = [
+    ("timestep 0.001", 10, "set_dt(dt)"),
+    ("timestep(0.001)", 1, "set_dt(dt)"),
+    ("timestep = 0.001", 1, "set_dt(dt)"),
+    ("dt = 0.001", 1, "set_dt(dt)"),
+    ("unfix f", 7, "delete_fix(ID)"),
+    ("undump(d)", 1, "delete_dump(ID)"),
+    ("thermo 100", 8, "set_output(N)"),
+    ("thermo_style custom step pe", 14, "log_modify(custom, "),
+    ("velocity(all, set, 1, 0)", 1, "initial_velocity_particles"),
+    ("variable a equal 3", 10, "name = expression"),
+    ("units si", 7, "leave it out"),
+    ("lattice", 1, "solid(ID, region, "),
+    ("fix(f, all, nve)", 13, "points move without a fix"),
+    ("fix(f, nve, all)", 8, "points move without a fix"),
+    ("compute(k, all, ke)", 17, "kinetic_energy"),
+    ("dump(d, all, custom, 10, d.*.gz, x)", 14, "particle"),
 ]
 
 
@@ -194,6 +242,21 @@ def test_names_and_values(text, column, part, tmp_path):
 @pytest.mark.parametrize(("text", "column", "part"), COMMANDS)
 def test_commands(text, column, part, tmp_path):
     check(SCENE + text, 7, column, part, tmp_path)
+
+
+@pytest.mark.parametrize(("text", "column", "part"), LAMMPS)
+def test_words_of_lammps(text, column, part, tmp_path):
+    check(f"{SCENE}{text}\n", 7, column, part, tmp_path)
+
+
+def test_hints_for_words_of_lammps_are_words_of_ours():
+    for family, words in elsewhere.INSTEAD.items():
+        for word, hint in words.items():
+            assert not registry.knows(family, word)
+            for command in re.findall(r"(\w+)\(", hint):
+                assert registry.knows("command", command), hint
+            style = re.match("the style ([^,]*)", hint)
+            assert not style or registry.knows(family, style[1]), hint
 
 
 @pytest.mark.parametrize("text", ["a = 1/0", "run(10"])
@@ -255,6 +318,8 @@ def test_long_lines_are_cut_around_the_mark():
         ("Run", ["run", "runs"], "run"),
         ("metod", ["method", "mesh"], "method"),
         ("zzz", ["a", "b"], None),
+        ("cubic", ["linear", "cubic-spline"], "cubic-spline"),
+        ("Hertz", ["contact/friction", "contact/hertz"], "contact/hertz"),
         ("a", [], None),
     ],
 )

@@ -210,9 +210,9 @@ def test_classes_defaults_varargs_and_keywords(hub):
 @pytest.mark.parametrize(
     ("text", "message", "column"),
     [
-        ("g", "expects group, vx[, vy[, velocity, ...[, glue=glue]]]; got 1 argument", None),
-        ("", "got 0 arguments", None),
-        ("g 1", "got 1 argument", 3),
+        ("g", "vx is missing", None),
+        ("", "group, vx are missing", None),
+        ("g 1", "vx is missing", 3),
         ("g, 1, vz=2", "no argument to be given as 'vz = ...'", 9),
         ("g, 1, glue=a, glue=b", "glue is given twice", 17),
         ("broken, 1", "it is broken", 11),
@@ -244,6 +244,20 @@ def test_a_signature_that_cannot_be_understood_is_no_crash(hub):
         call(hub, bad, "g")
     with pytest.raises(ScriptError, match="broken"):
         call(hub, taking(dict), "g")
+
+
+def test_syntax(hub):
+    """What may be left out is in brackets; names stand behind, each in its own."""
+    assert (
+        signature.syntax(Style, "style") == "style(group, vx[, vy[, velocity, ...]][, glue=glue])"
+    )
+
+    def several(hub, *, a: float, b: float = 0.0, c: float = 0.0):
+        return a + b + c
+
+    assert signature.syntax(several, "several") == "several(a=a[, b=b][, c=c])"
+    with pytest.raises(ScriptError, match=r"a=\.\.\. is missing"):
+        call(hub, several, "")
 
 
 def test_help():

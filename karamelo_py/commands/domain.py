@@ -188,7 +188,7 @@ def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) ->
     ID
         Name of the region.
     style
-        block, cylinder, sphere, union, intersection, difference, or the style of a plug-in.
+        The shape, or how it is made of other regions.
     arguments
         What the style asks for, see the page of the style.
 

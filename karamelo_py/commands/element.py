@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from karamelo_py.element.load_path import COMPONENTS, NORMAL, LoadPath
 from karamelo_py.element.point import Point, Unreachable
 from karamelo_py.element.response import Response
-from karamelo_py.laws import law_name
 from karamelo_py.material import Material
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.script.errors import ScriptError
@@ -17,12 +16,7 @@ from karamelo_py.signature import Positive
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
 
-KINEMATICS = {
-    "3D": Space(),
-    "plane-strain": PlaneStrain(),
-    "axisymmetric": Axisymmetric(),
-    "1D": Line(),
-}
+KINEMATICS = {kin.word: kin for kin in (Space(), PlaneStrain(), Axisymmetric(), Line())}
 
 
 def load_path(
@@ -183,7 +177,7 @@ def element(
     if hub.rehearsing:
         return
     hub.rehearse()
-    what = f"element {ID}: {material.id} ({law_name(material.law)}), {kinematics}"
+    what = f"element {ID}: {material.words}, {kinematics}"
     try:
         _follow(point, paths, response)
     finally:

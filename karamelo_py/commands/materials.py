@@ -20,7 +20,7 @@ def eos(hub: Hub, ID: str, style: StyleOf("eos"), *arguments: Argument) -> None:
     ID
         Name of the equation of state.
     style
-        ``linear``, ``shock``, ``fluid``, ``ideal-gas``, or the style of a plug-in.
+        The law.
     arguments
         What the style asks for; see its page.
 
@@ -43,8 +43,7 @@ def strength(hub: Hub, ID: str, style: StyleOf("strength"), *arguments: Argument
     ID
         Name of the strength.
     style
-        ``linear``, ``plastic``, ``johnson_cook``, ``swift``, ``mohr-coulomb``, ``drucker-prager``,
-        ``fluid``, or the style of a plug-in.
+        The law.
     arguments
         What the style asks for; see its page.
 
@@ -67,7 +66,7 @@ def damage(hub: Hub, ID: str, style: StyleOf("damage"), *arguments: Argument) ->
     ID
         Name of the damage.
     style
-        ``damage_johnson_cook``, or the style of a plug-in.
+        The law.
     arguments
         What the style asks for; see its page.
 
@@ -90,7 +89,7 @@ def temperature(hub: Hub, ID: str, style: StyleOf("temperature"), *arguments: Ar
     ID
         Name of the temperature.
     style
-        ``plastic_work``, or the style of a plug-in.
+        The law.
     arguments
         What the style asks for; see its page.
 
@@ -113,4 +112,6 @@ def define(
     target = registry.find(family, style)
     if ID in catalogue:
         catalogue.add(ID, None)
-    catalogue.add(ID, signature.call(target, hub, list(arguments), f"{family} {style}"))
+    part = signature.call(target, hub, list(arguments), f"{family} {style}")
+    part.style = style
+    catalogue.add(ID, part)

@@ -29,12 +29,11 @@ def method(
     Parameters
     ----------
     kind
-        Method style: ``ulmpm``, ``tlmpm``, ``ulcpdi``, ``tlcpdi``, ``ulmpm/contacts``.
+        Which grids there are, and whether points move through them.
     transfer
-        ``PIC``, ``FLIP``, ``APIC``, ``AFLIP``, ``ASFLIP``, ``MLS``, ``TPIC`` or ``XPIC``.
+        How velocity goes from the nodes to the points.
     basis
-        ``linear``, ``quadratic-spline``, ``cubic-spline``, ``Bernstein-quadratic``, ``ugimp`` or
-        ``cpgimp``; with the cpdi methods ``linear``.
+        The functions of the nodes; with the cpdi methods ``linear``.
     options
         What the transfer asks for (the share of FLIP from 0 to 1, the order of XPIC); then, in any
         order, ``mechanical`` (the default) or ``thermo-mechanical`` (heat flows between points,
@@ -85,14 +84,7 @@ def method(
         if word == "gradient-enhanced":
             transfer_class = _enhanced(transfer_class, argument)
         elif argument is not chosen and word not in OPTIONS:
-            known = [*OPTIONS, *call.fitting(variants)]
-            close = nearest(word, known)
-            raise ScriptError(
-                f"'{argument.text}' is not an option of method({kind}, {transfer}, {basis})",
-                place=argument.place,
-                expected="nothing more, or one of " + ", ".join(known),
-                hint=f"did you mean '{close}'?" if close else None,
-            )
+            raise _unknown_option(call, variants, argument)
     if hub.solids:
         raise ScriptError(
             "the method cannot change once there are solids",
@@ -101,6 +93,8 @@ def method(
         )
     hub.update.method = method_class(hub, basis_class())
     hub.update.method.place = hub.place
+    variant = next((name for name, other in variants.items() if other is basis_class), "")
+    hub.update.method.basis_name = f"{basis} {variant}".strip()
     hub.update.transfer = transfer_class(*parameters)
     hub.update.thermal = any(argument.word() == "thermo-mechanical" for argument in words)
 
@@ -139,7 +133,7 @@ class _Call(NamedTuple):
         """The same call with another basis, and with `option` at the end."""
         numbers = [argument.text for argument in self.options if argument.word() is None]
         names = self.transfer_class._fields
-        numbers += ["1"] * (len(names) - len(numbers))
+        numbers = (numbers + ["1"] * len(names))[: len(names)]
         kept = [argument.text for argument in self.options if argument.word() in OPTIONS]
         last = [option] if option is not None else []
         name = self.transfer_class.__name__
@@ -202,6 +196,30 @@ def _basis(
         f"method {call.kind} needs the shape of the domains",
         expected=f"{call.choice(variants)}; at the end, as in "
         + call.instead(basis=call.basis, option=fit[0]),
+    )
+
+
+def _unknown_option(call: _Call, variants: dict, argument: Argument) -> ScriptError:
+    """What is wrong with an option that nothing asks for."""
+    name, asked = call.transfer_class.__name__, call.transfer_class._fields
+    word = argument.word()
+    if word is None or isinstance(call.hub.interpreter.variables.get(word), float):
+        takes = f"{', '.join(asked)} and no further number" if asked else "no share of FLIP"
+        variant = next((o.word() for o in call.options if o.word() in variants), None)
+        return ScriptError(
+            f"{name} takes {takes}",
+            place=argument.place,
+            expected=call.instead(basis=call.basis, option=variant),
+        )
+    enhanced = [] if call.transfer_class is FLIP else ["gradient-enhanced"]
+    known = [option for option in OPTIONS if option not in enhanced]
+    known += call.fitting(variants)
+    close = nearest(word, known)
+    return ScriptError(
+        f"'{argument.text}' is not an option of method({call.kind}, {name}, {call.basis})",
+        place=argument.place,
+        expected="nothing more, or one of " + ", ".join(known),
+        hint=f"did you mean '{close}'?" if close else None,
     )
 
 

@@ -30,7 +30,7 @@ def dump(
     group
         Always the word ``all``.
     style
-        particle, particle/gz, grid, grid/gz, pyplot, or the style of a plug-in.
+        What is written, and in which form.
     arguments
         What the style asks for, beginning with the steps between two snapshots and the file name;
         see the page of the style.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from karamelo_py import registry, signature
 from karamelo_py.commands.materials import define
 from karamelo_py.kinds import StyleOf
+from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.interpreter import MEANINGS
@@ -23,7 +24,7 @@ def scheme(hub: Hub, style: StyleOf("scheme")) -> None:
     Parameters
     ----------
     style
-        ``musl`` (the default), ``usl``, ``usf`` or ``usavg``.
+        ``musl`` when there is no such command.
 
     Example
     -------
@@ -65,7 +66,7 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
     ID
         Name of the material.
     style
-        ``linear``, ``neo-hookean``, ``eos-strength``, ``rigid``, or the style of a plug-in.
+        The law.
     arguments
         What the style asks for; see its page.
 
@@ -88,7 +89,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     ID
         Name of the fix. A name that is in use replaces the fix.
     style
-        Style of the fix; ``karamelo-py styles`` lists them.
+        What it does.
     arguments
         What the style asks for, beginning with the group it acts on; see its page.
 
@@ -100,12 +101,17 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     --------
     delete_fix, group, compute
     """
-    _refuse_forgotten_id("fix", ID, style)
+    _refuse_wrong_order("fix", ID, style, arguments)
     target = registry.find("fix", style)
     _refuse_shared_id(ID, target, "compute", hub.computes)
     _check_names(hub, "fix", ID, target)
     new = signature.call(target, hub, list(arguments), f"fix {style}")
     new.style = style
+    if ID in hub.fixes:
+        hub.warn(
+            f"fix '{ID}' replaces the one of line {hub.fixes[ID].place.line}",
+            hint="fixes that act at the same time need IDs of their own",
+        )
     hub.fixes.add(ID, new, replace=True)
     hub.values.publish_vector(ID, new.published)
     _warn_if_empty(hub, "fix", ID, new)
@@ -139,7 +145,7 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
     ID
         Name of the compute.
     style
-        Style of the compute; ``karamelo-py styles`` lists them.
+        What it measures.
     arguments
         What the style asks for, beginning with the group it measures; see its page.
 
@@ -151,7 +157,7 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
     --------
     delete_compute, log_modify, fix
     """
-    _refuse_forgotten_id("compute", ID, style)
+    _refuse_wrong_order("compute", ID, style, arguments)
     target = registry.find("compute", style)
     _refuse_shared_id(ID, target, "fix", hub.fixes)
     _check_names(hub, "compute", ID, target)
@@ -181,14 +187,25 @@ def delete_compute(hub: Hub, ID: str) -> None:
     hub.computes.remove(ID)
 
 
-def _refuse_forgotten_id(kind: str, ID: str, style: str) -> None:
-    """Where the style stands in the place of the ID, say so."""
-    if registry.knows(kind, ID) and not registry.knows(kind, style):
+def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argument, ...]) -> None:
+    """Tell of a style in the place of the ID, or behind the group as in LAMMPS."""
+    if registry.knows(kind, style):
+        return
+    if registry.knows(kind, ID):
         raise ScriptError(
             f"'{ID}' is a style, and the ID comes first",
             argument="ID",
             expected=f"{kind}(ID, {ID}, {style}, ...)",
         )
+    third = arguments[0].word() if arguments else None
+    if third and registry.knows(kind, third):
+        raise ScriptError(
+            f"'{third}' is a style, and the style comes before the group",
+            place=arguments[0].place,
+            expected=f"{kind}({ID}, {third}, {style}, ...)",
+        )
+    if third and instead(kind, third):
+        registry.find(kind, third)  # says what to write in its place
 
 
 def _refuse_shared_id(ID: str, style: type, other: str, catalogue: Catalogue) -> None:

@@ -9,6 +9,7 @@ from karamelo_py.runner import Runner
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.signature import NonNegative, Positive
+from karamelo_py.update import DEFAULT_DT_FACTOR
 
 if TYPE_CHECKING:
     from karamelo_py.hub import Hub
@@ -33,6 +34,8 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     """
     hub.update.fixed_dt = dt
     hub.values.set("dt", dt)
+    if hub.update.dt_factor != DEFAULT_DT_FACTOR:
+        _warn_of_factor(hub)
 
 
 def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
@@ -53,7 +56,11 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     """
     hub.update.dt_factor = factor
     if hub.update.fixed_dt is not None:
-        hub.warn("dt_factor has no effect: set_dt has fixed the step", hint="leave one of them out")
+        _warn_of_factor(hub)
+
+
+def _warn_of_factor(hub: Hub) -> None:
+    hub.warn("dt_factor has no effect: set_dt fixes the step", hint="leave one of them out")
 
 
 def run(hub: Hub, steps: Annotated[int, NonNegative]) -> None:

@@ -26,7 +26,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
     ID
         Name of the solid.
     kind
-        ``region`` or ``mesh``, or the style of a plug-in.
+        Where the points come from.
     arguments
         What the style asks for, see the page of the style. For ``region``:
         ``regionID, ppc, material, h[, T0]``, the region to fill, the points per cell in each

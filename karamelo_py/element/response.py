@@ -78,7 +78,8 @@ class Response:
 
     def observe(self) -> None:
         """Add the present state."""
-        self.rows.append([float(value()) for value in self._columns.values()])
+        # A zero is added so that none is negative.
+        self.rows.append([float(value()) + 0.0 for value in self._columns.values()])
 
     def last(self) -> dict[str, float]:
         """The last row, by column."""
@@ -112,6 +113,9 @@ class Response:
         right.set_ylabel("von Mises stress q")
         for axes in (left, right):
             tidy(axes)
+            # Room for labels such as 0.0025 side by side, and powers of ten for longer ones.
+            axes.locator_params(axis="x", nbins=6)
+            axes.ticklabel_format(scilimits=(-3, 4))
             if axes.get_legend_handles_labels()[0]:
                 axes.legend(frameon=False)
         figure.suptitle(title)

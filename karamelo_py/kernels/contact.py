@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import kernel
+from karamelo_py.compile import kernel, point_function
 from karamelo_py.kernels.arrays import DT, TIMESTEP
 from karamelo_py.kernels.step import touch, touch_velocity
 from karamelo_py.points.kinematics import dimension
@@ -43,10 +43,15 @@ class SeparateFields(NamedTuple):
     change: np.ndarray  # (F, d) scratch: of the velocity of each of them
 
 
-@kernel
-def _yielding(held, n, m, k, per_a, per_b):
-    """Change of the relative velocity with an impulse along direction k."""
-    return (0.0 if held[n, k] else per_a) + (0.0 if held[m, k] else per_b)
+class Pair(NamedTuple):
+    """Two bodies at a place: a node of each, mass and share in the common normal."""
+
+    n: int
+    m: int
+    per_a: float  # 1 / mass
+    per_b: float
+    share_a: float
+    share_b: float
 
 
 @kernel
@@ -75,17 +80,42 @@ def _shares(contact, d, nodes, n, m):
 
 
 @kernel
-def _outward(nodes, shares, n, m, k):
-    """Component k of the common normal, not normalised, from the body at `n` to that at `m`."""
-    return shares[0] * nodes.normal[n, k] - shares[1] * nodes.normal[m, k]
+def _pair(contact, d, nodes, n, m):
+    per_a, per_b = 1.0 / nodes.sums[n, 0], 1.0 / nodes.sums[m, 0]
+    share_a, share_b = _shares(contact, d, nodes, n, m)
+    return Pair(n, m, per_a, per_b, share_a, share_b)
 
 
 @kernel
-def _slide(contact, nodes, shares, n, m, k, per_a, per_b, push):
+def _yielding(contact, pair, k):
+    """Change of the relative velocity with an impulse along direction k."""
+    of_n = 0.0 if contact.held[pair.n, k] else pair.per_a
+    of_m = 0.0 if contact.held[pair.m, k] else pair.per_b
+    return of_n + of_m
+
+
+@kernel
+def _outward(nodes, pair, k):
+    """Component k of the common normal, not normalised, from the first body to the second."""
+    return pair.share_a * nodes.normal[pair.n, k] - pair.share_b * nodes.normal[pair.m, k]
+
+
+@kernel
+def _slide(contact, nodes, pair, k, push):
     """Component of the relative velocity once the impulse `push` m grad N has been given."""
-    along = push * _outward(nodes, shares, n, m, k)
-    yielding = _yielding(contact.held, n, m, k, per_a, per_b)
-    return nodes.update[n, k] - nodes.update[m, k] - along * yielding
+    along = push * _outward(nodes, pair, k)
+    relative = nodes.update[pair.n, k] - nodes.update[pair.m, k]
+    return relative - along * _yielding(contact, pair, k)
+
+
+@kernel
+def _approach(d, nodes, pair):
+    """How fast two bodies approach, times the length of their normal."""
+    approach = 0.0
+    for k in range(d):
+        normal = _outward(nodes, pair, k)
+        approach += normal * (nodes.update[pair.n, k] - nodes.update[pair.m, k])
+    return approach
 
 
 @kernel
@@ -119,77 +149,57 @@ def _meet(contact, nodes, n):
 
 
 @kernel
+def _node(contact, place, i):
+    """The node at a place of the `i`-th of the fields that meet there."""
+    return place + contact.meeting[i] * contact.stride
+
+
+@kernel
 def _clear_change(contact, d, count):
     for i in range(count):
         for k in range(d):
             contact.change[i, k] = 0.0
 
 
-@kernel
-def _approach(contact, d, nodes, n, m):
-    """How fast two bodies approach, times the length of their normal."""
-    shares = _shares(contact, d, nodes, n, m)
-    approach = 0.0
-    for k in range(d):
-        normal = _outward(nodes, shares, n, m, k)
-        approach += normal * (nodes.update[n, k] - nodes.update[m, k])
-    return approach
+class Approaching(NamedTuple):
+    """Pairs of bodies that approach each other."""
+
+
+class Touched(NamedTuple):
+    """Pairs of bodies that contact acted between in a step."""
+
+    step: int
+
+
+@point_function()
+def _belongs(which, contact, d, nodes, n, m, b):
+    """Whether the bodies at `n` and `m`, the latter of field `b`, are such a pair."""
+
+
+@_belongs.on(Approaching)
+def _(which, contact, d, nodes, n, m, b):
+    return _approach(d, nodes, _pair(contact, d, nodes, n, m)) > 0
+
+
+@_belongs.on(Touched)
+def _(which, contact, d, nodes, n, m, b):
+    return abs(contact.touched[n, b]) == which.step
 
 
 @kernel
-def _touch_pair(contact, d, nodes, values, i, j, place, share):
-    """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
-    a, b = contact.meeting[i], contact.meeting[j]
-    n, m = place + a * contact.stride, place + b * contact.stride
-    approach = _approach(contact, d, nodes, n, m)
-    if not approach > 0:
-        return
-    shares = _shares(contact, d, nodes, n, m)
-    size = 0.0
-    for k in range(d):
-        normal = _outward(nodes, shares, n, m, k)
-        size += normal * normal
-    if not size > 0:
-        return
-    size = sqrt(size)
-    approach /= size
-    per_a = 1.0 / nodes.sums[n, 0]
-    per_b = 1.0 / nodes.sums[m, 0]
-    compliance = 0.0
-    for k in range(d):
-        normal = _outward(nodes, shares, n, m, k) / size
-        compliance += normal * normal * _yielding(contact.held, n, m, k, per_a, per_b)
-    if not compliance > 0:
-        return  # both are held
-    push = share * approach / compliance
-    step = int(values[TIMESTEP]) + 1
-    rub = 0.0
-    friction = contact.friction[a, b]
-    slip = 0.0
-    if friction > 0:
-        compliance = 0.0
-        for k in range(d):
-            slide = _slide(contact, nodes, shares, n, m, k, per_a, per_b, push / size)
-            slip += slide * slide
-            compliance += slide * slide * _yielding(contact.held, n, m, k, per_a, per_b)
-        slip = sqrt(slip)
-        if compliance > 0:
-            stop = share * slip * slip * slip / compliance
-            if stop <= friction * push:
-                step = -step
-            rub = min(stop, friction * push) / slip
-    contact.touched[n, b] = step
-    for k in range(d):
-        impulse = push * _outward(nodes, shares, n, m, k) / size
-        if rub > 0:
-            slide = _slide(contact, nodes, shares, n, m, k, per_a, per_b, push / size)
-            impulse += rub * slide
-        _take(contact, values, a, i, n, k, -impulse, per_a)
-        _take(contact, values, b, j, m, k, impulse, per_b)
-        if contact.pair[a, b] >= 0:
-            values[contact.pair[a, b] + k] -= impulse / values[DT]
-        if contact.pair[b, a] >= 0:
-            values[contact.pair[b, a] + k] += impulse / values[DT]
+def _count_partners(which, contact, d, nodes, place, count):
+    """Note in how many such pairs each of the fields that meet is; whether any is."""
+    found = False
+    contact.partners[:count] = 0
+    for i in range(count):
+        n = _node(contact, place, i)
+        for j in range(i + 1, count):
+            m = _node(contact, place, j)
+            if _belongs(which, contact, d, nodes, n, m, contact.meeting[j]):
+                contact.partners[i] += 1
+                contact.partners[j] += 1
+                found = True
+    return found
 
 
 @kernel
@@ -198,37 +208,80 @@ def _share(contact, i, j):
 
 
 @kernel
-def _count_approaching(contact, d, nodes, place, count):
-    """Note in how many pairs that approach each of the fields is; whether any is."""
-    if count == 2:
-        contact.partners[:count] = 1  # whether they approach, the pair itself looks at
-        return True
-    found = False
-    contact.partners[:count] = 0
-    for i in range(count):
-        for j in range(i + 1, count):
-            n = place + contact.meeting[i] * contact.stride
-            m = place + contact.meeting[j] * contact.stride
-            if _approach(contact, d, nodes, n, m) > 0:
-                contact.partners[i] += 1
-                contact.partners[j] += 1
-                found = True
-    return found
+def _compliance(contact, d, nodes, pair, size):
+    """Change of the relative velocity along the normal, of length `size`, with an impulse."""
+    compliance = 0.0
+    for k in range(d):
+        normal = _outward(nodes, pair, k) / size
+        compliance += normal * normal * _yielding(contact, pair, k)
+    return compliance
+
+
+@kernel
+def _rub(contact, d, nodes, pair, friction, push, size, share):
+    """Impulse along the surface over the speed of sliding, and whether it stops all sliding."""
+    compliance = 0.0
+    slip = 0.0
+    for k in range(d):
+        slide = _slide(contact, nodes, pair, k, push / size)
+        slip += slide * slide
+        compliance += slide * slide * _yielding(contact, pair, k)
+    if not compliance > 0:
+        return 0.0, False
+    slip = sqrt(slip)
+    stop = share * slip * slip * slip / compliance
+    return min(stop, friction * push) / slip, stop <= friction * push
+
+
+@kernel
+def _touch_pair(contact, d, nodes, values, i, j, place, share):
+    """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
+    a, b = contact.meeting[i], contact.meeting[j]
+    pair = _pair(contact, d, nodes, _node(contact, place, i), _node(contact, place, j))
+    approach = _approach(d, nodes, pair)
+    if not approach > 0:
+        return
+    size = 0.0
+    for k in range(d):
+        normal = _outward(nodes, pair, k)
+        size += normal * normal
+    if not size > 0:
+        return
+    size = sqrt(size)
+    compliance = _compliance(contact, d, nodes, pair, size)
+    if not compliance > 0:
+        return  # both are held
+    push = share * (approach / size) / compliance
+    rub, sticks = 0.0, False
+    if contact.friction[a, b] > 0:
+        rub, sticks = _rub(contact, d, nodes, pair, contact.friction[a, b], push, size, share)
+    step = int(values[TIMESTEP]) + 1
+    contact.touched[pair.n, b] = -step if sticks else step
+    for k in range(d):
+        impulse = push * _outward(nodes, pair, k) / size
+        if rub > 0:
+            impulse += rub * _slide(contact, nodes, pair, k, push / size)
+        _take(contact, values, a, i, pair.n, k, -impulse, pair.per_a)
+        _take(contact, values, b, j, pair.m, k, impulse, pair.per_b)
+        if contact.pair[a, b] >= 0:
+            values[contact.pair[a, b] + k] -= impulse / values[DT]
+        if contact.pair[b, a] >= 0:
+            values[contact.pair[b, a] + k] += impulse / values[DT]
 
 
 @kernel
 def _touch_place(contact, d, nodes, values, place, count):
     """Resolve contact where `count` fields meet."""
+    contact.partners[:count] = 1  # whether a single pair approaches, it looks itself
     for _ in range(REPEATS if count > 2 else 1):
-        if not _count_approaching(contact, d, nodes, place, count):
+        if count > 2 and not _count_partners(Approaching(), contact, d, nodes, place, count):
             return
         _clear_change(contact, d, count)
         for i in range(count):
             for j in range(i + 1, count):
-                share = _share(contact, i, j)
-                _touch_pair(contact, d, nodes, values, i, j, place, share)
+                _touch_pair(contact, d, nodes, values, i, j, place, _share(contact, i, j))
         for i in range(count):
-            n = place + contact.meeting[i] * contact.stride
+            n = _node(contact, place, i)
             for k in range(d):
                 nodes.update[n, k] += contact.change[i, k]
                 nodes.update[n, d + k] += contact.change[i, k]
@@ -258,63 +311,45 @@ def _touch_nodes(contact, kin, nodes, spans, values):
 
 
 @kernel
-def _stay_pair(contact, d, nodes, i, j, n, m, share, sticks):
+def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
     """Take `share` of the relative velocity across the surface, or of all where the pair sticks."""
     v = nodes.velocity
-    per_a = 1.0 / nodes.sums[n, 0]
-    per_b = 1.0 / nodes.sums[m, 0]
-    shares = _shares(contact, d, nodes, n, m)
     across = 0.0
     compliance = 0.0
     for k in range(d):
-        normal = _outward(nodes, shares, n, m, k)
-        across += normal * (v[n, k] - v[m, k])
-        compliance += normal * normal * _yielding(contact.held, n, m, k, per_a, per_b)
+        normal = _outward(nodes, pair, k)
+        across += normal * (v[pair.n, k] - v[pair.m, k])
+        compliance += normal * normal * _yielding(contact, pair, k)
     push = share * across / compliance if compliance > 0 else 0.0
     for k in range(d):
-        yielding = _yielding(contact.held, n, m, k, per_a, per_b)
+        yielding = _yielding(contact, pair, k)
         if not yielding > 0:
             continue
-        impulse = push * _outward(nodes, shares, n, m, k)
+        impulse = push * _outward(nodes, pair, k)
         if sticks:
-            impulse = share * (v[n, k] - v[m, k]) / yielding
-        if not contact.held[n, k]:
-            contact.change[i, k] -= impulse * per_a
-        if not contact.held[m, k]:
-            contact.change[j, k] += impulse * per_b
-
-
-@kernel
-def _count_touched(contact, place, count, step):
-    """Note in how many pairs that touched in `step` each of the fields is; whether any is."""
-    found = False
-    contact.partners[:count] = 0
-    for i in range(count):
-        n = place + contact.meeting[i] * contact.stride
-        for j in range(i + 1, count):
-            if abs(contact.touched[n, contact.meeting[j]]) == step:
-                contact.partners[i] += 1
-                contact.partners[j] += 1
-                found = True
-    return found
+            impulse = share * (v[pair.n, k] - v[pair.m, k]) / yielding
+        if not contact.held[pair.n, k]:
+            contact.change[i, k] -= impulse * pair.per_a
+        if not contact.held[pair.m, k]:
+            contact.change[j, k] += impulse * pair.per_b
 
 
 @kernel
 def _stay_place(contact, d, nodes, place, count, step):
-    if not _count_touched(contact, place, count, step):
+    if not _count_partners(Touched(step), contact, d, nodes, place, count):
         return
     for _ in range(REPEATS if count > 2 else 1):
         _clear_change(contact, d, count)
         for i in range(count):
-            n = place + contact.meeting[i] * contact.stride
+            n = _node(contact, place, i)
             for j in range(i + 1, count):
                 touched = contact.touched[n, contact.meeting[j]]
                 if abs(touched) == step:
-                    m = place + contact.meeting[j] * contact.stride
+                    pair = _pair(contact, d, nodes, n, _node(contact, place, j))
                     share = _share(contact, i, j)
-                    _stay_pair(contact, d, nodes, i, j, n, m, share, touched < 0)
+                    _stay_pair(contact, d, nodes, i, j, pair, share, touched < 0)
         for i in range(count):
-            n = place + contact.meeting[i] * contact.stride
+            n = _node(contact, place, i)
             for k in range(d):
                 nodes.velocity[n, k] += contact.change[i, k]
 

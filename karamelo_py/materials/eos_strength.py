@@ -92,6 +92,7 @@ class EosStrength(Material):
                     argument="second",
                     expected="one damage and one temperature at most",
                 )
+        self.parts = (eos, strength, *given)
         self.law = EosStrengthLaw(
             eos.law,
             strength.law,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from karamelo_py import registry
 from karamelo_py.kernels.step import FBar, PointByPoint
 from karamelo_py.lattice import Lattice, numbered
 from karamelo_py.points.basis import blank
@@ -30,6 +31,8 @@ class Method:
     ----------
     basis
         The basis' tag.
+    basis_name
+        The basis, with its variant, as the script calls it.
     place
         Place of the command in the script, for messages.
     frame
@@ -40,6 +43,7 @@ class Method:
         Whether every solid has a velocity field of its own on the grid of the domain.
     """
 
+    basis_name = ""
     place: Place | None = None
     frame: NamedTuple = Updated()
     own_grids: ClassVar[bool] = False
@@ -108,12 +112,12 @@ class Method:
         """Refuse what does not go together; called before every run."""
         transfer, basis, scheme = hub.update.transfer, self.basis, hub.update.scheme
         unsteady = transfer.inverts_spread and not basis.steady_moment and self.frame.moves
-        name = type(basis).__name__
         if unsteady and not getattr(scheme, "maps_velocity_again", False):
             raise ScriptError(
-                f"{type(transfer).__name__} with {name} functions and "
-                f"{type(scheme).__name__.lower()} is unstable: D of the affine transfers vanishes "
-                "at nodes, and there the moments push where there is next to no mass",
+                f"{registry.name_of('transfer', type(transfer))} with {self.basis_name} functions "
+                f"and {registry.name_of('scheme', type(scheme))} is unstable: D of the affine "
+                "transfers vanishes at nodes, and there the moments push where there is next to no "
+                "mass",
                 hint="scheme(musl), or TPIC in the place of the transfer, or quadratic-spline in "
                 "that of the basis, or method tlmpm",
             )

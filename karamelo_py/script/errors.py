@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import unicodedata
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -136,4 +137,8 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
         return close[0]
     by_lower = {candidate.lower(): candidate for candidate in names}
     close = difflib.get_close_matches(lowered, by_lower, n=1, cutoff=0.6)
-    return by_lower[close[0]] if close else None
+    if close:
+        return by_lower[close[0]]
+    # A part of the name: cubic of cubic-spline.
+    parts = (c for c in by_lower if len(lowered) > 2 and lowered in re.split("[-_/ ]", c))
+    return by_lower.get(next(parts, ""))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from karamelo_py import registry, signature
 from karamelo_py.script import expressions
+from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
@@ -205,7 +206,7 @@ class Interpreter:
         return ScriptError(
             f"'{name}' is neither a command nor a variable",
             expected="name = expression, or command(arguments)",
-            hint=f"did you mean '{close}'?" if close else None,
+            hint=instead("command", name) or _meant(close),
         )
 
     # -- assignments ------------------------------------------------------------------------------
@@ -339,7 +340,8 @@ class Interpreter:
     def _unknown_call(self, name: str, place: Any, statement: bool) -> ScriptError:
         commands = registry.names("command")
         what = "command" if statement else "function"
-        if name in self.variables or name in SEEDS or name in CONSTANTS or name in self.hub.values:
+        other = instead("command", name) if statement else None
+        if self.knows(name) and not other:
             return ScriptError(
                 f"'{name}' is not a {what} but a variable",
                 place=place,
@@ -353,7 +355,7 @@ class Interpreter:
             f"unknown {what} '{name}'",
             place=place,
             expected="one of " + ", ".join(shown),
-            hint=f"did you mean '{close}'?" if close else None,
+            hint=other or _meant(close),
         )
 
     # -- expressions ------------------------------------------------------------------------------
@@ -406,21 +408,33 @@ class Interpreter:
         later = self._later(name)
         if later:
             return later(place)
-        known = [*self.variables, *self.hub.values.names(), *SEEDS, *CONSTANTS]
-        close = nearest(name, known)
+        published = [value for value in self.hub.values.names() if value not in SEEDS]
+        known = [*self.variables, *published, *SEEDS, *CONSTANTS]
+        by_style = self._values_by_style()
+        close = nearest(name, known) or by_style.get(nearest(name, by_style) or "")
         hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
         if name.upper() in WORDS:
             hint = f"write {name.upper()}"
         if name.lower() in ("true", "false"):
             hint = f"write {int(name.lower() == 'true')}"
-        defined = ", ".join(self.variables) or "none so far"
         return ScriptError(
             f"unknown name '{name}'",
             place=place,
-            expected=f"a variable that is set ({_shortened(defined)}), a value of a fix or a "
-            "compute, or x, y, z, x0, y0, z0, time, timestep, dt, PI",
+            expected=f"a variable that is set ({_listed(self.variables)}), a value of a fix or a "
+            f"compute ({_listed(published)}), or x, y, z, x0, y0, z0, time, timestep, dt, PI",
             hint=hint,
         )
+
+    def _values_by_style(self) -> dict[str, str]:
+        """For each style of a fix or compute that publishes: the first value of the last one."""
+        items = [
+            *getattr(self.hub, "fixes", {}).items(), *getattr(self.hub, "computes", {}).items()
+        ]  # fmt: skip
+        return {
+            item.style: f"{ID}_{item.published[0]}" if item.published[0] else ID
+            for ID, item in items
+            if item.published
+        }
 
     def _not_published(self, name: str, place: Any) -> ScriptError | None:
         """The error for a value that the fix or compute of this ID does not set."""
@@ -513,6 +527,10 @@ def read_script(path: Path) -> str:
         return data.decode("latin-1")
 
 
+def _meant(close: str | None) -> str | None:
+    return f"did you mean '{close}'?" if close else None
+
+
 def _check_name(name: str) -> None:
     """Refuse to assign what already means something else."""
     if name in ("and", "or", "not"):
@@ -529,10 +547,12 @@ def _check_name(name: str) -> None:
         what = "a function"
     else:
         return
+    free = f"another name, such as {name}_1 or my_{name}"
+    other = f"{name}(...) calls it" if what == "a command" else instead("command", name)
     raise ScriptError(
         f"'{name}' is {what} and cannot be assigned",
         expected="a name that is free",
-        hint=f"choose another name, such as {name}_1 or my_{name}",
+        hint=f"{other}; or choose {free}" if other else f"choose {free}",
     )
 
 
@@ -543,5 +563,6 @@ def _same(a: Path, b: Path) -> bool:
         return False
 
 
-def _shortened(text: str) -> str:
+def _listed(names: Iterable[str]) -> str:
+    text = ", ".join(names) or "none so far"
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."

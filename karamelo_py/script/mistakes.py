@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
+from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.syntax import Source
 
@@ -380,13 +381,18 @@ def _side_by_side(code: str, tokens: list[_Token], index: int) -> Mistake:
             hint=_block_or_call(before.text, words),
         )
     two_statements = _is_call(tokens[:index]) and here.kind == "name"
+    hint = "multiply with *; two statements stand on two lines" if two_statements else None
+    if two_statements and tokens[0].text in _BLOCKS:
+        hint = _NO_BLOCKS
+    elif before.kind == "number" and here.kind == "name" and index == len(tokens) - 1:
+        hint = "numbers stand without units"
     what = f"'{_short(before)}' and '{_short(here)}'"
     return Mistake(
         f"an operator is missing between {what}",
         here.start,
         here.end,
         expected="an operator, such as *, or a comma between arguments",
-        hint="multiply with *; two statements stand on two lines" if two_statements else None,
+        hint=hint,
     )
 
 
@@ -398,25 +404,16 @@ def _is_call(tokens: list[_Token]) -> bool:
 
 
 _BLOCKS = ("for", "while", "if", "else", "elif", "def", "do", "import", "loop", "next", "jump")
+_NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
 
 
-def _block_or_call(name: str, words: list[str]) -> str | None:
+def _block_or_call(name: str, words: list[str]) -> str:
     """What to write instead of ``name word word``."""
-    if name in (
-        "for",
-        "while",
-        "if",
-        "else",
-        "elif",
-        "def",
-        "do",
-        "import",
-        "loop",
-        "next",
-        "jump",
-    ):
-        return "there are no loops and blocks; if(condition, a, b) chooses a value"
-    if all(re.fullmatch(r"[\w.*/+-]+", word) for word in words):
+    if name in _BLOCKS:
+        return _NO_BLOCKS
+    if other := instead("command", name):
+        return other
+    if all(re.fullmatch(r"[\w.*/+-]+|\"[^\"]*\"", word) for word in words):
         return f"arguments go in parentheses: {name}({', '.join(words)})"
     return f"arguments go in parentheses: {name}(...)"
 

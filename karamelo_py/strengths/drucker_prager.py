@@ -6,7 +6,6 @@ from math import cos, inf, sin, sqrt, tan
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from karamelo_py.points.materials.strength.drucker_prager import DruckerPrager as DruckerPragerLaw
-from karamelo_py.points.materials.strength.drucker_prager import DruckerPragerSoftening
 from karamelo_py.signature import NonNegative, Positive
 from karamelo_py.strengths.base import Strength
 from karamelo_py.strengths.soils import angles, residual
@@ -87,10 +86,7 @@ class DruckerPrager(Strength):
         a, b = angles(cohesion, phi, psi)
         end = residual(cohesion, phi, residual_cohesion, residual_phi, softening)
         xi, eta = cone(fit, a)
-        limit = inf if tension is None else tension
-        peak = (G, xi * cohesion, eta, cone(fit, b)[1], limit)
-        if end is None:
-            self.law = DruckerPragerLaw(*peak)
-        else:
-            xi, eta = cone(fit, end.phi)
-            self.law = DruckerPragerSoftening(*peak, xi * end.cohesion, eta, end.over)
+        peak = (xi * cohesion, eta, cone(fit, b)[1])
+        xi, eta = cone(fit, end.phi)
+        left = (xi * end.cohesion, eta, end.softening)
+        self.law = DruckerPragerLaw(G, *peak, inf if tension is None else tension, *left)

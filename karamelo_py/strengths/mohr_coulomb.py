@@ -6,7 +6,6 @@ from math import cos, sin
 from typing import TYPE_CHECKING, Annotated
 
 from karamelo_py.points.materials.strength.mohr_coulomb import MohrCoulomb as MohrCoulombLaw
-from karamelo_py.points.materials.strength.mohr_coulomb import MohrCoulombSoftening
 from karamelo_py.signature import NonNegative, Positive
 from karamelo_py.strengths.base import Strength
 from karamelo_py.strengths.soils import angles, residual
@@ -69,9 +68,6 @@ class MohrCoulomb(Strength):
     ):
         a, b = angles(cohesion, phi, psi)
         end = residual(cohesion, phi, residual_cohesion, residual_phi, softening)
-        peak = (G, cohesion * cos(a), sin(a), sin(b))
-        if end is None:
-            self.law = MohrCoulombLaw(*peak)
-        else:
-            left = (end.cohesion * cos(end.phi), sin(end.phi), end.over)
-            self.law = MohrCoulombSoftening(*peak, *left)
+        peak = (cohesion * cos(a), sin(a), sin(b))
+        left = (end.cohesion * cos(end.phi), sin(end.phi), end.softening)
+        self.law = MohrCoulombLaw(G, *peak, *left)

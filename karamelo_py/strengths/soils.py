@@ -9,11 +9,11 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Residual(NamedTuple):
-    """Strength at the end of softening."""
+    """Strength at the end of softening: that of the peak where there is none."""
 
     cohesion: float
     phi: float  # radians
-    over: float  # plastic strain
+    softening: float  # 1 / plastic strain at the end, 0 for none
 
 
 def angles(cohesion: float, phi: float, psi: float) -> tuple[float, float]:
@@ -42,8 +42,8 @@ def angles(cohesion: float, phi: float, psi: float) -> tuple[float, float]:
 
 def residual(
     cohesion: float, phi: float, to_cohesion: float | None, to_phi: float | None, over: float | None
-) -> Residual | None:
-    """Strength at the end of softening, from what the script says; None for no softening.
+) -> Residual:
+    """Strength at the end of softening, from what the script says.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def residual(
                 argument="softening",
                 expected="residual_cohesion=... or residual_phi=..., or both",
             )
-        return None
+        return Residual(cohesion, radians(phi), 0.0)
     if over is None:
         raise ScriptError(
             "softening needs the plastic strain at which the residual strength is reached",
@@ -74,7 +74,7 @@ def residual(
     return Residual(
         cohesion if to_cohesion is None else to_cohesion,
         radians(phi if to_phi is None else to_phi),
-        over,
+        1 / over,
     )
 
 

@@ -10,6 +10,7 @@ from karamelo_py.compile import point_function
 class Line(NamedTuple):
     """One dimension: uniaxial strain, the limit that plane strain and space have too."""
 
+    word = "1D"
     dimension = 1
     tensor_size = 1
     symmetric_names = ("11", "22", "33")
@@ -18,6 +19,7 @@ class Line(NamedTuple):
 class PlaneStrain(NamedTuple):
     """Two dimensions, unit thickness, no strain out of the plane."""
 
+    word = "plane-strain"
     dimension = 2
     tensor_size = 4
     symmetric_names = ("11", "22", "33", "12")
@@ -30,6 +32,7 @@ class Axisymmetric(NamedTuple):
     (dN/dr, dN/dz, N/r): the last makes the strain and the force around the axis.
     """
 
+    word = "axisymmetric"
     dimension = 2
     tensor_size = 5
     symmetric_names = ("11", "22", "33", "12")
@@ -38,6 +41,7 @@ class Axisymmetric(NamedTuple):
 class Space(NamedTuple):
     """Three dimensions."""
 
+    word = "3D"
     dimension = 3
     tensor_size = 9
     symmetric_names = ("11", "22", "33", "12", "13", "23")

@@ -77,12 +77,9 @@ from karamelo_py.points.materials.strength import (
     viscosity_of,
     with_elastic_ratio,
 )
-from karamelo_py.points.materials.strength.drucker_prager import (
-    DruckerPrager,
-    DruckerPragerSoftening,
-)
+from karamelo_py.points.materials.strength.drucker_prager import DruckerPrager
 from karamelo_py.points.materials.strength.elastic import elastic_trial
-from karamelo_py.points.materials.strength.mohr_coulomb import MohrCoulomb, MohrCoulombSoftening
+from karamelo_py.points.materials.strength.mohr_coulomb import MohrCoulomb
 from karamelo_py.points.materials.temperatures import (
     Isothermal,
     heated,
@@ -220,9 +217,7 @@ def _(strength, law, kin, s, strain, j, m, dt):
 
 
 @respond.on(MohrCoulomb)
-@respond.on(MohrCoulombSoftening)
 @respond.on(DruckerPrager)
-@respond.on(DruckerPragerSoftening)
 def _(strength, law, kin, s, strain, j, m, dt):
     trial = elastic_trial(kin, strength.G, s, strain)
     elastic = elastic_ratio(strength, m.strength, j)

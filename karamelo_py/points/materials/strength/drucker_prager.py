@@ -8,11 +8,7 @@ from typing import NamedTuple
 from karamelo_py.compile import real
 from karamelo_py.points.kinematics import contract
 from karamelo_py.points.materials.strength import pressure_response
-from karamelo_py.points.materials.strength.frictional import (
-    give_friction,
-    give_softening,
-    surface,
-)
+from karamelo_py.points.materials.strength.frictional import give_friction, surface
 from karamelo_py.tensors import scale
 
 
@@ -24,27 +20,15 @@ class DruckerPrager(NamedTuple):
     friction: float
     dilation: float
     tension: float
-
-
-class DruckerPragerSoftening(NamedTuple):
-    """The same, with strength that falls with plastic strain."""
-
-    G: float  # shear modulus
-    cohesion: float
-    friction: float
-    dilation: float
-    tension: float
-    residual_cohesion: float
+    residual_cohesion: float  # at the end of softening
     residual_friction: float
-    over: float  # plastic strain at the end of softening
+    softening: float  # share of the way to the residual for each unit of plastic strain, or 0
 
 
 give_friction(DruckerPrager)
-give_softening(DruckerPragerSoftening)
 
 
 @pressure_response.on(DruckerPrager)
-@pressure_response.on(DruckerPragerSoftening)
 def _(strength, kin, s, p, K, strain):
     cohesion, friction, dilation = surface(strength, strain)
     zero = real(0, p)

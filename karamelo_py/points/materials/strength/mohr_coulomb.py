@@ -8,11 +8,7 @@ from typing import NamedTuple
 from karamelo_py.compile import real, shared
 from karamelo_py.points.kinematics import contract, from_principal, principal
 from karamelo_py.points.materials.strength import pressure_response
-from karamelo_py.points.materials.strength.frictional import (
-    give_friction,
-    give_softening,
-    surface,
-)
+from karamelo_py.points.materials.strength.frictional import give_friction, surface
 
 
 class MohrCoulomb(NamedTuple):
@@ -22,22 +18,12 @@ class MohrCoulomb(NamedTuple):
     cohesion: float  # c cos(phi)
     friction: float  # sin(phi)
     dilation: float  # sin(psi)
-
-
-class MohrCoulombSoftening(NamedTuple):
-    """The same, with strength that falls with plastic strain."""
-
-    G: float  # shear modulus
-    cohesion: float  # c cos(phi)
-    friction: float  # sin(phi)
-    dilation: float  # sin(psi)
-    residual_cohesion: float  # c cos(phi) in the end
-    residual_friction: float  # sin(phi) in the end
-    over: float  # plastic strain at the end of softening
+    residual_cohesion: float  # at the end of softening
+    residual_friction: float
+    softening: float  # share of the way to the residual for each unit of plastic strain, or 0
 
 
 give_friction(MohrCoulomb)
-give_softening(MohrCoulombSoftening)
 
 
 @shared
@@ -91,7 +77,6 @@ def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
 
 
 @pressure_response.on(MohrCoulomb)
-@pressure_response.on(MohrCoulombSoftening)
 def _(strength, kin, s, p, K, strain):
     k, sin_phi, sin_psi = surface(strength, strain)
     half = real(0.5, p)

@@ -1,0 +1,85 @@
+"""Words of other programs, above all of LAMMPS, and what says the same here."""
+
+from __future__ import annotations
+
+_FILL = "solid(ID, region, regionID, ppc, material, h, 0) fills a region with points"
+_LAW = "material(ID, linear, rho, E, nu) makes a material, and solid(...) uses it"
+_COLUMNS = "log_modify(custom, step, time, ...) names the columns of the log"
+_DOMAIN = "dimension(2, xlo, xhi, ylo, yhi, h) makes the domain and its grid"
+_VELOCITY = "fix(ID, initial_velocity_particles, group, vx, vy, vz) sets velocities"
+_NEEDLESS = "leave it out"
+
+# By family and name.
+INSTEAD = {
+    "command": {
+        "timestep": "set_dt(dt) sets the time step",
+        "dt": "set_dt(dt) sets the time step",
+        "unfix": "delete_fix(ID) ends a fix",
+        "uncompute": "delete_compute(ID) ends a compute",
+        "undump": "delete_dump(ID) ends a dump",
+        "dump_modify": "dump(ID, all, style, every, file, ...) says all of it",
+        "thermo": "set_output(N) logs every N steps",
+        "thermo_style": _COLUMNS,
+        "thermo_modify": _COLUMNS,
+        "variable": "a variable is set by name = expression",
+        "velocity": _VELOCITY,
+        "units": f"{_NEEDLESS}: any consistent units will do",
+        "run_style": "scheme(musl), scheme(usl), scheme(usf) or scheme(usavg)",
+        "create_box": _DOMAIN,
+        "lattice": _FILL,
+        "create_atoms": _FILL,
+        "read_data": f"{_FILL}; solid(ID, mesh, file, material, h) reads a mesh",
+        "mass": "the density stands in material(...)",
+        "pair_style": _LAW,
+        "pair_coeff": _LAW,
+        "atom_style": _NEEDLESS,
+        "atom_modify": _NEEDLESS,
+        "comm_modify": _NEEDLESS,
+        "neighbor": f"{_NEEDLESS}: points interact by the grid",
+        "neigh_modify": f"{_NEEDLESS}: points interact by the grid",
+        "newton": _NEEDLESS,
+        "processors": "karamelo-py SCRIPT --threads N",
+    },
+    "fix": {
+        "nve": f"{_NEEDLESS}: points move without a fix",
+        "enforce2d": f"{_NEEDLESS}: dimension(2, ...) is a plane",
+        "gravity": "fix(ID, body_force, all, 0, -9.81)",
+        "addforce": "fix(ID, body_force, group, ax, ay) or fix(ID, force_nodes, group, fx, fy)",
+        "setforce": "fix(ID, velocity_nodes, group, 0, 0) holds nodes",
+        "freeze": "fix(ID, velocity_nodes, group, 0, 0) holds nodes",
+        "move": "fix(ID, velocity_particles, group, vx, vy) moves points",
+        "velocity": _VELOCITY,
+        "wall/reflect": "boundary(reflect)",
+    },
+    "compute": {
+        "ke": "the style kinetic_energy",
+        "pe": "the style strain_energy",
+        "temp": "the style average_temperature",
+        "angmom": "the style angular_momentum",
+    },
+    "region": {
+        "box": "the style block",
+        "rectangle": "the style block",
+        "circle": "the style cylinder",
+        "disk": "the style cylinder",
+        "ball": "the style sphere",
+    },
+    "material": {
+        "elastic": "the style linear",
+        "plastic": "the style eos-strength, of an eos and a strength",
+        "fluid": "the style eos-strength, of an eos and a strength",
+    },
+    "dump": {
+        "atom": "the style particle",
+        "custom": "the style particle",
+        "atom/gz": "the style particle/gz",
+        "custom/gz": "the style particle/gz",
+        "image": "the style pyplot",
+        "movie": "the style pyplot",
+    },
+}
+
+
+def instead(family: str, name: str) -> str | None:
+    """What to write here for a command or style of another program; None for other words."""
+    return INSTEAD.get(family, {}).get(name)
