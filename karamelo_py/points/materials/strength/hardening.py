@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from karamelo_py.compile import point_function, real, round_off, shared
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.materials.strength import (
@@ -28,23 +30,25 @@ def returned(trial, q, flow, memory, increment):
     return scale(flow / q, trial), (memory[0] + increment,), flow * increment
 
 
-# Newton's method takes three to five; bisection, where it has to step in, one for each bit.
+# Newton's method takes two or three; bisection, where it has to step in, one for each bit.
 _MOST_ITERATIONS = 80
 
 
 @shared
-def plastic_increment(strength, q, strain, heat, dt):
+def plastic_increment(strength, q, strain, heat, dt, first, hardening):
     """The plastic strain x of a step that solves q - 3 G x = flow stress, for q above it at 0.
 
     The left side falls with x and the flow stress does not: there is one solution, whatever the
-    size of the step. Newton's method from above, kept within bounds by bisection.
+    size of the step. Newton's method from the flow stress `first` at 0 and its slope, kept within
+    bounds by bisection.
     """
     half = real(0.5, q)
     slope = real(3, q) * strength.G
+    enough = real(4, q) * round_off(q) * q  # what the three terms are rounded to
+    small = sqrt(round_off(q))
     low = real(0, q)
     high = q / slope
-    first, _ = flow_stress(strength, strain, low, heat, dt)
-    x = (q - first) / slope
+    x = (q - first) / (slope + hardening)
     for _ in range(_MOST_ITERATIONS):
         flow, hardening = flow_stress(strength, strain, x, heat, dt)
         excess = q - slope * x - flow
@@ -52,9 +56,11 @@ def plastic_increment(strength, q, strain, heat, dt):
             low = x
         else:
             high = x
-        if abs(excess) <= round_off(q) * q:
+        change = excess / (slope + hardening)
+        x += change
+        # The next change would be of the order of this one squared.
+        if abs(excess) <= enough or abs(change) <= small * x:
             break
-        x += excess / (slope + hardening)
         if not (low < x < high):
             x = half * (low + high)
             if not (low < x < high):
@@ -87,8 +93,8 @@ def give_hardening(strength: type) -> None:
     def _(strength, kin, s, strain, memory, heat, dt):
         trial = elastic_trial(kin, strength.G, s, strain)
         q = von_mises(kin, trial)
-        flow, _ = flow_stress(strength, memory[0], real(0, q), heat, dt)
+        flow, hardening = flow_stress(strength, memory[0], real(0, q), heat, dt)
         if q > flow:
-            x = plastic_increment(strength, q, memory[0], heat, dt)
+            x = plastic_increment(strength, q, memory[0], heat, dt, flow, hardening)
             return returned(trial, q, q - real(3, q) * strength.G * x, memory, x)
         return trial, memory, real(0, q)
