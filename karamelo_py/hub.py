@@ -30,14 +30,19 @@ class Catalogue(dict):
 
     def add(self, ID: str, item: Any, *, replace: bool = False) -> Any:
         """File `item` under `ID`; a second use of an ID is an error unless `replace`."""
-        if ID in self and not replace:
-            before = getattr(self[ID], "place", None)
-            where = f" (line {before.line})" if before else ""
-            raise ScriptError(f"{self.kind} ID '{ID}' is already used{where}", argument="ID")
+        if not replace:
+            self.refuse(ID)
         item.id = ID
         item.place = self.hub.place
         self[ID] = item
         return item
+
+    def refuse(self, ID: str) -> None:
+        """An ID that is in use is an error."""
+        if ID in self:
+            before = getattr(self[ID], "place", None)
+            where = f" (line {before.line})" if before else ""
+            raise ScriptError(f"{self.kind} ID '{ID}' is already used{where}", argument="ID")
 
     def __missing__(self, ID: str) -> Any:
         always = ["all"] if self.kind == "group" else []
@@ -47,10 +52,10 @@ class Catalogue(dict):
         raise ScriptError(
             f"unknown {self.kind} '{ID}'" + (f"; '{ID}' is a {other}" if other else ""),
             expected=f"one of {known}" if known else f"no {self.kind} is defined yet",
-            hint=f"did you mean '{close}'?"
+            hint=_group_of(other, ID)
+            if self.kind == "group" and other in ("region", "solid")
+            else f"did you mean '{close}'?"
             if close
-            else f"group({ID}, particles, region, regionID, solid, {ID}) makes one of a solid"
-            if (self.kind, other) == ("group", "solid")
             else None,
         )
 
@@ -58,6 +63,12 @@ class Catalogue(dict):
         """Forget `ID`; unknown is an error."""
         self[ID]
         del self[ID]
+
+
+def _group_of(kind: str, ID: str) -> str:
+    """How to make a group of a region or a solid."""
+    who = f"{ID}, all" if kind == "region" else f"regionID, solid, {ID}"
+    return f"group({ID}, particles, region, {who}) makes a group of a {kind}"
 
 
 class Settings:

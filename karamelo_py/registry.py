@@ -109,10 +109,14 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
     if name in styles:
         return styles[name]
     close = nearest(name, styles)
+    hint = instead(family, name) or (f"did you mean '{close}'?" if close else None)
+    others = [other for other in families() if other != "command" and knows(other, name)]
+    if hint is None and others:
+        hint = f"'{name}' is a style of {' and of '.join(others)}"
     raise ScriptError(
         f"unknown {family if family == 'command' else family + ' style'} '{name}'",
         expected="one of " + ", ".join(names(family)) if styles else f"no {family} is installed",
-        hint=instead(family, name) or (f"did you mean '{close}'?" if close else None),
+        hint=hint,
     )
 
 

@@ -12,7 +12,7 @@ from karamelo_py.cli import main
 from karamelo_py.hub import Hub
 from karamelo_py.script.interpreter import Interpreter
 
-# Points of the scenes that other codes were measured on (shared/reference and the papers there).
+# Points of the scenes that Karamelo was measured on.
 PUBLISHED = {
     "disks-20": 416, "disks-80": 6456, "disks-320": 102936,
     "bar-3d-ul": 74664, "bar-3d-tl": 74052, "dam-break": 88804,

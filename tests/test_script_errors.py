@@ -174,6 +174,9 @@ COMMANDS = [
     ("region(r, circle, 0, 0, 1)", 11, "the style cylinder"),
     ("fix(v, initial_velocity_particles, s, 1, 0)", 36, "'s' is a solid"),
     ("solid(s2, region, n, 1, m, 0.1)", 19, "'n' is a group"),
+    ("fix(v, velocity_nodes, b, 1, 0)", 24, "group(b, particles, region, b, all) makes"),
+    ("material(c, johnson_cook, 1, 2)", 13, "'johnson_cook' is a style of strength"),
+    ("fix(t, max_position, all)", 8, "is a style of compute"),
     ("delete_fix(g)", 12, "expected: no fix is defined yet"),
     ("set_dt = 0.1", 1, "set_dt(...) calls it"),
     ("log_modify(custom, step, s11)", 26, "s11 differs from point to point"),
@@ -242,6 +245,12 @@ def test_names_and_values(text, column, part, tmp_path):
 @pytest.mark.parametrize(("text", "column", "part"), COMMANDS)
 def test_commands(text, column, part, tmp_path):
     check(SCENE + text, 7, column, part, tmp_path)
+
+
+def test_an_id_of_a_solid_is_refused_before_its_points_are_made(tmp_path, capsys):
+    with pytest.raises(ScriptError, match="'s' is already used"):
+        run(SCENE + "solid(s, region, b, 2, m, 0.1, 0)\n", tmp_path)
+    assert "twice the mass" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("text", "column", "part"), LAMMPS)

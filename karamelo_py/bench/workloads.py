@@ -31,7 +31,7 @@ fix(v, initial_velocity_particles, all, 0.1*y0, 0.1*z0, 0.1*x0)
 set_dt(0.02*h)
 """
 # The copper bar of Taylor's test in three dimensions, with one point a cell (de Vaucorbeil et al.
-# 2020, section 4.4): 74052 points in tlmpm, 74664 in ulmpm.
+# 2020): 74052 points in tlmpm, 74664 in ulmpm.
 BAR = """
 L0 = 25.4e-3
 R0 = 3.8e-3

@@ -110,8 +110,7 @@ def define(
     """File under `ID` what the style makes of the arguments; an ID in use is an error first."""
     family = catalogue.kind
     target = registry.find(family, style)
-    if ID in catalogue:
-        catalogue.add(ID, None)
+    catalogue.refuse(ID)
     part = signature.call(target, hub, list(arguments), f"{family} {style}")
     part.style = style
     catalogue.add(ID, part)

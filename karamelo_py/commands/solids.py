@@ -51,6 +51,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
             expected="method(...) before the first solid, such as method(ulmpm, FLIP, linear, 1)",
         )
     require_domain(hub)
+    hub.solids.refuse(ID)
     target = registry.find("solid", kind)
     new = signature.call(target, hub, list(arguments), f"solid {kind}")
     warn_of_coinciding(hub, new, ID)
