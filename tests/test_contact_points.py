@@ -234,3 +234,24 @@ def test_messages(run_interpreted, contact, said):
 def test_shared_grids_are_a_warning(run_interpreted, method):
     script = bodies(0.1, MINIMIZE, "log_modify(custom, step)", "run(1)", method=method)
     assert "touch there already" in run_interpreted(script).err
+
+
+def test_solids_without_contact_are_told(run_interpreted):
+    """Bodies of total Lagrangian methods pass through each other, unless a fix says otherwise."""
+    script = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(2, 0, 4, 0, 1, 1)
+    region(left, block, 0, 1, 0, 1)
+    region(right, block, 2, 3, 0, 1)
+    material(m, linear, 1, 1, 0.3)
+    solid(a, region, left, 1, m, 1, 0)
+    solid(b, region, right, 1, m, 1, 0)
+    set_dt(0.1)
+    {}
+    run(1)
+    run(1)
+    """
+    said = run_interpreted(script.format("")).err
+    assert said.count("pass through each other: a, b") == 1
+    said = run_interpreted(script.format("fix(c, contact/minimize_penetration, a, b, 0)")).err
+    assert "pass through" not in said

@@ -127,6 +127,19 @@ class OwnGrids(Method):
     """A grid of its own for every solid."""
 
     own_grids = True
+    warned = False
+
+    def begin(self, hub: Hub, contact: NamedTuple) -> None:
+        """Tell once of solids that pass through all others."""
+        touching = {solid.id for fix in hub.fixes.values() for solid in fix.solids}
+        alone = [ID for ID in hub.solids if ID not in touching]
+        if len(hub.solids) > 1 and alone and not self.warned:
+            self.warned = True
+            hub.warn(
+                f"solids with grids of their own pass through each other: {', '.join(alone)}",
+                hint="fix(ID, contact/minimize_penetration, solid1, solid2, mu) for those that may "
+                "meet, or method ulmpm",
+            )
 
     def lattices(self, hub: Hub) -> list[Lattice]:
         """A grid over the box of each solid."""
