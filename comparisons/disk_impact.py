@@ -20,7 +20,8 @@ SMALL = {}  # the published size is small enough
 def compare(run, axes, full):
     """Depth and speed along the way, energy at the end."""
     time, depth, speed, kinetic = np.loadtxt(TABLE, delimiter=",", comments="#", skiprows=4).T
-    log = run(Y=YIELD).log
+    result = run(Y=YIELD)
+    log = result.log
     t = 1e6 * log.Time
     for at in (10, 20, 40):
         there, here = np.interp(at, time, depth), np.interp(at, t, log.depth)
@@ -38,4 +39,8 @@ def compare(run, axes, full):
     if full:
         fine = run(Y=YIELD, refine=2).log
         axes.plot(1e6 * fine.Time, fine.depth, lw=1, label="cells of half the size")
+    last = result.snapshots("disk_impact")[-1]
+    inset = axes.inset_axes([0.52, 0.08, 0.46, 0.6])
+    inset.scatter(1e3 * last.x, 1e3 * last.y, c=last.ep, s=0.3)
+    inset.set(aspect="equal", xticks=[], yticks=[], title="plastic strain")
     axes.set(xlabel="time (us)", ylabel="depth of the foot of the disk (mm)")

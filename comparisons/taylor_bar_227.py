@@ -24,4 +24,4 @@ def compare(run, axes, full):
     axes.scatter(1e3 * last.x, 1e3 * last.y, c=last.ep, s=1)
     axes.axhspan(*LENGTH, color="k", alpha=0.3, label="length, finite elements")
     axes.axvspan(*RADIUS, color="r", alpha=0.3, label="radius, finite elements")
-    axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal")
+    axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(0, 20))
