@@ -37,9 +37,12 @@ def compare(run, axes, full):
         # The wall has no friction; one that holds the foot fast leaves it 9.7 mm wide.
         yield Row(f"diameter of the foot, {kind} (mm)", DIAMETER, foot, 0.1, SOURCE)
         yield Row(f"diameter at 0.2 L0, {kind} (mm)", WAIST, waist, 0.1, SOURCE)
-        axes.plot(radius, height, ".", ms=0.5, label=kind)
+        side = 1 if kind == "tlmpm" else -1
+        axes.plot(
+            side * radius, height, ".", ms=0.5, label=f"{kind}, {'right' if side > 0 else 'left'}"
+        )
     if full:
         for what, a, b in zip(("length", "foot"), found["tlmpm"], found["ulmpm"], strict=True):
             yield Row(f"{what}, tlmpm / ulmpm", 1.0, a / b, 0.02, "two methods")
     axes.plot([DIAMETER / 2, WAIST / 2, 0], [0, 0.2 * L0, LENGTH], "k+", ms=12, label="experiment")
-    axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(0, 16))
+    axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(-10, 20))
