@@ -39,7 +39,7 @@ def compare(run, axes, full):
     axes.plot(t, log.depth, lw=1, label="von Mises 367 MPa")
     if full:
         fine = run(Y=YIELD, refine=2).log
-        yield Row("depth at 40 us, half the cells (mm)", FINE, fine.depth[-1], 0.03, SOURCE)
+        yield Row("depth at 40 us, cells of half the size (mm)", FINE, fine.depth[-1], 0.03, SOURCE)
         axes.plot(1e6 * fine.Time, fine.depth, lw=1, label="cells of half the size")
     last = result.snapshots("disk_impact")[-1]
     inset = axes.inset_axes([0.52, 0.08, 0.46, 0.6])
