@@ -1,0 +1,48 @@
+"""Copper bar against a wall, 190 m/s, in three dimensions: final shape against the experiment."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from comparisons.row import Row
+
+SOURCE = "Johnson & Holmquist 1988 (experiment)"
+LENGTH, DIAMETER, WAIST = 16.2, 13.5, 10.1  # mm; the waist is a fifth of L0 above the wall
+L0, R0 = 25.4, 3.8  # mm
+SMALL = {"refine": 1 / 3}
+
+
+def shape(snapshots):
+    """Radius and height of the points at the end, and the diameter at the waist, in mm."""
+    first, last = snapshots[0], snapshots[-1]
+    radius, height = 1e3 * np.hypot(last.x, last.y), 1e3 * last.z
+    # The outermost points lie inside the surface by as much as at the start.
+    margin = R0 - 1e3 * np.hypot(first.x, first.y).max()
+    waist = radius[np.abs(height - 0.2 * L0) < 0.02 * L0].max() + margin
+    return radius, height, 2 * waist
+
+
+def compare(run, axes, full):
+    """Length, foot and waist by tlmpm with one point a cell; in full by ulmpm with eight, too."""
+    ways = {"tlmpm": {}}
+    if full:
+        ways["ulmpm"] = {"kind": "ulmpm", "ppc": 2, "refine": 1 / 2}
+    found = {}
+    for kind, words in ways.items():
+        result = run(**words)
+        log = result.log
+        radius, height, waist = shape(result.snapshots("taylor_bar"))
+        found[kind] = length, foot = log.length[-1], log.diameter[-1]
+        yield Row(f"length, {kind} (mm)", LENGTH, length, 0.05, SOURCE)
+        # The wall has no friction; one that holds the foot fast leaves it 9.7 mm wide.
+        yield Row(f"diameter of the foot, {kind} (mm)", DIAMETER, foot, 0.1, SOURCE)
+        yield Row(f"diameter at 0.2 L0, {kind} (mm)", WAIST, waist, 0.1, SOURCE)
+        side = 1 if kind == "tlmpm" else -1
+        axes.plot(
+            side * radius, height, ".", ms=0.5, label=f"{kind}, {'right' if side > 0 else 'left'}"
+        )
+    if full:
+        for what, a, b in zip(("length", "foot"), found["tlmpm"], found["ulmpm"], strict=True):
+            yield Row(f"{what}, tlmpm / ulmpm", 1.0, a / b, 0.02, "two methods")
+    axes.plot([DIAMETER / 2, WAIST / 2, 0], [0, 0.2 * L0, LENGTH], "k+", ms=12, label="experiment")
+    axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(-10, 20))
