@@ -1,4 +1,4 @@
-"""Water column that falls down: its front against Martin & Moyce, and its density."""
+"""Column of water that falls down: its front against Martin & Moyce, and its density."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ def compare(run, axes, full):
     log = result.log
     before = log.front < 0.98 * TANK  # the other wall
     time, front = log.Time[before] * np.sqrt(2 * G / WIDTH), log.front[before] / WIDTH
-    for place in (2, 4):
-        found = [np.interp(place, Z, T) for T, Z in columns()]
-        # The front has no gate to wait for and no friction: 10 % early, as without viscosity.
-        computed = np.interp(place, front, time)
-        yield Row(f"time of the front at {place} a", band(found), computed, 0.12, SOURCE)
+    start, end = (np.interp(place, front, time) for place in (2, 4))
+    found = np.array([[np.interp(place, Z, T) for place in (2, 4)] for T, Z in columns()])
+    # Early by a quarter of the unit, 0.014 s of the larger column, from the first readings on: the
+    # gate of the experiment takes time to open.
+    yield Row("time of the front at 4 a", band(found[:, 1]), end, 0.12, SOURCE)
+    yield Row("time from 2 a to 4 a", band(np.diff(found)), end - start, 0.1, SOURCE)
     speeds = [np.polyfit(T[Z < 5], Z[Z < 5], 1)[0] for T, Z in columns(2)]
     late = front > 2
     speed = np.polyfit(time[late], front[late], 1)[0]
@@ -52,7 +53,7 @@ def columns(above=0.0):
 
 def band(numbers):
     """From the smallest to the largest."""
-    return float(min(numbers)), float(max(numbers))
+    return float(np.min(numbers)), float(np.max(numbers))
 
 
 def density(result, name):
