@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from comparisons.lines import distance, surface, unmoved
 from comparisons.row import Row
 
 SOURCE = "Bui et al. 2008 (experiment)"
@@ -22,12 +23,13 @@ def compare(run, axes, full):
     """Distances between the lines, run-out, and angle of repose."""
     last = run().snapshots("collapse")[-1]
     cell = HEIGHT / (CELLS * (1 if full else SMALL["refine"]))
-    x, depth = deposit(last, cell)
-    still = unmoved(last)
+    top = surface(last, RHO, cell)
+    still = unmoved(last, 5e-4)
+    x, depth = top.T
     toe = x[np.flatnonzero(depth < BAR)[0]]
     # The toe is as thin as a cell: coarse grids lose the end of it.
     yield Row("run-out (m)", SURFACE[-1, 0], toe, 0.03 if full else 0.1, SOURCE)
-    off = 1e3 * distance(SURFACE, np.column_stack([x, depth]))
+    off = 1e3 * distance(SURFACE, top)
     yield Row("distance of the surfaces (mm)", 0.0, off, 3, SOURCE)
     # At the foot the floor, which lets nothing slip, holds 10 mm more of the heap.
     off = 1e3 * distance(FAILURE, still)
@@ -41,31 +43,6 @@ def compare(run, axes, full):
     axes.plot(*SURFACE.T, "k.", label="experiment")
     axes.plot(*FAILURE.T, "k+", label="experiment: did not move")
     axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", xlim=(0, 0.55))
-
-
-def deposit(points, width):
-    """Depth of the deposit at the density that the heap had, over columns of a cell."""
-    edges = np.arange(0, points.x.max() + 2 * width, width)
-    volume, _ = np.histogram(points.x, edges, weights=points.mass / RHO)
-    return (edges[1:] + edges[:-1]) / 2, volume / width
-
-
-def unmoved(points):
-    """The upper ends of the columns of points that have moved by less than half a millimetre."""
-    moved = np.hypot(points.x - points.x0, points.y - points.y0)
-    still = moved < 5e-4
-    columns = np.unique(points.x0[still])
-    top = [points.y0[still & (points.x0 == x)].max() for x in columns]
-    return np.column_stack([columns, top])
-
-
-def distance(points, line):
-    """Mean distance of points from a broken line (rows of x and y)."""
-    start, along = line[:-1], np.diff(line, axis=0)
-    ahead = points[:, None] - start
-    share = (ahead * along).sum(-1) / (along**2).sum(-1)
-    away = ahead - np.clip(share, 0, 1)[..., None] * along
-    return np.hypot(away[..., 0], away[..., 1]).min(axis=1).mean()
 
 
 def repose(x, y):
