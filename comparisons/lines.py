@@ -16,7 +16,8 @@ def distance(points, line):
 
 def surface(points, density, width):
     """Height of what lies on a floor, as if it had its first density, over columns of a width."""
-    edges = np.arange(0, points.x.max() + 2 * width, width)
+    first = np.floor(points.x.min() / width) * width
+    edges = np.arange(first, points.x.max() + 2 * width, width)
     volume, _ = np.histogram(points.x, edges, weights=points.mass / density)
     return np.column_stack([(edges[1:] + edges[:-1]) / 2, volume / width])
 
