@@ -29,7 +29,7 @@ from comparisons.row import Row
 HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"
 INPUTS = HERE.parent / "inputs"
-TOOLS = ("__main__", "results", "row")
+TOOLS = ("__main__", "lines", "results", "row")
 
 
 def scenes() -> list[str]:

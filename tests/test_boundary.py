@@ -8,6 +8,7 @@ from scenes import SCHEMES, TRANSFERS, block
 from states import final_state, same_bits
 
 from comparisons.results import read_dump, read_log
+from karamelo_py.points.boundary import turned
 
 MASS = {1: 2 * 0.3, 2: 2 * 0.3 * 0.2, 3: 2 * 0.3 * 0.2 * 0.1}
 COUNT = {1: 6, 2: 24, 3: 48}
@@ -91,6 +92,16 @@ def test_a_reflected_point_is_a_mirror_image(run_interpreted, d, transfer):
         assert last[name] == pytest.approx([expected], abs=1e-8)
         sign = -1 if free[k] > 1.2 else 1
         assert last["v" + name] == pytest.approx([sign * V[k]], rel=1e-9)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_the_gradient_of_a_reflected_point_is_a_mirror_image(d):
+    """The field v = L x, seen in the mirror R: R v(R x)."""
+    L, R = np.arange(1.0, d * d + 1).reshape(d, d), np.diag([-1.0, 1.0, -1.0][:d])
+    mirror_image = [R @ L @ R @ x for x in np.eye(d)]
+    found = turned(tuple(np.diag(R)), tuple(L.ravel()))
+    assert np.reshape(found, (d, d)).T.tolist() == np.array(mirror_image).tolist()
+    assert turned(tuple(np.diag(R)), ()) == ()
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])

@@ -28,7 +28,7 @@ def _(grid, kin, y, v, moment):
 @reflected.on(ReflectingGrid)
 def _(grid, kin, y, v, moment):
     signs = turns(grid, y, v)
-    return mirrored(grid, y), multiply_each(signs, v), rows_times(signs, moment), hits(grid, y)
+    return mirrored(grid, y), multiply_each(signs, v), turned(signs, moment), hits(grid, y)
 
 
 @shared
@@ -83,12 +83,14 @@ hits = in_every_direction(hit)
 turns = in_every_direction(turn)
 
 
-def rows_times(signs, moment):
-    """The rows of a square tensor (or none) times the signs: its velocities turn round."""
-    return tuple(signs[n // len(signs)] * m for n, m in enumerate(moment))
+def turned(signs, moment):
+    """R L R of a square tensor L (or none), R = diag(signs): velocities and places turn round."""
+    d = len(signs)
+    return tuple(signs[n // d] * m * signs[n % d] for n, m in enumerate(moment))
 
 
-@by_type(rows_times)
-def _rows_times(signs, moment):
-    items = "".join(f"signs[{n // len(signs)}] * moment[{n}], " for n in range(len(moment)))
+@by_type(turned)
+def _turned(signs, moment):
+    d = len(signs)
+    items = "".join(f"signs[{n // d}] * moment[{n}] * signs[{n % d}], " for n in range(len(moment)))
     return define("signs, moment", f"return ({items})")
