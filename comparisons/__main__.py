@@ -14,6 +14,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
+from shutil import rmtree
 from types import ModuleType
 from typing import Any
 
@@ -48,7 +49,8 @@ def runner(name: str, folder: Path, size: dict[str, Any]) -> Callable[..., Resul
     def run(**variables: Any) -> Result:
         words = {**size, **variables}
         place = folder / "_".join([name, *(f"{k}={v}" for k, v in words.items())]).replace("/", "-")
-        place.mkdir(parents=True, exist_ok=True)
+        rmtree(place, ignore_errors=True)  # a longer run before may have left later snapshots
+        place.mkdir(parents=True)
         options = [part for k, v in words.items() for part in ("-var", k, str(v))]
         command = [sys.executable, "-m", "karamelo_py.cli", str(INPUTS / f"in.{name}"), *options]
         done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)

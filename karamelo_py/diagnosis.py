@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from karamelo_py.group import NOTHING_THERE, NodeGroup
-from karamelo_py.kernels.step import ABOVE_LIMIT
+from karamelo_py.kernels.step import ABOVE_LIMIT, SHRUNK
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.tensors import record
@@ -68,6 +68,9 @@ def stop(
     if status == ABOVE_LIMIT:
         message, hint = _above_limit(hub, simulation)
         _write_last_good(hub)
+    elif status == SHRUNK:
+        message, hint = _shrunk(hub, simulation)
+        _write_last_good(hub)
     else:
         message, hint = _wrong_point(hub, simulation)
         simulation.restore(snapshot)
@@ -89,6 +92,21 @@ def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     fastest = int(np.argmax(speeds))
     message += f" ({_named(hub, simulation, fastest)} moves at {speeds[fastest]:.4g})"
     return message, f"set_dt({0.5 * limit:.3g}) or less, or leave set_dt out"
+
+
+def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+    here = np.flatnonzero(simulation.present)
+    speeds = np.abs(simulation.v[here]).max(axis=1)
+    volumes = hub.fields.particle("volume") / hub.fields.reference_volume[here]
+    fastest, widest = int(np.argmax(speeds)), int(np.argmax(volumes))
+    message = (
+        f"step {simulation.step}, time {simulation.time:.6g}: the stable step has fallen to "
+        f"{simulation.limit:.3g}, less than a millionth of the first "
+        f"({_named(hub, simulation, here[fastest])} moves at {speeds[fastest]:.3g}, "
+        f"{_named(hub, simulation, here[widest])} has {volumes[widest]:.3g} times its volume)"
+    )
+    smaller = _smaller_step(hub, simulation)
+    return message, f"something went wrong before: look at the dumps; {smaller}"
 
 
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:

@@ -15,6 +15,7 @@ from karamelo_py import boundary
 from karamelo_py.kernels.arrays import (
     DRIFT,
     GRADIENT,
+    KEPT,
     LIGHTEST,
     SPACING,
     Block,
@@ -178,8 +179,9 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
-    control = Control(hub.values.array, np.zeros(13), np.zeros(4, np.int64))
+    control = Control(hub.values.array, np.zeros(15), np.zeros(4, np.int64))
     control.real[SPACING] = min(lattice.h for lattice in lattices)
+    control.real[KEPT] = getattr(transfer, "alpha", 0)
     control.real[DRIFT] = np.inf  # the points are not sorted yet
     needs = Needs(
         moment=transfer.keeps_moment,

@@ -14,6 +14,7 @@ from karamelo_py.kernels.arrays import (
     DT,
     DT_FACTOR,
     END_TIME,
+    FIRST_RATE,
     FIXED_DT,
     HEAT_LIMIT,
     INITIAL_INTEGRATE,
@@ -309,6 +310,8 @@ class Simulation:
                 "nothing limits the time step: all that there is is rigid and at rest",
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",
             )
+        if control.real[FIRST_RATE] == 0:
+            control.real[FIRST_RATE] = control.real[RATE]
         control.whole[WATCH_LIMIT] = int(not self.above_limit())
         control.whole[OVER_LIMIT] = 0
 
@@ -356,7 +359,7 @@ class Simulation:
         return int(self.setup.control.values[TIMESTEP])
 
     def advance(self, count: int) -> int:
-        """Take up to `count` steps (to the end time at most); DONE, STOPPED or ABOVE_LIMIT.
+        """Take up to `count` steps (to the end time at most); DONE, or why it stopped.
 
         Points that are due to be sorted are sorted before the next step, so that the nodes keep
         showing the last one.

@@ -173,3 +173,30 @@ def test_formulas_of_place_and_time(run_interpreted):
     expected = MASS * 0.45 * log.Time[:-1]
     assert log.g_x[1:] == pytest.approx(expected, rel=1e-5, abs=1e-15)
     assert log.g_y[1:] == pytest.approx(np.full(3, MASS * 0.4), rel=1e-5)
+
+
+@pytest.mark.parametrize("share", [1, 0.9, 0])
+def test_reaction_is_the_stress(run_interpreted, share):
+    """The grips of a bar that is stretched slowly bear E ln(1 + strain), whatever points keep."""
+    script = f"""
+    h = 0.25
+    method(tlmpm, FLIP, linear, {share})
+    dimension(1, -0.5, 1.5, h)
+    region(bar, block, 0, 1)
+    material(m, linear, 1e-4, 1, 0)
+    solid(bar, region, bar, 2, m, h, 0)
+    region(left, block, -h/4, h/4)
+    region(right, block, 1 - h/4, 1 + h/4)
+    group(left, nodes, region, left, all)
+    group(right, nodes, region, right, all)
+    fix(v0, initial_velocity_particles, all, 0.01*x0)
+    fix(left, velocity_nodes, left, 0)
+    fix(right, velocity_nodes, right, 0.01)
+    log_modify(custom, step, time, left_x, right_x)
+    set_output(100)
+    run_time(1)
+    """
+    log = run_interpreted(script).log
+    exact = np.log(1.01)
+    assert log.right_x[-1] == pytest.approx(exact, rel=1e-3)
+    assert log.left_x[-1] == pytest.approx(-exact, rel=1e-3)

@@ -223,3 +223,19 @@ def test_thermal_pressure():
     warm = with_temperature(law, kin, state, 398.0)
     free = with_stress(law, kin, warm, (0.0, 0.0, 0.0, 0.0))
     assert jacobian(law, kin, free) == pytest.approx(1 + 2 / 160)
+
+
+def test_tension_of_a_liquid():
+    """tension cuts Tait's curve: pressure stays, energy grows with the volume."""
+    whole, torn = Tait(1e-3, 2.0, 7.0), Tait(1e-3, 2.0, 7.0, 0.5)
+    start = ratio_at_pressure(torn, -0.5, ())
+    assert pressure(whole, start, (), ()) == pytest.approx(-0.5)
+    assert ratio_at_pressure(torn, -1.0, ()) == start
+    for j in (0.95, 1.0, 1.01):
+        assert pressure(torn, j, (), ()) == pressure(whole, j, (), ())
+        assert compression_energy(torn, j, ()) == pytest.approx(compression_energy(whole, j, ()))
+    assert pressure(torn, 1.5, (), ()) == -0.5
+    grown = compression_energy(torn, 1.5, ()) - compression_energy(torn, 1.2, ())
+    assert grown == pytest.approx(0.5 * 0.3)
+    none = Tait(1e-3, 2.0, 7.0, 0.0)
+    assert pressure(none, 1.2, (), ()) == 0 and compression_energy(none, 1.2, ()) == 0

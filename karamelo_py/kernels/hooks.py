@@ -6,7 +6,8 @@ functions are called by address, so a new list of fixes compiles nothing but the
 
 Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star, force, total)``
     `value` and `before` are the formula at the time of the step and one step earlier, `share` is
-    one over the number of members with mass; the totals are summed and published.
+    one over the number of members with mass; the totals are summed and published, with what
+    a change of v before the update adds to the momentum of points over dt.
 Point function ``(mass, v, x_old, x, value, before, dt) -> (v, x, total)``
 Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``
     acts on points where heat flows: `value` and `other` are the first and the second formula,
@@ -33,6 +34,7 @@ from karamelo_py.kernels.arrays import (
     FINAL_INTEGRATE,
     FROM,
     INITIAL_INTEGRATE,
+    KEPT,
     POST_ADVANCE_PARTICLES,
     POST_GRID_TO_POINT,
     POST_HEAT_TO_GRID,
@@ -184,6 +186,7 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, h, count, sha
             else:
                 v = nodes.velocity[n, c]
                 star = v
+            old = v
             v, star, force, part = _call_node_function(
                 hooks.table[h, ADDRESS],
                 mass,
@@ -196,6 +199,9 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, h, count, sha
                 share,
             )
             total += part
+            if target == ON_UPDATE:
+                # Points that keep their velocity take the change v* - v: another v is an impulse.
+                total += control.real[KEPT] * mass * (old - v) / dt
             if target == ON_SUMS:
                 nodes.sums[n, 1 + d + c] = force
             elif target == ON_UPDATE:

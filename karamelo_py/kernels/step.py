@@ -18,6 +18,7 @@ from karamelo_py.kernels.arrays import (
     DT,
     DT_FACTOR,
     END_TIME,
+    FIRST_RATE,
     FIXED_DT,
     HEAT_LIMIT,
     LIGHTEST,
@@ -469,16 +470,18 @@ def begin(scheme, visits, mode, s):
     """
 
 
-DONE, STOPPED, ABOVE_LIMIT, SORT = range(4)
+DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK = range(5)
 PATIENCE = 50  # steps above the stable limit before a run is stopped
+SMALLEST = 1e-6  # share of the first stable step at which a run is stopped: it would never end
 
 
 def run_steps(scheme, visits, mode, s, hooks, count):
     """Take up to `count` steps, as far as the end time; say why it stopped.
 
-    Returns DONE, STOPPED (a point went wrong), ABOVE_LIMIT (the step is above the stable limit) or
-    SORT: the points must be sorted before one can have left the surroundings of its tile. When that
-    is depends on the points only, never on where a run is interrupted.
+    Returns DONE, STOPPED (a point went wrong), ABOVE_LIMIT (the step is above the stable limit),
+    SHRUNK (the stable step has become next to nothing) or SORT: the points must be sorted before
+    one can have left the surroundings of its tile. When that is depends on the points only, never
+    on where a run is interrupted.
     """
     control = s.control
     if not begin(scheme, visits, mode, s):
@@ -491,6 +494,8 @@ def run_steps(scheme, visits, mode, s, hooks, count):
         finish(control)
         if control.whole[WATCH_LIMIT] > 0 and control.whole[OVER_LIMIT] >= PATIENCE:
             return ABOVE_LIMIT
+        if control.real[RATE] * SMALLEST > control.real[FIRST_RATE]:
+            return SHRUNK
         if control.real[DRIFT] > control.real[DRIFT_LIMIT]:
             return SORT
         if last:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import log
+from math import inf, log
 from typing import NamedTuple
 
 from karamelo_py.compile import real, round_off
@@ -16,11 +16,12 @@ from karamelo_py.points.materials.eos import (
 
 
 class Tait(NamedTuple):
-    """p = K ((rho / rho0)^gamma - 1)."""
+    """p = K ((rho / rho0)^gamma - 1), but not below -tension."""
 
     specific_volume: float  # reference volume per mass
     K: float  # reference pressure; K gamma is the bulk modulus
     gamma: float
+    tension: float = inf  # that the liquid bears; K at most, by the formula
 
 
 give_specific_volume(Tait)
@@ -28,7 +29,7 @@ give_specific_volume(Tait)
 
 @pressure.on(Tait)
 def _(eos, j, memory, heat):
-    return eos.K * (j ** (-eos.gamma) - real(1, j))
+    return max(eos.K * (j ** (-eos.gamma) - real(1, j)), -eos.tension)
 
 
 @bulk_modulus.on(Tait)
@@ -39,13 +40,16 @@ def _(eos, j, memory, heat):
 @compression_energy.on(Tait)
 def _(eos, j, memory):
     one = real(1, j)
+    bound = min(j, ratio_at_pressure(eos, -eos.tension, ()))
     power = one - eos.gamma
-    grown = -log(j) if power == 0 else (one - j**power) / power
-    return eos.K * (grown - (one - j))
+    grown = -log(bound) if power == 0 else (one - bound**power) / power
+    torn = j - bound  # at constant tension
+    return eos.K * (grown - (one - bound)) + (eos.tension * torn if torn > 0 else torn - torn)
 
 
 @ratio_at_pressure.on(Tait)
 def _(eos, p, heat):
     # Tension of K would need an infinite volume.
     one = real(1, p)
-    return max(one + p / eos.K, round_off(p)) ** (-one / eos.gamma)
+    borne = max(p, -eos.tension)
+    return max(one + borne / eos.K, round_off(p)) ** (-one / eos.gamma)
