@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import sqrt
-
 from karamelo_py.compile import point_function, real, round_off, shared
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.materials.strength import (
@@ -45,10 +43,10 @@ def plastic_increment(strength, q, strain, heat, dt, first, hardening):
     half = real(0.5, q)
     slope = real(3, q) * strength.G
     enough = real(4, q) * round_off(q) * q  # what the three terms are rounded to
-    small = sqrt(round_off(q))
     low = real(0, q)
     high = q / slope
     x = (q - first) / (slope + hardening)
+    last = x
     for _ in range(_MOST_ITERATIONS):
         flow, hardening = flow_stress(strength, strain, x, heat, dt)
         excess = q - slope * x - flow
@@ -58,9 +56,10 @@ def plastic_increment(strength, q, strain, heat, dt, first, hardening):
             high = x
         change = excess / (slope + hardening)
         x += change
-        # The next change would be of the order of this one squared.
-        if abs(excess) <= enough or abs(change) <= small * x:
+        # Changes go like their squares, c_(n+1) = (c_n / c_(n-1))^2 c_n: is the next one round-off?
+        if abs(excess) <= enough or abs(change * change * change) <= round_off(q) * x * last * last:
             break
+        last = change
         if not (low < x < high):
             x = half * (low + high)
             if not (low < x < high):
