@@ -83,19 +83,21 @@ published number, or to the nearer end of a range.
 """
 
 
+def published(row: Row) -> str:
+    """The published number or range."""
+    ends = row.published if isinstance(row.published, tuple) else (row.published,)
+    return " to ".join(f"{end:.4g}" for end in ends)
+
+
 def section(name: str, rows: list[Row]) -> str:
     """The part of docs/comparison.md about a scene."""
     title = (scene(name).__doc__ or name).splitlines()[0]
     lines = [f"## `in.{name}`", "", title, ""]
     lines += ["| quantity | published | computed | difference | source |", "|---|---|---|---|---|"]
     for row in rows:
-        if isinstance(row.published, tuple):
-            published = " to ".join(f"{p:.4g}" for p in row.published)
-        else:
-            published = f"{row.published:.4g}"
         # Relative to zero there is nothing to divide by.
         difference = f"{100 * row.difference:+.1f} %" if row.published else f"{row.difference:+.2g}"
-        cells = (row.quantity, published, f"{row.computed:.4g}", difference, row.source)
+        cells = (row.quantity, published(row), f"{row.computed:.4g}", difference, row.source)
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join([*lines, "", f"![{title}](_static/{name}.png)", ""])
 
@@ -110,7 +112,9 @@ def main() -> None:
     """Run scenes, write the page and the pictures."""
     parser = argparse.ArgumentParser(prog="python -m comparisons", description=__doc__)
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help="all, if none is named")
-    parser.add_argument("--small", action="store_true", help="at the size of the tests, to look at")
+    parser.add_argument(
+        "--small", action="store_true", help="at the size of the tests; writes no page"
+    )
     parser.add_argument("--folder", type=Path, help="where logs and dumps stay")
     options = parser.parse_args()
     if unknown := set(options.scenes) - set(scenes()):
@@ -121,10 +125,13 @@ def main() -> None:
         folder = (options.folder or Path(temporary)).resolve()
         for name in options.scenes or scenes():
             print(f"in.{name}", flush=True)
+            print("  quantity: published | computed")
             rows = compare(name, folder, not options.small)
             for row in rows:
-                mark = "" if row.agrees else f"  NOT within {row.within:g}"
-                print(f"  {row.quantity}: {row.published} | {row.computed:.5g}{mark}", flush=True)
+                mark = "ok" if row.agrees else f"NOT within {row.within:g}"
+                print(
+                    f"  {row.quantity}: {published(row)} | {row.computed:.4g}  {mark}", flush=True
+                )
             if options.small:
                 continue
             found[name] = section(name, rows)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from comparisons.row import Row
 
-SOURCE = "finite element codes"
+SOURCE = "finite element codes, as they are quoted"
 LENGTH, RADIUS = (21.4, 21.5), (7.0, 7.2)  # mm, of several codes
 ENERGY = 239.6  # J, at the start
 SMALL = {"refine": 1 / 2}
@@ -14,6 +14,7 @@ def compare(run, axes, full):
     """Length and head, and where the kinetic energy goes."""
     result = run()
     log = result.log
+    # The ranges are of few codes: one more may lie as far outside as they are wide.
     yield Row("length (mm)", LENGTH, log.length[-1], 0.01, SOURCE)
     yield Row("radius of the head (mm)", RADIUS, log.radius[-1], 0.03, SOURCE)
     yield Row("kinetic energy at the start (J)", ENERGY, log.E_kinetic[0], 2e-3, SOURCE)

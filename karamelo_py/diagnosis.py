@@ -112,6 +112,11 @@ def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     """What is wrong with the first point that went wrong, and what can be done."""
     wrong = [(int(block.id[p]), block, p) for block, p in simulation.wrong_points()]
+    if not wrong and hub.update.thermal:
+        return (
+            "the temperature of a point is not a number",
+            "look at the fixes that act on heat: a formula that gives NaN, or heat without bounds",
+        )
     if not wrong:
         return "a point went wrong", "use a smaller step"
     number, block, p = min(wrong, key=lambda item: item[0])

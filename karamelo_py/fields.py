@@ -256,7 +256,7 @@ class Fields:
             return mass
         if name == "T" and self.hub.update.thermal:
             heat = self._simulation.setup.heat.nodes
-            return np.where(heat.sums[:, 0] > 0, heat.update[:, 0], 0.0)
+            return np.where(heat.sums[:, 0] > 0, heat.velocity[:, 0], 0.0)
         if name in ABSENT_AT_NODES:
             return np.zeros(self.node_count)
         axis = AXES.index(name[1])

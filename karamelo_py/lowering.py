@@ -15,6 +15,8 @@ from karamelo_py import boundary
 from karamelo_py.kernels.arrays import (
     DRIFT,
     GRADIENT,
+    HEAT_LIMIT,
+    HEAT_REFERENCE,
     KEPT,
     LIGHTEST,
     SPACING,
@@ -136,10 +138,10 @@ def stable_courant(hub: Hub) -> float:
 
 
 def stable_conduction(hub: Hub) -> float:
-    """The stable step of conduction: h^2 / (4 d) times capacity over conductivity, of the worst.
+    """The stable step of conduction in undeformed bodies, of the worst.
 
-    The bound of lumped finite elements is h^2 / (2 d); a body that is squeezed to seven tenths of
-    its thickness in the total frame needs the rest.
+    h^2 / (4 d) times capacity over conductivity: half of the bound of lumped finite elements, since
+    points stand anywhere in a cell.
     """
     if not hub.update.thermal:
         return np.inf
@@ -179,8 +181,9 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
-    control = Control(hub.values.array, np.zeros(15), np.zeros(4, np.int64))
+    control = Control(hub.values.array, np.zeros(18), np.zeros(4, np.int64))
     control.real[SPACING] = min(lattice.h for lattice in lattices)
+    control.real[[HEAT_LIMIT, HEAT_REFERENCE]] = stable_conduction(hub)
     control.real[KEPT] = getattr(transfer, "alpha", 0)
     control.real[DRIFT] = np.inf  # the points are not sorted yet
     needs = Needs(

@@ -9,11 +9,14 @@ A fix overrides the hooks it needs, by the names of Karamelo:
 ``post_grid_to_point``         the points have their new velocity and place; :class:`PointsView`
 ``post_advance_particles``     the same moment, after all ``post_grid_to_point``
 ``post_velocities_to_grid``    the velocity that will deform the points; :class:`NodesView`
-``post_heat_to_grid``          the temperature of the nodes is known (thermo-mechanical)
-``supply_heat``                heat flows, points may get heat
-``post_update_grid_heat``      the temperature of the nodes after the step is known
+``post_heat_to_grid``          the temperature of the nodes is known; :class:`NodesView` of heat
+``supply_heat``                points may get heat; :class:`PointsView` with ``heat_supply``
+``post_update_grid_heat``      the temperature after the step is known; :class:`NodesView` of heat
 ``final_integrate``            the end of the step; :class:`PointsView`
 =============================  =================================================================
+
+The last three are those of thermo-mechanical methods. In a view of heat, ``velocity`` is the
+temperature, (n, 1), ``mass`` the heat capacity and ``force`` the heat flow.
 
 A hook is either a method, called with a view of the group (Python comes back at that stage of each
 step), or the result of :func:`node_hook` or :func:`point_hook`, which is compiled into the loop.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import Fused, Staged
 from karamelo_py.laws import law_kind
 
@@ -51,9 +52,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         total += of_one * len(block.id)
     say("fields of a node")
     per_node = 0
-    for name, array in zip(s.nodes._fields, s.nodes, strict=True):
-        if array is None:
-            continue
+    for name, array in node_fields(s):
         size = array.itemsize * array.shape[1]
         per_node += size
         say(f"  {name:<30}  {array.shape[1]!s:<10} {size:>6}")
@@ -68,6 +67,14 @@ def materials(hub: Hub, block: Any) -> list[Material]:
     """The materials of the points of this block: those in use whose laws are of its kind."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
     return [material for material in used if law_kind(material.law) == law_kind(block.laws)]
+
+
+def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
+    """The arrays of the nodes, and of those that heat flows through, with their names."""
+    fields = list(s.nodes._asdict().items())
+    if isinstance(s.heat, Conducting):
+        fields += [(f"{name} (heat)", array) for name, array in s.heat.nodes._asdict().items()]
+    return [(name, array) for name, array in fields if array is not None]
 
 
 def point_fields(block: Any) -> list[tuple[str, str, int]]:
@@ -96,4 +103,6 @@ def stages(hub: Hub, simulation: Simulation) -> list[str]:
     first = type(hub.update.scheme).stages[0 if visits is Fused else 1]
     if not lines:
         lines = ["no fix acts between them"]
+    if hub.update.thermal:
+        lines.insert(0, "before v*: heat to the nodes, its flow, temperature of the points")
     return [*first, *lines]

@@ -14,14 +14,13 @@ from karamelo_py.kernels.arrays import (
     DT,
     DT_FACTOR,
     END_TIME,
-    FIRST_RATE,
+    FIRST_LIMIT,
     FIXED_DT,
-    HEAT_LIMIT,
     INITIAL_INTEGRATE,
+    LIMIT,
     NOW,
     OVER_LIMIT,
-    RATE,
-    SPACING,
+    SUPPLY_HEAT,
     TIME,
     TIMESTEP,
     WATCH_LIMIT,
@@ -52,7 +51,6 @@ from karamelo_py.lowering import (
     State,
     chosen,
     lower,
-    stable_conduction,
     stable_courant,
     thread_count,
 )
@@ -140,6 +138,8 @@ def _(hooks, stage, target, s):
 @at_heated_points.on(PythonHooks)
 def _(hooks, s):
     at_heated_points(hooks.compiled, s)
+    for fix, hook in hooks.by_stage.get(SUPPLY_HEAT, ()):
+        hook(PointsView(hooks.simulation, fix.group, then=False))
 
 
 class Simulation:
@@ -296,7 +296,6 @@ class Simulation:
         control = self.setup.control
         control.real[FIXED_DT] = update.fixed_dt or 0.0
         control.real[COURANT] = stable_courant(self.hub)
-        control.real[HEAT_LIMIT] = stable_conduction(self.hub)
         control.real[DT_FACTOR] = update.dt_factor
         control.real[END_TIME] = end_time
         control.whole[OVER_LIMIT] = 0
@@ -310,8 +309,9 @@ class Simulation:
                 "nothing limits the time step: all that there is is rigid and at rest",
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",
             )
-        if control.real[FIRST_RATE] == 0:
-            control.real[FIRST_RATE] = control.real[RATE]
+        # A body at rest that has no waves has no first limit to compare with.
+        if control.real[FIRST_LIMIT] == 0 and np.isfinite(self.limit) and not update.fixed_dt:
+            control.real[FIRST_LIMIT] = self.limit
         control.whole[WATCH_LIMIT] = int(not self.above_limit())
         control.whole[OVER_LIMIT] = 0
 
@@ -335,9 +335,7 @@ class Simulation:
     @property
     def limit(self) -> float:
         """The stable step of the present state."""
-        control = self.setup.control.real
-        of_waves = control[COURANT] * control[SPACING] / control[RATE] if control[RATE] else np.inf
-        return min(of_waves, control[HEAT_LIMIT])
+        return float(self.setup.control.real[LIMIT])
 
     def above_limit(self) -> bool:
         """Whether the chosen step is above the stable limit already."""

@@ -9,9 +9,11 @@ import numpy as np
 
 from karamelo_py.domain import Domain, require_domain
 from karamelo_py.forms import finite
+from karamelo_py.laws import can, law_kind
 from karamelo_py.material import Material
 from karamelo_py.placement import MAX_POINTS, Placement
 from karamelo_py.points.materials import specific_volume
+from karamelo_py.points.materials.temperatures import initial_heat
 from karamelo_py.regions.base import look_up
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.signature import Argument
@@ -89,8 +91,24 @@ class Solid:
                 "GlueToSolid has no effect: with this method all solids share one velocity field",
                 hint="leave it out",
             )
+        self._compare_temperatures(hub)
         self.index = len(hub.solids)
         self.first_id = sum(other.count for other in hub.solids.values())
+
+    def _compare_temperatures(self, hub: Hub) -> None:
+        """Tell of a temperature that the material does not have, or that nobody gives."""
+        if self.T0 and not can(self.material.law, initial_heat):
+            hub.warn(
+                f"T0 = {self.T0:g} has no effect: the material has no temperature",
+                hint="material(ID, linear, rho, E, nu, cp, kappa), or temperature(...) with "
+                "eos-strength",
+            )
+        kinds = law_kind(self.material.law)
+        if self.T0 is None and any("initial_temperature" in kind._fields for kind in kinds):
+            hub.warn(
+                "the solid starts at the temperature 0, since neither it nor its material says one",
+                hint="give T0 behind the cell size",
+            )
 
     def put(self, hub: Hub, placement: Placement, *, may_be_empty: bool = False) -> None:
         """Give the solid its points, in place of those that it has.

@@ -65,6 +65,7 @@ class Update:
                 transfer + (f" ({numbers})" if numbers else ""),
                 self.method.basis_name,
                 registry.name_of("scheme", type(self.scheme)),
+                *(["thermo-mechanical"] if self.thermal else []),
             ]
         )
 

@@ -10,8 +10,11 @@ import numpy as np
 from karamelo_py.kernels.arrays import (
     DT,
     POST_PARTICLES_TO_GRID,
+    POST_UPDATE_GRID_HEAT,
     POST_UPDATE_GRID_STATE,
     POST_VELOCITIES_TO_GRID,
+    SUPPLY,
+    TEMPERATURE,
     TIME,
 )
 from karamelo_py.kernels.step import corners_that_move
@@ -113,7 +116,7 @@ class NodesView(_View):
     def velocity(self, value: np.ndarray) -> None:
         if self._stage == POST_VELOCITIES_TO_GRID or self._before_update:
             self._nodes.velocity[self.index] = value
-        elif self._stage == POST_UPDATE_GRID_STATE:
+        elif self._stage in (POST_UPDATE_GRID_STATE, POST_UPDATE_GRID_HEAT):
             star = self._nodes.update[self.index, : self._d]
             self._nodes.update[self.index, self._d :] = star - value
         else:
@@ -218,6 +221,26 @@ class PointsView(_View):
         if block.points.force is None:
             raise ValueError("points have no force: the fix needs puts_force_on_points = True")
         return block.points.force
+
+    @property
+    def temperature(self) -> np.ndarray:
+        """(n,) temperatures, where heat flows; read only."""
+        return self._gather(lambda block: self._heat(block)[:, TEMPERATURE])
+
+    @property
+    def heat_supply(self) -> np.ndarray:
+        """(n,) heat per time that fixes bring; add to it in ``supply_heat``."""
+        return self._gather(lambda block: self._heat(block)[:, SUPPLY])
+
+    @heat_supply.setter
+    def heat_supply(self, value: np.ndarray) -> None:
+        self._scatter(lambda block: self._heat(block)[:, SUPPLY], value)
+
+    @staticmethod
+    def _heat(block: Any) -> np.ndarray:
+        if block.points.heat is None:
+            raise ValueError("no heat flows: the method has to be thermo-mechanical")
+        return block.points.heat
 
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""

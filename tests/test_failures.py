@@ -122,3 +122,38 @@ def test_an_interrupted_run_is_whole(tmp_path):
     dumps = list(tmp_path.glob("d.*"))
     assert len(dumps) >= 3
     assert {len(read_dump(path)[0].id) for path in dumps} == {24}
+
+
+def test_a_step_that_shrinks_to_nothing(run_interpreted):
+    """A run that would never end is stopped."""
+    script = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(1, -0.5, 1.5, 0.25)
+    region(bar, block, 0, 1)
+    material(m, neo-hookean, 1, 1, 0)
+    solid(bar, region, bar, 2, m, 0.25, 0)
+    fix(push, velocity_nodes, all, -{}*x0)
+    set_output(1000)
+    run_time(1)
+    """
+    said = run_interpreted(script.format(0.9)).err
+    assert "fallen" not in said
+    # Squeezed to nothing: the cells, and with them the step, are gone at the end.
+    said = run_interpreted(script.format(1), status=1, folder="squeezed").err
+    assert "the stable step has fallen to" in said and "less than a millionth of the first" in said
+
+
+def test_a_step_that_is_given_may_be_large_beside_what_moves(run_interpreted):
+    """A rigid body that sets off from rest has no first stable step to compare with."""
+    script = """
+    method(ulmpm, FLIP, linear, 1)
+    dimension(2, 0, 10, 0, 10, 1)
+    region(b, block, 2, 4, 2, 4)
+    material(m, rigid, 1)
+    solid(s, region, b, 2, m, 1, 0)
+    group(g, particles, region, b, all)
+    fix(f, velocity_particles, g, 0.1*time, 0)
+    set_dt(0.1)
+    run(5)
+    """
+    assert "fallen" not in run_interpreted(script).err

@@ -58,8 +58,8 @@ def method(
     ``eos-strength`` with a temperature; others take no part). Points take changes of the nodes'
     temperature (FLIP, whatever the transfer of velocity): nothing is smeared but by conduction.
     Without it points only heat by their own work. Conduction has a stable step of its own,
-    h^2/(4 d) rho cp/kappa in d dimensions, which `dt` keeps too. Heat leaves a body only where a
-    fix says so.
+    h^2/(4 d) rho cp/kappa in d dimensions, which `dt` keeps too. Bodies that share nodes share
+    heat; else it leaves a body only where a fix says so.
 
     See Also
     --------

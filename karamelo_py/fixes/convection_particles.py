@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from karamelo_py.fixes.heat import HeatFix
 from karamelo_py.group import ParticleGroup
 from karamelo_py.modify import heat_hook
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 
 if TYPE_CHECKING:
@@ -14,8 +15,14 @@ if TYPE_CHECKING:
 
 
 def exchange(capacity, T, face, supply, value, other, dt):
-    """Newton's law of cooling, through one face of the point."""
-    return 1.0, supply + face * value * (other - T), T
+    """Newton's law of cooling through one face of the point, at its temperature after the step.
+
+    With the temperature before it, a large coefficient would cool the point below the fluid.
+    """
+    if not capacity > 0:
+        return 1.0, supply, T
+    rate = face * value
+    return 1.0, supply + rate * (other - T) / (1 + rate * dt / capacity), T
 
 
 class ConvectionParticles(HeatFix):
@@ -38,7 +45,9 @@ class ConvectionParticles(HeatFix):
     Notes
     -----
     A point shows one face to what is around it, the side of a cube of its volume; in one dimension
-    that is the whole section. Publishes the heat per time that all points get as ID_s.
+    that is the whole section. A point at an edge of the body, with two faces outside, needs a fix
+    for each; around an axis the face is at the radius of the point, somewhat inside the surface.
+    Publishes the heat per time that all points get as ID_s.
 
     See Also
     --------
@@ -49,3 +58,9 @@ class ConvectionParticles(HeatFix):
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):
         super().__init__(hub, group, h, T_inf)
+        if h.is_constant and not h.constant >= 0:
+            raise ScriptError(
+                f"the heat transfer coefficient is {h.constant:g}",
+                argument="h",
+                expected="a number of at least 0; whether it heats or cools follows from T_inf",
+            )

@@ -36,7 +36,9 @@ class HeatFluxParticles(HeatFix):
     Notes
     -----
     A point shows one face to what is around it, the side of a cube of its volume; in one dimension
-    that is the whole section. Publishes the heat per time (in two dimensions per thickness, per
+    that is the whole section. A point at an edge of the body, with two faces outside, needs a fix
+    for each; around an axis the face is at the radius of the point, somewhat inside the surface.
+    Publishes the heat per time (in two dimensions per thickness, per
     radian where axisymmetric) as ID_s.
 
     See Also

@@ -32,6 +32,10 @@ class TemperatureParticles(HeatFix):
     -------
     fix(hot, temperature_particles, heater, 400)
 
+    Notes
+    -----
+    Publishes nothing.
+
     See Also
     --------
     temperature_nodes, heat_flux_particles, convection_particles, method

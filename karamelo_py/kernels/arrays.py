@@ -115,7 +115,7 @@ class Control(NamedTuple):
     """What the compiled loop reads and writes beside the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
-    real: np.ndarray  # (15,) float64, see the names below
+    real: np.ndarray  # (18,) float64, see the names below
     whole: np.ndarray  # (4,) int64, see the names below
 
 
@@ -127,7 +127,10 @@ NEW_MOVE = 10
 COURANT = 11  # stable step as a share of cell size over the fastest point's rate
 HEAT_LIMIT = 12  # stable step of conduction, infinite where there is none
 KEPT = 13  # share of its own velocity that a point keeps, and changes by what that of nodes does
-FIRST_RATE = 14  # rate of the fastest point at the start
+FIRST_LIMIT = 14  # stable step at the start
+LIMIT = 15  # stable step now
+HEAT_REFERENCE = 16  # stable step of conduction in undeformed bodies
+FASTER = 17  # by what factor conduction is faster, in the point where it is most
 # Control.whole
 NOW, WRONG, OVER_LIMIT, WATCH_LIMIT = range(4)
 

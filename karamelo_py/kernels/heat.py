@@ -26,11 +26,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import fma, index, over_blocks, point_function, real, shared
+from karamelo_py.compile import (
+    fma,
+    index,
+    kernel,
+    over_blocks,
+    point_function,
+    real,
+    round_off,
+    shared,
+)
 from karamelo_py.kernels.arrays import (
     CAPACITY,
     CONDUCTANCE,
+    FASTER,
     GRADIENT,
+    HEAT_LIMIT,
+    HEAT_REFERENCE,
     NOW,
     POST_HEAT_TO_GRID,
     POST_UPDATE_GRID_HEAT,
@@ -38,6 +50,7 @@ from karamelo_py.kernels.arrays import (
     SUPPLY,
     SUPPLY_HEAT,
     TEMPERATURE,
+    WRONG,
     Hooks,
     Nodes,
     NoHooks,
@@ -61,7 +74,7 @@ from karamelo_py.kernels.stages import (
 from karamelo_py.kernels.step import clear_totals, conduct, step_size, visit_here
 from karamelo_py.kernels.sweep import sweep_nodes
 from karamelo_py.points.basis import entry, reach
-from karamelo_py.points.frames import drawn_back
+from karamelo_py.points.frames import drawn_back, thinning
 from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import Line, dimension, vector_at
 from karamelo_py.points.materials import (
@@ -124,6 +137,16 @@ class Warming(NamedTuple):
     writes = ("state",)
 
 
+@shared
+def held(weight):
+    """`weight`, and next to nothing where it is nothing.
+
+    A point that stands on a node has no weight at the next, but a gradient: that node needs the
+    temperature that the point has there, and what flows to it has to come back.
+    """
+    return max(weight, round_off(weight))
+
+
 # --- from points to nodes ---------------------------------------------------------------------
 
 
@@ -162,6 +185,7 @@ def _gradient(w, p):
 def _(scatter, w, stencil, k, burden):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     capacity, conductance, T, gradient = burden
+    weight = held(weight)
     arm = reach(w.basis, w.kin, w.grid, stencil, k)
     for axis in range(len(gradient)):
         T = fma(gradient[axis], arm[axis], T)
@@ -186,7 +210,7 @@ def _(scatter, w, p, like):
 def _(scatter, w, stencil, k, burden):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     flow, supply = burden
-    total = fma(weight, supply, scatter.sums[i, 2])
+    total = fma(held(weight), supply, scatter.sums[i, 2])
     for axis in range(len(flow)):
         total = fma(flow[axis], gradient[axis], total)
     scatter.sums[i, 2] = total
@@ -222,7 +246,7 @@ def _(gather, w, x):
 @gathered.on(Warming)
 def _(gather, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    return add_scaled(total, weight, (gather.update[i, 1], gather.levels[i, 0]))
+    return add_scaled(total, held(weight), (gather.update[i, 1], gather.levels[i, 0]))
 
 
 @settled.on(Warming)
@@ -237,7 +261,10 @@ def _(gather, w, stencil, p, dt, total, fastest):
         change = total[0] + hidden * (total[1] - T)
         T = fma(w.points.heat[p, SHARE], change, T)
     put_at(w.points.state, p, 0, with_temperature(law, w.kin, state, T))
-    return real(0, dt), fastest
+    # By what factor conduction has become faster than in the undeformed body.
+    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    faster = jacobian(law, w.kin, state) * thinning(w.frame, w.kin, f, dt)
+    return real(0, dt) * T, max(fastest, faster)
 
 
 # --- a step of conduction ---------------------------------------------------------------------
@@ -255,8 +282,9 @@ def _(hooks, stage, target, s):
 
 @at_heat_nodes.on(Hooks)
 def _(hooks, stage, target, s):
+    # Temperatures are always kept: FLIP, whatever the transfer of velocity.
     node_hooks(
-        stage, target, Line(), s.grids, s.heat.nodes, s.spans, hooks, s.control, step_size(s)
+        stage, target, Line(), s.grids, s.heat.nodes, s.spans, hooks, s.control, step_size(s), 1.0
     )
 
 
@@ -284,6 +312,21 @@ def _(hooks, s):
     _supply_blocks(s, hooks)
 
 
+@kernel
+def _read_heat(tiling, control):
+    for t in range(tiling.colour[-1]):
+        control.real[FASTER] = max(control.real[FASTER], tiling.report[t, 1])
+        if tiling.report[t, 2] > 0:
+            control.whole[WRONG] = 1
+
+
+def _survey_heat(block, s):
+    _read_heat(block.tiling, s.control)
+
+
+_survey_blocks = over_blocks(_survey_heat)
+
+
 @shared
 def map_heat(nodes, s, mode):
     """Heat capacity and heat of the nodes, from the points now."""
@@ -306,7 +349,7 @@ def _(heat, s, mode):
 @show_heat.on(Conducting)
 def _(heat, s, mode):
     map_heat(heat.nodes, s, mode)
-    sweep_nodes(mode, Update(), Line(), heat.nodes, s.spans, step_size(s))
+    sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.spans, step_size(s))
 
 
 @conduct.on(Conducting)
@@ -323,3 +366,6 @@ def _(heat, s, mode, hooks):
     sweep_nodes(mode, Update(), kin, nodes, s.spans, dt)
     at_heat_nodes(hooks, POST_UPDATE_GRID_HEAT, ON_UPDATE, s)
     visit_here(s, mode, Warming(nodes.update, nodes.growth), Nothing(), dt)
+    s.control.real[FASTER] = 0.0
+    _survey_blocks(s)
+    s.control.real[HEAT_LIMIT] = s.control.real[HEAT_REFERENCE] / s.control.real[FASTER]

@@ -34,7 +34,6 @@ from karamelo_py.kernels.arrays import (
     FINAL_INTEGRATE,
     FROM,
     INITIAL_INTEGRATE,
-    KEPT,
     POST_ADVANCE_PARTICLES,
     POST_GRID_TO_POINT,
     POST_HEAT_TO_GRID,
@@ -162,7 +161,7 @@ def _locate_nodes(kin, grids, hooks, count):
 
 
 @kernel
-def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, h, count, share):
+def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, count, share):
     """Act on the chosen nodes; add to the published totals."""
     step_back = min(dt, control.values[TIME])  # nothing was before time 0
     _locate_nodes(kin, grids, hooks, count)
@@ -201,7 +200,7 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, h, count, sha
             total += part
             if target == ON_UPDATE:
                 # Points that keep their velocity take the change v* - v: another v is an impulse.
-                total += control.real[KEPT] * mass * (old - v) / dt
+                total += kept * mass * (old - v) / dt
             if target == ON_SUMS:
                 nodes.sums[n, 1 + d + c] = force
             elif target == ON_UPDATE:
@@ -224,8 +223,11 @@ def clear_total(hooks, h, control):
 
 
 @kernel
-def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt):
-    """Call the node functions of `stage` on the members that have mass."""
+def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept):
+    """Call the node functions of `stage` on the members that have mass.
+
+    `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
+    """
     dt = float(dt)
     for h in range(len(hooks.table)):
         if hooks.table[h, STAGE] != stage:
@@ -255,13 +257,15 @@ def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt):
                     count += 1
                     if count == BLOCK:
                         _apply_at_nodes(
-                            target, kin, grids, nodes, hooks, control, dt, h, count, share
+                            target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
                         )
                         count = np.int64(0)
             if counting:
                 share = 1.0 / max(heavy, 1)
             elif count > 0:
-                _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, h, count, share)
+                _apply_at_nodes(
+                    target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
+                )
 
 
 class Motion(NamedTuple):

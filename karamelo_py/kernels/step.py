@@ -18,10 +18,12 @@ from karamelo_py.kernels.arrays import (
     DT,
     DT_FACTOR,
     END_TIME,
-    FIRST_RATE,
+    FIRST_LIMIT,
     FIXED_DT,
     HEAT_LIMIT,
+    KEPT,
     LIGHTEST,
+    LIMIT,
     MOVE,
     NEW_MOVE,
     NEW_RATE,
@@ -223,6 +225,7 @@ def choose_dt(control):
     real_, whole = control.real, control.whole
     limit = real_[COURANT] * real_[SPACING] / real_[RATE] if real_[RATE] > 0 else inf
     limit = min(limit, real_[HEAT_LIMIT])
+    real_[LIMIT] = limit
     fixed = real_[FIXED_DT]
     dt = fixed if fixed > 0 else real_[DT_FACTOR] * limit
     whole[OVER_LIMIT] = whole[OVER_LIMIT] + 1 if dt > limit else 0
@@ -266,7 +269,8 @@ def _(hooks, stage, target, s):
 @at_nodes.on(Hooks)
 def _(hooks, stage, target, s):
     dt = step_size(s)
-    node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, dt)
+    kept = s.control.real[KEPT]
+    node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, dt, kept)
 
 
 @shared
@@ -494,7 +498,7 @@ def run_steps(scheme, visits, mode, s, hooks, count):
         finish(control)
         if control.whole[WATCH_LIMIT] > 0 and control.whole[OVER_LIMIT] >= PATIENCE:
             return ABOVE_LIMIT
-        if control.real[RATE] * SMALLEST > control.real[FIRST_RATE]:
+        if control.real[LIMIT] < SMALLEST * control.real[FIRST_LIMIT]:
             return SHRUNK
         if control.real[DRIFT] > control.real[DRIFT_LIMIT]:
             return SORT

@@ -23,7 +23,8 @@ class PlasticWork(Temperature):
     cp
         Heat capacity per mass.
     kappa
-        Conductivity. Heat stays where it is made, whatever its value, in the methods there are.
+        Conductivity, by which heat flows with ``method(..., thermo-mechanical)``; without, heat
+        stays where it is made.
     alpha
         Pressure per kelvin: 3 K times the coefficient of linear expansion, with the bulk modulus K.
     T0

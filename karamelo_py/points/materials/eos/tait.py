@@ -21,7 +21,7 @@ class Tait(NamedTuple):
     specific_volume: float  # reference volume per mass
     K: float  # reference pressure; K gamma is the bulk modulus
     gamma: float
-    tension: float = inf  # that the liquid bears; K at most, by the formula
+    tension: float = inf  # that the liquid bears; from K on what the formula says
 
 
 give_specific_volume(Tait)
@@ -40,11 +40,12 @@ def _(eos, j, memory, heat):
 @compression_energy.on(Tait)
 def _(eos, j, memory):
     one = real(1, j)
-    bound = min(j, ratio_at_pressure(eos, -eos.tension, ()))
     power = one - eos.gamma
-    grown = -log(bound) if power == 0 else (one - bound**power) / power
-    torn = j - bound  # at constant tension
-    return eos.K * (grown - (one - bound)) + (eos.tension * torn if torn > 0 else torn - torn)
+    whole = j if eos.tension >= eos.K else min(j, ratio_at_pressure(eos, -eos.tension, ()))
+    grown = -log(whole) if power == 0 else (one - whole**power) / power
+    energy = eos.K * (grown - (one - whole))
+    # From there on at constant tension.
+    return energy + eos.tension * (j - whole) if j > whole else energy
 
 
 @ratio_at_pressure.on(Tait)

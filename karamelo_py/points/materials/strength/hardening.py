@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from karamelo_py.compile import point_function, real, round_off, shared
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.materials.strength import (
@@ -43,6 +45,7 @@ def plastic_increment(strength, q, strain, heat, dt, first, hardening):
     half = real(0.5, q)
     slope = real(3, q) * strength.G
     enough = real(4, q) * round_off(q) * q  # what the three terms are rounded to
+    small = sqrt(round_off(q)) * q
     low = real(0, q)
     high = q / slope
     x = (q - first) / (slope + hardening)
@@ -57,7 +60,9 @@ def plastic_increment(strength, q, strain, heat, dt, first, hardening):
         change = excess / (slope + hardening)
         x += change
         # Changes go like their squares, c_(n+1) = (c_n / c_(n-1))^2 c_n: is the next one round-off?
-        if abs(excess) <= enough or abs(change * change * change) <= round_off(q) * x * last * last:
+        # Beside a kink of the curve they do not: there the excess has to be small, too.
+        next_is_small = abs(change * change * change) <= round_off(q) * x * last * last
+        if abs(excess) <= enough or (next_is_small and abs(excess) <= small):
             break
         last = change
         if not (low < x < high):
