@@ -4,7 +4,8 @@ A scene is a script inputs/in.NAME and, if there is something to compare, a file
 has
 
 - a docstring, whose first line says what is compared with whom;
-- ``SMALL``, the variables that make a scene small enough for the tests;
+- ``SMALL``, the variables that make a scene small enough for the tests, or None where others test
+  it;
 - ``compare(run, axes, full)``, which calls ``run(**variables)`` (a `Result`) as often as it likes,
   draws its result beside the reference on Matplotlib axes, and yields a `Row` for each number.
 

@@ -65,7 +65,7 @@ def compare(name: str, folder: Path, full: bool) -> list[Row]:
     """Run a scene, save its picture, return its rows."""
     module = scene(name)
     figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-    run = runner(name, folder, {} if full else module.SMALL)
+    run = runner(name, folder, {} if full else module.SMALL or {})
     rows = list(module.compare(run, axes, full))
     axes.set_title(f"in.{name}", fontsize=9)
     if axes.get_legend_handles_labels()[0]:

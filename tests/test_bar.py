@@ -11,6 +11,8 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
+from comparisons.vibrating_bar import frequency
+
 LENGTH, AMPLITUDE = 25, 0.1
 OMEGA = pi / (2 * LENGTH) * sqrt(100 / 1)
 ENERGY = AMPLITUDE**2 * LENGTH / 4
@@ -38,13 +40,6 @@ log_modify(custom, time, dt, v_x, Ek, Es, Ek + Es)
 set_output(5)
 run_time({time})
 """.replace("sin(PI*x0/(2*25)))", "sin(PI*x0/(2*25))" + no_motion + ")")
-
-
-def frequency(time, v):
-    """omega from the first and last fall of a velocity through zero, linear in between."""
-    falls = np.flatnonzero((v[:-1] > 0) & (v[1:] <= 0))
-    crossings = time[falls] + (time[falls + 1] - time[falls]) * v[falls] / (v[falls] - v[falls + 1])
-    return 2 * pi * (len(crossings) - 1) / (crossings[-1] - crossings[0])
 
 
 @pytest.mark.parametrize("d, law", [(1, "linear"), (2, "linear"), (1, "neo-hookean")])

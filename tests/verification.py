@@ -7,7 +7,6 @@ the parameters of a test.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import pi
 from typing import Any
 
 import numpy as np
@@ -115,10 +114,3 @@ def errors_on(run_script, scene: str, way: Way, grids, column="error_z", **varia
         float(run_scene(run_script, scene, way, refine=grid, **variables).log[column][-1])
         for grid in grids
     ]
-
-
-def frequency(time, v):
-    """omega from the falls of a velocity through zero, linear in between."""
-    falls = np.flatnonzero((v[:-1] > 0) & (v[1:] <= 0))
-    crossings = time[falls] + (time[falls + 1] - time[falls]) * v[falls] / (v[falls] - v[falls + 1])
-    return 2 * pi * (len(crossings) - 1) / (crossings[-1] - crossings[0])

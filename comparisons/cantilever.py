@@ -1,0 +1,27 @@
+"""Beam that sinks under a sudden weight: its lowest point, by CPDI and cpgimp."""
+
+from __future__ import annotations
+
+from comparisons.row import Row
+
+WYSER = "Wyser et al. 2020"
+SMALL = None  # tests of its own (tests/test_verification_beams.py)
+CPDI = {"kind": "ulcpdi", "domains": "Q4"}
+CPGIMP = {"basis": "cpgimp", "domains": "stretch"}
+
+
+def compare(run, axes, full):
+    """With the law in rate form as published, and with the neo-Hookean one of the reference."""
+    cases = {
+        "CPDI": (CPDI | {"law": "linear"}, -3.310, 1.070, WYSER),
+        "cpgimp": (CPGIMP | {"law": "linear"}, -3.319, 1.065, WYSER),
+        "CPDI, neo-hookean": (CPDI, -3.28, 1.06, "finite elements (Sadeghirad et al. 2011)"),
+    }
+    for name, (words, depth, moment, source) in cases.items():
+        log = run(T=3 if name == "CPDI, neo-hookean" else 1.4, **words).log
+        lowest = log.tip_s[log.Time < 1.5].argmax()
+        yield Row(f"lowest point, {name} (m)", depth, -log.tip_s[lowest], 0.005, source)
+        yield Row(f"when, {name} (s)", moment, log.Time[lowest], 0.005, source)
+        axes.plot(log.Time, -log.tip_s, lw=1, label=name)
+        axes.plot(moment, depth, "k+", ms=12)
+    axes.set(xlabel="time (s)", ylabel="height of the lower corner (m)")
