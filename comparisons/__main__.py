@@ -29,6 +29,7 @@ from comparisons.row import Row
 
 HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"
+PICTURES = DOCS / "_static" / "comparison"
 INPUTS = HERE.parent / "inputs"
 TOOLS = ("__main__", "lines", "results", "row")
 
@@ -70,7 +71,7 @@ def compare(name: str, folder: Path, full: bool) -> list[Row]:
     axes.set_title(f"in.{name}", fontsize=9)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=7)
-    figure.savefig((DOCS / "_static" if full else folder) / f"{name}.png", dpi=110)
+    figure.savefig((PICTURES if full else folder) / f"{name}.png", dpi=110)
     plt.close(figure)
     return rows
 
@@ -99,7 +100,7 @@ def section(name: str, rows: list[Row]) -> str:
         difference = f"{100 * row.difference:+.1f} %" if row.published else f"{row.difference:+.2g}"
         cells = (row.quantity, published(row), f"{row.computed:.4g}", difference, row.source)
         lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join([*lines, "", f"![{title}](_static/{name}.png)", ""])
+    return "\n".join([*lines, "", f"![{title}](_static/comparison/{name}.png)", ""])
 
 
 def sections(text: str) -> dict[str, str]:

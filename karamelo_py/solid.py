@@ -97,7 +97,8 @@ class Solid:
 
     def _compare_temperatures(self, hub: Hub) -> None:
         """Tell of a temperature that the material does not have, or that nobody gives."""
-        if self.T0 and not can(self.material.law, initial_heat):
+        # Scripts of Karamelo give T0 in mechanical runs, too.
+        if hub.update.thermal and self.T0 and not can(self.material.law, initial_heat):
             hub.warn(
                 f"T0 = {self.T0:g} has no effect: the material has no temperature",
                 hint="material(ID, linear, rho, E, nu, cp, kappa), or temperature(...) with "
