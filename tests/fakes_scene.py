@@ -69,7 +69,7 @@ class FakeHub:
         self.materials.add("steel", FakeMaterial())
         self.rehearsing = self.checking = False
         self.warnings = []
-        self.update = SimpleNamespace(method=Method(self, Linear()))
+        self.update = SimpleNamespace(method=Method(self, Linear()), thermal=False)
         self.regions = Catalogue("region", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
