@@ -181,7 +181,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
-    control = Control(hub.values.array, np.zeros(18), np.zeros(4, np.int64))
+    control = Control(hub.values.array, np.zeros(17), np.zeros(4, np.int64))
     control.real[SPACING] = min(lattice.h for lattice in lattices)
     control.real[[HEAT_LIMIT, HEAT_REFERENCE]] = stable_conduction(hub)
     control.real[KEPT] = getattr(transfer, "alpha", 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import pytest
-from conftest import INPUTS
+from verification import run_scene
 
 from comparisons.__main__ import scene, scenes
 from comparisons.row import Row
@@ -15,11 +15,7 @@ def found(run_script, name: str, full: bool) -> list[Row]:
     size = {} if full else scene(name).SMALL
 
     def run(**variables):
-        words = {**size, **variables}
-        options = ["--threads", "1"]
-        options += [part for key, value in words.items() for part in ("-var", key, str(value))]
-        folder = "_".join([name, *(str(value) for value in words.values())]).replace("/", "-")
-        return run_script(INPUTS / f"in.{name}", *options, folder=folder)
+        return run_scene(run_script, name, None, **{**size, **variables})
 
     figure, axes = plt.subplots()
     rows = list(scene(name).compare(run, axes, full))

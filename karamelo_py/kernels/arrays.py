@@ -115,7 +115,7 @@ class Control(NamedTuple):
     """What the compiled loop reads and writes beside the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
-    real: np.ndarray  # (18,) float64, see the names below
+    real: np.ndarray  # (17,) float64, see the names below
     whole: np.ndarray  # (4,) int64, see the names below
 
 
@@ -130,7 +130,6 @@ KEPT = 13  # share of its own velocity that a point keeps, and changes by what t
 FIRST_LIMIT = 14  # stable step at the start
 LIMIT = 15  # stable step now
 HEAT_REFERENCE = 16  # stable step of conduction in undeformed bodies
-FASTER = 17  # by what factor conduction is faster, in the point where it is most
 # Control.whole
 NOW, WRONG, OVER_LIMIT, WATCH_LIMIT = range(4)
 

@@ -29,7 +29,6 @@ import numpy as np
 from karamelo_py.compile import (
     fma,
     index,
-    kernel,
     over_blocks,
     point_function,
     real,
@@ -39,10 +38,10 @@ from karamelo_py.compile import (
 from karamelo_py.kernels.arrays import (
     CAPACITY,
     CONDUCTANCE,
-    FASTER,
     GRADIENT,
     HEAT_LIMIT,
     HEAT_REFERENCE,
+    NEW_RATE,
     NOW,
     POST_HEAT_TO_GRID,
     POST_UPDATE_GRID_HEAT,
@@ -50,7 +49,6 @@ from karamelo_py.kernels.arrays import (
     SUPPLY,
     SUPPLY_HEAT,
     TEMPERATURE,
-    WRONG,
     Hooks,
     Nodes,
     NoHooks,
@@ -71,7 +69,7 @@ from karamelo_py.kernels.stages import (
     scattered,
     settled,
 )
-from karamelo_py.kernels.step import clear_totals, conduct, step_size, visit_here
+from karamelo_py.kernels.step import clear_totals, conduct, read_reports, step_size, visit_here
 from karamelo_py.kernels.sweep import sweep_nodes
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import drawn_back, thinning
@@ -312,21 +310,6 @@ def _(hooks, s):
     _supply_blocks(s, hooks)
 
 
-@kernel
-def _read_heat(tiling, control):
-    for t in range(tiling.colour[-1]):
-        control.real[FASTER] = max(control.real[FASTER], tiling.report[t, 1])
-        if tiling.report[t, 2] > 0:
-            control.whole[WRONG] = 1
-
-
-def _survey_heat(block, s):
-    _read_heat(block.tiling, s.control)
-
-
-_survey_blocks = over_blocks(_survey_heat)
-
-
 @shared
 def map_heat(nodes, s, mode):
     """Heat capacity and heat of the nodes, from the points now."""
@@ -366,6 +349,6 @@ def _(heat, s, mode, hooks):
     sweep_nodes(mode, Update(), kin, nodes, s.spans, dt)
     at_heat_nodes(hooks, POST_UPDATE_GRID_HEAT, ON_UPDATE, s)
     visit_here(s, mode, Warming(nodes.update, nodes.growth), Nothing(), dt)
-    s.control.real[FASTER] = 0.0
-    _survey_blocks(s)
-    s.control.real[HEAT_LIMIT] = s.control.real[HEAT_REFERENCE] / s.control.real[FASTER]
+    # What `Warming` reports as a rate is by what factor conduction has become faster.
+    read_reports(s)
+    s.control.real[HEAT_LIMIT] = s.control.real[HEAT_REFERENCE] / s.control.real[NEW_RATE]

@@ -148,11 +148,17 @@ _survey_blocks = over_blocks(_survey)
 
 
 @shared
-def _survey_all(s):
-    """Gather what the tiles reported; whether all points went well."""
+def read_reports(s):
+    """Gather what the tiles reported: largest rate and move, and whether a point went wrong."""
     s.control.real[NEW_RATE] = 0.0
     s.control.real[NEW_MOVE] = 0.0
     _survey_blocks(s)
+
+
+@shared
+def _survey_all(s):
+    """Take over what the tiles reported; whether all points went well."""
+    read_reports(s)
     # Points move in one sweep of a step, and their domains may grow in another.
     s.control.real[MOVE] += s.control.real[NEW_MOVE]
     if s.control.real[NEW_RATE] > 0:
