@@ -53,7 +53,8 @@ def runner(name: str, folder: Path, size: dict[str, Any]) -> Callable[..., Resul
         rmtree(place, ignore_errors=True)  # a longer run before may have left later snapshots
         place.mkdir(parents=True)
         options = [part for k, v in words.items() for part in ("-var", k, str(v))]
-        command = [sys.executable, "-m", "karamelo_py.cli", str(INPUTS / f"in.{name}"), *options]
+        command = [sys.executable, "-m", "karamelo_py.app.cli"]
+        command += [str(INPUTS / f"in.{name}"), *options]
         done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
         if done.returncode:
             sys.exit(f"{' '.join(command[3:])}\n{done.stderr}")

@@ -15,12 +15,17 @@ import pytest
 from hypothesis import settings
 
 from comparisons.results import Result
-from karamelo_py.cli import main
+from karamelo_py.app.cli import main
 
 TESTS = Path(__file__).parent
 INPUTS = TESTS.parent / "inputs"
 # Numbers of other programs; each file says which one and how.
 REFERENCE = TESTS / "data"
+
+# Processes that tests start run the tree, whatever is installed.
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    filter(None, [str(TESTS.parent), os.environ.get("PYTHONPATH")])
+)
 
 # No test asserts a time, and a failure is the same in every run.
 settings.register_profile("tests", deadline=None, derandomize=True, max_examples=40)

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from karamelo_py.console import Console
-from karamelo_py.fields import ABSENT_AT_NODES, ABSENT_AT_POINTS
+from karamelo_py.output.console import Console
+from karamelo_py.output.fields import ABSENT_AT_NODES, ABSENT_AT_POINTS
 
 
 class FakeValues(dict):
@@ -66,7 +66,7 @@ class FakeHub:
     """What output sees of a hub."""
 
     def __init__(self, folder, dimension=2, count=40):
-        from karamelo_py.output import Output
+        from karamelo_py.output.output import Output
 
         used = np.arange(3) < dimension
         self.folder = Path(folder)

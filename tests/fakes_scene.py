@@ -6,15 +6,15 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
 
-from karamelo_py.domain import Domain
-from karamelo_py.hub import Catalogue, Hub
-from karamelo_py.material import Material
-from karamelo_py.methods.base import Method
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.points.materials import specific_volume
+from karamelo_py.points.laws import specific_volume
+from karamelo_py.scene.domain import Domain
+from karamelo_py.scene.hub import Catalogue, Hub
+from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import Place
 from karamelo_py.script.values import Values
-from karamelo_py.solids.region import RegionSolid
+from karamelo_py.styles.methods.base import Method
+from karamelo_py.styles.solids.region import RegionSolid
 
 DENSITY = 1000.0
 

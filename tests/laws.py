@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from tensors import flat, symmetric_matrix
 
-from karamelo_py.points.materials import advance, cauchy_stress, kirchhoff_stress
+from karamelo_py.points.laws import advance, cauchy_stress, kirchhoff_stress
 
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 

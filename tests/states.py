@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from karamelo_py.console import Console
-from karamelo_py.hub import Hub
-from karamelo_py.script.interpreter import Interpreter
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.scene.hub import Hub
 
 
 def final_hub(script: Path, threads: int | None = None) -> Hub:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numba import njit
 from tensors import ALL_KINEMATICS, flat
 
-from karamelo_py.lattice import Lattice
+from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.basis import (
     affine_weight,
     blank,
@@ -37,7 +37,7 @@ from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
 from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import Axisymmetric, Line, diagonal
-from karamelo_py.tensors import scale
+from karamelo_py.scene.lattice import Lattice
 
 H = 0.15
 LO = (0.0, 0.5, -2.0)  # a radius starts at 0

@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-from karamelo_py.bench import measure
-from karamelo_py.bench.workloads import WORKLOADS
-from karamelo_py.cli import main
-from karamelo_py.hub import Hub
-from karamelo_py.script.interpreter import Interpreter
+from karamelo_py.app.bench import measure
+from karamelo_py.app.bench.workloads import WORKLOADS
+from karamelo_py.app.cli import main
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.scene.hub import Hub
 
 # Points of the scenes that Karamelo was measured on.
 PUBLISHED = {

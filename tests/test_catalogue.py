@@ -1,11 +1,11 @@
 """karamelo-py styles and karamelo-py help, as a user calls them."""
 
-import importlib.metadata
-
 import pytest
 
-from karamelo_py import catalogue, registry
-from karamelo_py.cli import main
+import karamelo_py
+from karamelo_py.app import catalogue
+from karamelo_py.app.cli import main
+from karamelo_py.language import registry
 
 
 def call(capsys, *arguments):
@@ -17,7 +17,7 @@ def call(capsys, *arguments):
 def test_styles_lists_every_command_and_style_with_its_package(capsys):
     status, out, _ = call(capsys, "styles")
     assert status == 0
-    version = importlib.metadata.version("karamelo-py")
+    version = karamelo_py.__version__
     rows = [line.split() for line in out.splitlines() if line.startswith("  ")]
     listed = [row[0] for row in rows if f"karamelo-py {version}" == " ".join(row[1:3])]
     known = [name for family in catalogue.families() for name in registry.names(family)]

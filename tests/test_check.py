@@ -7,7 +7,7 @@ import re
 import pytest
 from conftest import INPUTS
 
-from karamelo_py.cli import main
+from karamelo_py.app.cli import main
 
 
 @pytest.fixture

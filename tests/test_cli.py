@@ -2,8 +2,8 @@
 
 import pytest
 
-from karamelo_py.bench.workloads import WORKLOADS
-from karamelo_py.cli import main
+from karamelo_py.app.bench.workloads import WORKLOADS
+from karamelo_py.app.cli import main
 
 
 @pytest.mark.parametrize("script", ["", "# nothing\n", "dimension(1, 0, 1, 0.1)\n"])

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from numba import njit
 from states import final_hub, final_state, same_bits
 
-from karamelo_py.lattice import Lattice
 from karamelo_py.points.basis import (
     affine_weight,
     carried,
@@ -35,7 +34,8 @@ from karamelo_py.points.basis.cpdi.quadrilateral import Q4
 from karamelo_py.points.basis.cpdi.quadrilateral import SIGNS as SQUARE
 from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
-from karamelo_py.views import PointsView
+from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.views import PointsView
 
 LO, HI, H = (0.3, 0.5, 2.0), (1.35, 1.1, 2.6), 0.15
 FLAT = [(R4, PlaneStrain()), (Q4, PlaneStrain()), (T3, PlaneStrain())]

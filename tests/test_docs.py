@@ -10,11 +10,12 @@ import meshio
 import numpy as np
 import pytest
 
-from karamelo_py import catalogue, registry
-from karamelo_py.hub import Hub
+from karamelo_py.app import catalogue
+from karamelo_py.language import registry
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import FUNCTIONS
-from karamelo_py.script.interpreter import Interpreter
 from karamelo_py.script.parser import parse
 
 ROOT = Path(__file__).parent.parent

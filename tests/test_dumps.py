@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from fakes import FakeHub
 
-from karamelo_py.dumps import files, lammps
-from karamelo_py.dumps.grid import Grid
-from karamelo_py.dumps.grid_gz import GridGz
-from karamelo_py.dumps.particle import Particle
-from karamelo_py.dumps.particle_gz import ParticleGz
-from karamelo_py.dumps.pyplot import PyPlot
+from karamelo_py.output import files
 from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.styles.dumps import lammps
+from karamelo_py.styles.dumps.grid import Grid
+from karamelo_py.styles.dumps.grid_gz import GridGz
+from karamelo_py.styles.dumps.particle import Particle
+from karamelo_py.styles.dumps.particle_gz import ParticleGz
+from karamelo_py.styles.dumps.pyplot import PyPlot
 
 
 @pytest.fixture(params=[1, 2, 3])
@@ -274,7 +275,7 @@ def test_pyplot_refuses_other_formats_and_fields(plane):
 
 
 def test_limits_grow_and_stay():
-    from karamelo_py.dumps.picture import grown
+    from karamelo_py.styles.dumps.picture import grown
 
     limits = grown(None, np.array([0.0, 0.9]))
     assert limits[0] <= 0 and limits[1] >= 0.9

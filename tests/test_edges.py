@@ -131,10 +131,10 @@ def test_affine_transfer_without_a_second_mapping_is_refused(run_interpreted):
 def test_a_hook_that_moves_points_moves_their_mass(tmp_path):
     """Points put elsewhere by initial_integrate give to the nodes there, and leave no trace."""
     code = """
-        from karamelo_py.console import Console
-        from karamelo_py.hub import Hub
-        from karamelo_py.modify import Fix, PointsView
-        from karamelo_py.script.interpreter import Interpreter
+        from karamelo_py.output.console import Console
+        from karamelo_py.scene.hub import Hub
+        from karamelo_py.scene.modify import Fix, PointsView
+        from karamelo_py.language.interpreter import Interpreter
 
         class Jump(Fix):
             def __init__(self, hub, group):
@@ -180,7 +180,7 @@ def test_old_caches_are_forgotten_and_nothing_else(tmp_path):
         (kernels / name).mkdir()
     (tmp_path / "data").mkdir()
     subprocess.run(
-        [sys.executable, "-c", "import karamelo_py.compile"],
+        [sys.executable, "-c", "import karamelo_py.compiler.compile"],
         env={**os.environ, "KARAMELO_PY_CACHE": str(tmp_path)},
         check=True,
     )

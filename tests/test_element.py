@@ -11,7 +11,7 @@ import pytest
 from conftest import INPUTS
 
 from comparisons.results import read_log
-from karamelo_py.element import response
+from karamelo_py.run.element import response
 
 K, G, Y = 160e9, 80e9, 400e6
 E = 9 * K * G / (3 * K + G)
@@ -213,7 +213,7 @@ def test_what_is_refused(run_script, lines, says):
 
 
 def test_check_writes_nothing(run_script, tmp_path):
-    from karamelo_py.cli import main
+    from karamelo_py.app.cli import main
 
     script = tmp_path / "in.check"
     used = "modulus = value(b_sxx/b_exx)\nmaterial(other, neo-hookean, 1000, modulus, 0.3)\n"

@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tensors import ALL_KINEMATICS, flat, symmetric_flat, symmetric_matrix, symmetric_tensors
 
-from karamelo_py.cli import main
-from karamelo_py.laws import law_in, law_kind, law_table
+from karamelo_py.app.cli import main
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.laws import law_in, law_kind, law_table
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space, trace, von_mises
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
     elastic_strain,
@@ -26,12 +27,11 @@ from karamelo_py.points.materials import (
     wave_speed_squared,
     with_stress,
 )
-from karamelo_py.points.materials.eos.linear import LinearPressure
-from karamelo_py.points.materials.eos_strength import EosStrength
-from karamelo_py.points.materials.strength.elastic import Elastic
-from karamelo_py.points.materials.strength.plastic import Plastic
+from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos_strength import EosStrength
+from karamelo_py.points.laws.strength.elastic import Elastic
+from karamelo_py.points.laws.strength.plastic import Plastic
 from karamelo_py.script.values import Values
-from karamelo_py.tensors import record
 
 RHO, K, G, Y = 2.0, 160.0, 80.0, 0.4
 ELASTIC = EosStrength(LinearPressure(1 / RHO, K), Elastic(G))

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression, Formula
-from karamelo_py.script.interpreter import Interpreter
 from karamelo_py.script.values import CAPACITY, Values
 
 

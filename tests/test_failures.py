@@ -101,7 +101,7 @@ def test_an_interrupted_run_is_whole(tmp_path):
                    "dump(d, all, particle, 10, d.*.LAMMPS, x)", "run(100000000)")  # fmt: skip
     (tmp_path / "in.script").write_text(script, encoding="utf-8")
     process = subprocess.Popen(
-        [sys.executable, "-m", "karamelo_py.cli", "in.script"],
+        [sys.executable, "-m", "karamelo_py.app.cli", "in.script"],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:

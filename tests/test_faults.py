@@ -6,15 +6,15 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
-from karamelo_py import registry
-from karamelo_py.hub import Hub
+from karamelo_py.language import registry
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.interpreter import Interpreter
-from karamelo_py.views import PointsView
 
 STYLES = """
-from karamelo_py.group import ParticleGroup
-from karamelo_py.modify import Compute, Fix
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.modify import Compute, Fix
 
 class Spring(Fix):
     def __init__(self, hub, group: ParticleGroup, k: float = 1.0):

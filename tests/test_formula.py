@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from karamelo_py.kernels.formula import (
+from karamelo_py.compiler.formula import (
     BLOCK,
     CONSTANT,
     MAX_DEPTH,
@@ -17,7 +17,7 @@ from karamelo_py.kernels.formula import (
     Program,
     evaluate,
 )
-from karamelo_py.script.interpreter import Interpreter
+from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.script.parser import parse_text
 from karamelo_py.script.values import Values
 

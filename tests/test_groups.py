@@ -5,16 +5,16 @@ import pytest
 from fakes_scene import FakeArgument, FakeHub
 
 from karamelo_py.commands.solids import group
-from karamelo_py.group import AnyGroup, NodeGroup, ParticleGroup
-from karamelo_py.methods.base import Method
-from karamelo_py.methods.tlmpm import TLMPM
-from karamelo_py.methods.ulmpm_contacts import ULMPMContacts
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.regions.block import Block
-from karamelo_py.regions.cylinder import Cylinder
-from karamelo_py.regions.difference import Difference
+from karamelo_py.scene.group import AnyGroup, NodeGroup, ParticleGroup
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.methods.base import Method
+from karamelo_py.styles.methods.tlmpm import TLMPM
+from karamelo_py.styles.methods.ulmpm_contacts import ULMPMContacts
+from karamelo_py.styles.regions.block import Block
+from karamelo_py.styles.regions.cylinder import Cylinder
+from karamelo_py.styles.regions.difference import Difference
 
 
 def scene():

@@ -354,10 +354,10 @@ def test_messages_of_methods(run_interpreted):
 def test_hooks_in_python(tmp_path):
     """A fix in Python supplies heat and holds a temperature as the built-in ones do."""
     code = """
-        from karamelo_py.console import Console
-        from karamelo_py.hub import Hub
-        from karamelo_py.modify import Fix
-        from karamelo_py.script.interpreter import Interpreter
+        from karamelo_py.output.console import Console
+        from karamelo_py.scene.hub import Hub
+        from karamelo_py.scene.modify import Fix
+        from karamelo_py.language.interpreter import Interpreter
 
         class Lamp(Fix):
             def supply_heat(self, points):

@@ -10,7 +10,7 @@ from laws import TURN, pressure_of, stress, stretched, worked
 from tensors import ALL_KINEMATICS, symmetric_flat
 
 from karamelo_py.points.kinematics import Axisymmetric, Space
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     damage,
     damage_initiation,
     dissipated_energy,
@@ -23,13 +23,13 @@ from karamelo_py.points.materials import (
     with_stress,
     with_temperature,
 )
-from karamelo_py.points.materials.damages.johnson_cook import JohnsonCookDamage
-from karamelo_py.points.materials.eos.linear import LinearPressure
-from karamelo_py.points.materials.eos.shock import Shock
-from karamelo_py.points.materials.eos_strength import EosStrength
-from karamelo_py.points.materials.strength.johnson_cook import JohnsonCook
-from karamelo_py.points.materials.strength.plastic import Plastic
-from karamelo_py.points.materials.temperatures.plastic_work import PlasticWork
+from karamelo_py.points.laws.damages.johnson_cook import JohnsonCookDamage
+from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos.shock import Shock
+from karamelo_py.points.laws.eos_strength import EosStrength
+from karamelo_py.points.laws.strength.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strength.plastic import Plastic
+from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
 
 K, G, Y = 160.0, 80.0, 0.4
 D1, D2, D3, D4, D5, TR, TM = 0.05, 0.8, -1.5, 0.02, 0.6, 300.0, 1300.0

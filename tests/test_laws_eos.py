@@ -10,7 +10,7 @@ from laws import closed_to, pressure_of, stretched, worked
 from tensors import ALL_KINEMATICS
 
 from karamelo_py.points.kinematics import Line, PlaneStrain, Space
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     cauchy_stress,
     dissipated_energy,
     energy_density,
@@ -20,21 +20,21 @@ from karamelo_py.points.materials import (
     with_stress,
     with_temperature,
 )
-from karamelo_py.points.materials.eos import (
+from karamelo_py.points.laws.eos import (
     bulk_modulus,
     compression_energy,
     pressure,
     ratio_at_pressure,
 )
-from karamelo_py.points.materials.eos.ideal_gas import IdealGas
-from karamelo_py.points.materials.eos.linear import LinearPressure
-from karamelo_py.points.materials.eos.shock import Shock
-from karamelo_py.points.materials.eos.tait import Tait
-from karamelo_py.points.materials.eos_strength import EosStrength
-from karamelo_py.points.materials.strength.elastic import Elastic
-from karamelo_py.points.materials.strength.viscous import Viscous
-from karamelo_py.points.materials.temperatures.plastic_work import PlasticWork
-from karamelo_py.points.materials.viscosity.artificial import ArtificialViscosity
+from karamelo_py.points.laws.eos.ideal_gas import IdealGas
+from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos.shock import Shock
+from karamelo_py.points.laws.eos.tait import Tait
+from karamelo_py.points.laws.eos_strength import EosStrength
+from karamelo_py.points.laws.strength.elastic import Elastic
+from karamelo_py.points.laws.strength.viscous import Viscous
+from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
+from karamelo_py.points.laws.viscosity.artificial import ArtificialViscosity
 
 RHO, C0, S, GAMMA, CV, TR = 8.96, 0.394, 1.489, 2.02, 383e-8, 298.0  # copper: g/cm3, cm/us
 COPPER = Shock(1 / RHO, RHO * C0**2, S, GAMMA * RHO * CV, TR)

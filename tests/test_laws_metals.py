@@ -10,7 +10,7 @@ from laws import TURN, integrated, mises, stress, stretched, worked
 from tensors import ALL_KINEMATICS, symmetric_flat
 
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     advance,
     dissipated_energy,
     energy_density,
@@ -21,12 +21,12 @@ from karamelo_py.points.materials import (
     with_stress,
     with_temperature,
 )
-from karamelo_py.points.materials.eos.linear import LinearPressure
-from karamelo_py.points.materials.eos_strength import EosStrength
-from karamelo_py.points.materials.strength.johnson_cook import JohnsonCook
-from karamelo_py.points.materials.strength.plastic import LinearHardening, Plastic
-from karamelo_py.points.materials.strength.swift import Swift
-from karamelo_py.points.materials.temperatures.plastic_work import PlasticWork
+from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos_strength import EosStrength
+from karamelo_py.points.laws.strength.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strength.plastic import LinearHardening, Plastic
+from karamelo_py.points.laws.strength.swift import Swift
+from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
 
 RHO, K, G = 8.0, 160.0, 80.0
 EOS = LinearPressure(1 / RHO, K)

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from karamelo_py.cli import main
+from karamelo_py.app.cli import main
 
 SCENE = """
 method(METHOD, FLIP, linear, 1)

@@ -8,7 +8,7 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 
-from karamelo_py.cli import main
+from karamelo_py.app.cli import main
 
 HEAD = """
 dimension(2, -0.5, 1.5, 0, 1, 0.25)

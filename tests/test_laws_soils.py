@@ -18,7 +18,7 @@ from karamelo_py.points.kinematics import (
     from_principal,
     principal,
 )
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     advance,
     dissipated_energy,
     elastic_strain,
@@ -28,12 +28,12 @@ from karamelo_py.points.materials import (
     plastic_strain,
     with_stress,
 )
-from karamelo_py.points.materials.eos.linear import LinearPressure
-from karamelo_py.points.materials.eos.shock import Shock
-from karamelo_py.points.materials.eos_strength import EosStrength
-from karamelo_py.points.materials.strength.mohr_coulomb import returned_to_plane
-from karamelo_py.strengths.drucker_prager import DruckerPrager
-from karamelo_py.strengths.mohr_coulomb import MohrCoulomb
+from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos.shock import Shock
+from karamelo_py.points.laws.eos_strength import EosStrength
+from karamelo_py.points.laws.strength.mohr_coulomb import returned_to_plane
+from karamelo_py.styles.strengths.drucker_prager import DruckerPrager
+from karamelo_py.styles.strengths.mohr_coulomb import MohrCoulomb
 
 RHO, K, G = 2.0, 100.0, 60.0
 COHESION, PHI, PSI = 0.3, 30.0, 10.0

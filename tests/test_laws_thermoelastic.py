@@ -9,12 +9,10 @@ import pytest
 from laws import stretched
 from tensors import ALL_KINEMATICS, flat
 
-from karamelo_py.cli import main
-from karamelo_py.laws import law_on
-from karamelo_py.materials.linear import LinearElastic
-from karamelo_py.materials.neo_hookean import NeoHookean
+from karamelo_py.app.cli import main
+from karamelo_py.kernels.laws import law_on
 from karamelo_py.points.kinematics import PlaneStrain, Space, contract, symmetric_part
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
     conductivity,
@@ -27,6 +25,8 @@ from karamelo_py.points.materials import (
     with_stress,
     with_temperature,
 )
+from karamelo_py.styles.materials.linear import LinearElastic
+from karamelo_py.styles.materials.neo_hookean import NeoHookean
 
 E, NU, ALPHA, T0 = 200.0, 0.25, 1e-4, 300.0
 K = E / (3 * (1 - 2 * NU))

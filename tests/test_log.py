@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from fakes import FakeHub
 
-from karamelo_py.console import Console, duration, show
-from karamelo_py.quantity import Quantity
+from karamelo_py.output.console import Console, duration, show
+from karamelo_py.output.quantity import Quantity
 from karamelo_py.script.errors import ScriptError
 
 
@@ -90,7 +90,7 @@ def test_a_rehearsal_writes_nothing(hub):
 
 
 def test_nothing_is_refreshed_for_dumps_alone(hub):
-    from karamelo_py.dumps.particle import Particle
+    from karamelo_py.styles.dumps.particle import Particle
 
     hub.output.log.every = 10
     hub.dumps["d"] = Particle(hub, 2, "d.dump")
@@ -110,7 +110,7 @@ def test_a_pipe_sees_the_log_as_it_is(hub):
 
 
 def test_plain_console(monkeypatch):
-    monkeypatch.setattr("karamelo_py.console.REPORT", 0.0)
+    monkeypatch.setattr("karamelo_py.output.console.REPORT", 0.0)
     console = Console(io.StringIO(), io.StringIO())
     console.banner("karamelo-py", {"method": "ulmpm", "points": 102936, "dt": 0.001})
     console.begin_run()
@@ -129,7 +129,7 @@ def test_plain_console(monkeypatch):
 
 
 def test_terminal_console(monkeypatch):
-    monkeypatch.setattr("karamelo_py.console.REDRAW", 0.0)
+    monkeypatch.setattr("karamelo_py.output.console.REDRAW", 0.0)
     console = Console(io.StringIO(), io.StringIO(), terminal=True)
     console.banner("karamelo-py", {"points": 416})
     console.log_line("Step dt", header=True)
@@ -162,7 +162,8 @@ def test_piped_output_does_not_import_rich():
     import sys
 
     code = (
-        "import sys; from karamelo_py.console import Console; c = Console(); c.banner('a', {});"
+        "import sys; from karamelo_py.output.console import Console; c = Console();"
+        "c.banner('a', {});"
         "c.begin_run(); c.log_line('1'); c.end_run(); assert 'rich' not in sys.modules"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -17,9 +17,8 @@ from tensors import (
     tensors,
 )
 
-from karamelo_py.material import lame_parameters
 from karamelo_py.points.kinematics import Line, PlaneStrain, Space, contract
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
     elastic_strain,
@@ -31,8 +30,9 @@ from karamelo_py.points.materials import (
     wave_speed_squared,
     with_stress,
 )
-from karamelo_py.points.materials.linear import FixedFrame, Jaumann
-from karamelo_py.points.materials.neo_hookean import Hyperelastic
+from karamelo_py.points.laws.linear import FixedFrame, Jaumann
+from karamelo_py.points.laws.neo_hookean import Hyperelastic
+from karamelo_py.scene.material import lame_parameters
 
 E, NU, RHO = 100.0, 0.3, 2.0
 LAM, G = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))

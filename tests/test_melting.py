@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from numba import config, njit
 
-from karamelo_py import melting
-from karamelo_py.compile import kernel, shared
+from karamelo_py.compiler import melting
+from karamelo_py.compiler.compile import kernel, shared
 
 
 @shared

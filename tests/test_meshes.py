@@ -11,11 +11,11 @@ from fakes_scene import DENSITY, FakeHub
 from meshed import CUTS, grid_mesh, write
 from test_scene_script import message
 
-from karamelo_py.meshes.elements import SHAPES, elements_of, measured
-from karamelo_py.meshes.reading import read
-from karamelo_py.regions.mesh import MeshRegion
+from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
+from karamelo_py.scene.meshes.reading import read
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.solids.mesh import MeshSolid
+from karamelo_py.styles.regions.mesh import MeshRegion
+from karamelo_py.styles.solids.mesh import MeshSolid
 
 CANTILEVER = Path(__file__).parents[2] / "shared/reference/data/cantilever_1041_tets.msh"
 COUNTS = {1: (7,), 2: (4, 3), 3: (3, 2, 4)}

@@ -7,10 +7,10 @@ import re
 
 import pytest
 
-from karamelo_py.console import Console
-from karamelo_py.hub import Hub
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.interpreter import Interpreter
 
 
 @pytest.fixture

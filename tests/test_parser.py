@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.interpreter import Interpreter
 from karamelo_py.script.parser import parse, parse_text
 from karamelo_py.script.syntax import Assignment, Call, Evaluation
 from karamelo_py.script.values import Values

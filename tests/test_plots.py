@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from fakes import FakeHub
 
-from karamelo_py.plots import Curve
-from karamelo_py.quantity import Quantity
+from karamelo_py.output.plots import Curve
+from karamelo_py.output.quantity import Quantity
 
 
 @pytest.fixture

@@ -76,7 +76,7 @@ def karamelo_py(site, folder, *arguments, compiled=False):
     path = os.pathsep.join(filter(None, [str(site), os.environ.get("PYTHONPATH")]))
     environment = os.environ | {"PYTHONPATH": path, "KARAMELO_PY_CACHE": str(site.parent / "cache")}
     environment["NUMBA_DISABLE_JIT"] = "0" if compiled else "1"
-    command = [sys.executable, "-m", "karamelo_py.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "karamelo_py.app.cli", *map(str, arguments)]
     return subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
     )

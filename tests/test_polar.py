@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from karamelo_py.hub import Hub
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.interpreter import Interpreter
 
 PLANE = """
 method(ulmpm, FLIP, linear, 1)

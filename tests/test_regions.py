@@ -9,15 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from karamelo_py.commands import domain as commands
-from karamelo_py.domain import Domain
-from karamelo_py.lattice import Lattice
-from karamelo_py.regions.block import Block
-from karamelo_py.regions.cylinder import Cylinder
-from karamelo_py.regions.difference import Difference
-from karamelo_py.regions.intersection import Intersection
-from karamelo_py.regions.sphere import Sphere
-from karamelo_py.regions.union import Union
+from karamelo_py.scene.domain import Domain
+from karamelo_py.scene.lattice import Lattice
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.regions.block import Block
+from karamelo_py.styles.regions.cylinder import Cylinder
+from karamelo_py.styles.regions.difference import Difference
+from karamelo_py.styles.regions.intersection import Intersection
+from karamelo_py.styles.regions.sphere import Sphere
+from karamelo_py.styles.regions.union import Union
 
 
 def empty_hub():

@@ -3,9 +3,9 @@
 import pytest
 from fakes_scene import FakeHub
 
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.language.signature import describe
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.interpreter import Interpreter
-from karamelo_py.signature import describe
 
 SCENE = """
 D = 2
@@ -156,7 +156,7 @@ def test_mistakes_at_the_start(line, mark, says):
 
 
 def test_help_shows_the_forms():
-    from karamelo_py import registry
+    from karamelo_py.language import registry
 
     def syntax(family, name):
         return describe(registry.find(family, name), f"{family} {name}").syntax

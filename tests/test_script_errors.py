@@ -5,11 +5,11 @@ import re
 import pytest
 from scenes import block
 
-from karamelo_py import registry
-from karamelo_py.hub import Hub
+from karamelo_py.language import registry
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script import elsewhere
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
-from karamelo_py.script.interpreter import Interpreter
 
 SCENE = """\
 method(ulmpm, FLIP, linear, 1)

@@ -4,13 +4,9 @@ from typing import Annotated, Any, Literal
 
 import pytest
 
-from karamelo_py import registry, signature
-from karamelo_py.hub import Hub
-from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import Expression
-from karamelo_py.script.interpreter import Interpreter
-from karamelo_py.script.parser import parse
-from karamelo_py.signature import (
+from karamelo_py.language import registry, signature
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.language.signature import (
     Argument,
     AtLeast,
     In,
@@ -19,6 +15,10 @@ from karamelo_py.signature import (
     OutputFile,
     Positive,
 )
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.script.parser import parse
 
 
 class Thing:

@@ -10,17 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from karamelo_py.commands import solids as commands
-from karamelo_py.methods.base import Method, OwnGrids
-from karamelo_py.methods.ulcpdi import ULCPDI
-from karamelo_py.placement import cell_pattern
 from karamelo_py.points.basis.cpdi.parallel import R4
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.ugimp import UGIMP
-from karamelo_py.regions.block import Block
-from karamelo_py.regions.cylinder import Cylinder
-from karamelo_py.regions.sphere import Sphere
-from karamelo_py.regions.union import Union
+from karamelo_py.scene.placement import cell_pattern
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.methods.base import Method, OwnGrids
+from karamelo_py.styles.methods.ulcpdi import ULCPDI
+from karamelo_py.styles.regions.block import Block
+from karamelo_py.styles.regions.cylinder import Cylinder
+from karamelo_py.styles.regions.sphere import Sphere
+from karamelo_py.styles.regions.union import Union
 
 
 def whole(hub, ID="whole"):
@@ -94,7 +94,7 @@ def test_points_do_not_depend_on_chunks(monkeypatch):
         return hub.solid("s", hub.region("r", Sphere, 0.5, 0.5, 0.5, 0.4)).x0
 
     whole_at_once = points()
-    monkeypatch.setattr("karamelo_py.domain.CHUNK", 100)
+    monkeypatch.setattr("karamelo_py.scene.domain.CHUNK", 100)
     np.testing.assert_array_equal(points(), whole_at_once)
 
 

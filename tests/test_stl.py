@@ -9,9 +9,9 @@ from fakes_scene import FakeHub
 from meshed import cube_surface, enclosed_volume, sphere_surface, write
 from test_scene_script import message
 
-from karamelo_py.meshes.surface import Surface
-from karamelo_py.regions.stl import STL
+from karamelo_py.scene.meshes.surface import Surface
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.regions.stl import STL
 
 
 @pytest.fixture(params=[True, False], ids=["binary", "text"])
@@ -120,6 +120,6 @@ def test_what_is_no_surface(tmp_path, monkeypatch):
     (tmp_path / "cut.stl").write_bytes((tmp_path / "body.stl").read_bytes()[:150])
     assert "cut.stl cannot be read as a mesh" in message(SCENE + "region(r, stl, cut.stl)")
     with pytest.raises(ScriptError, match="not exist"):
-        from karamelo_py.script.interpreter import Interpreter
+        from karamelo_py.language.interpreter import Interpreter
 
         Interpreter(FakeHub(3)).run_text("region(r, stl, bdy.stl)")

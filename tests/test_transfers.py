@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tensors import ALL_KINEMATICS, numbers, tensors
 
-from karamelo_py.lattice import Lattice
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
@@ -32,6 +31,7 @@ from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.points.transfers.tflip import TFLIP
 from karamelo_py.points.transfers.tpic import TPIC
 from karamelo_py.points.transfers.xpic import XPIC
+from karamelo_py.scene.lattice import Lattice
 
 LO, H, CELLS = (0.0, 0.5, -2.0), 0.15, (7, 4, 5)
 AFFINE = [APIC(), AFLIP(0.9), ASFLIP(0.9)]

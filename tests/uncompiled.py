@@ -31,7 +31,7 @@ def save_state(request: dict) -> int:
 def main() -> None:
     """Serve requests until the input ends."""
     requests, answers = sys.stdin, sys.stdout
-    from karamelo_py.cli import main as command
+    from karamelo_py.app.cli import main as command
 
     # Interpreted arithmetic warns about what compiled kernels pass over in silence.
     warnings.simplefilter("ignore")

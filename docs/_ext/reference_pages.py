@@ -10,8 +10,8 @@ import re
 import shutil
 from pathlib import Path
 
-from karamelo_py import registry
-from karamelo_py.catalogue import COMMAND, describe_parameter, families, help_of
+from karamelo_py.app.catalogue import COMMAND, describe_parameter, families, help_of
+from karamelo_py.language import registry
 
 TITLES = {
     "command": ("Commands", "What a script can say."),

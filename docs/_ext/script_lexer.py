@@ -5,7 +5,7 @@ from __future__ import annotations
 from pygments.lexer import RegexLexer, words
 from pygments.token import Comment, Keyword, Name, Number, Operator, Punctuation, String, Text
 
-from karamelo_py import registry
+from karamelo_py.language import registry
 
 
 class ScriptLexer(RegexLexer):

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from karamelo_py import registry, signature
-from karamelo_py.domain import Domain, require_domain
-from karamelo_py.forms import Forms, number, place_of
-from karamelo_py.kinds import StyleOf
+from karamelo_py.language import registry, signature
+from karamelo_py.language.forms import Forms, number, place_of
+from karamelo_py.language.kinds import StyleOf
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.domain import Domain, require_domain
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.signature import Argument
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
 
 _BOUNDS = ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
 _WITH_H = {d: (*_BOUNDS[: 2 * d], "h") for d in (1, 2, 3)}

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
-from karamelo_py.element.load_path import COMPONENTS, NORMAL, LoadPath
-from karamelo_py.element.point import Point, Unreachable
-from karamelo_py.element.response import Response
-from karamelo_py.material import Material
+from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.run.element.load_path import COMPONENTS, NORMAL, LoadPath
+from karamelo_py.run.element.point import Point, Unreachable
+from karamelo_py.run.element.response import Response
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.signature import Positive
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
 
 KINEMATICS = {kin.word: kin for kin in (Space(), PlaneStrain(), Axisymmetric(), Line())}
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from karamelo_py.language.interpreter import shown
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit
 from karamelo_py.script.expressions import POINT_SEEDS, SEEDS, Expression, Formula
-from karamelo_py.script.interpreter import shown
-from karamelo_py.signature import Argument
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
 
 
 def print_(hub: Hub, first: Argument, *more: Argument) -> None:

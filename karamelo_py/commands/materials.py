@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from karamelo_py import registry, signature
-from karamelo_py.kinds import StyleOf
-from karamelo_py.signature import Argument
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Catalogue, Hub
+from karamelo_py.language import registry, signature
+from karamelo_py.language.kinds import StyleOf
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.hub import Catalogue, Hub
 
 
 def eos(hub: Hub, ID: str, style: StyleOf("eos"), *arguments: Argument) -> None:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
 
-from karamelo_py import registry
-from karamelo_py.kinds import StyleOf
+from karamelo_py.language import registry
+from karamelo_py.language.kinds import StyleOf
+from karamelo_py.language.signature import Argument
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.tflip import TFLIP
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, nearest
-from karamelo_py.signature import Argument
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
 
 OPTIONS = ("mechanical", "thermo-mechanical", "gradient-enhanced")
 

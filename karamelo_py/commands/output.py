@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
-from karamelo_py import registry, signature
-from karamelo_py.arguments import NUMBER
-from karamelo_py.dumps.files import picture_format
-from karamelo_py.kinds import StyleOf
-from karamelo_py.plots import Curve
-from karamelo_py.quantity import Quantity
+from karamelo_py.language import registry, signature
+from karamelo_py.language.arguments import NUMBER
+from karamelo_py.language.kinds import StyleOf
+from karamelo_py.language.signature import Argument, OutputFile, Positive
+from karamelo_py.output.files import picture_format
+from karamelo_py.output.plots import Curve
+from karamelo_py.output.quantity import Quantity
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.signature import Argument, OutputFile, Positive
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
 
 
 def dump(

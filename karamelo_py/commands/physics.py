@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from karamelo_py import registry, signature
 from karamelo_py.commands.materials import define
-from karamelo_py.kinds import StyleOf
+from karamelo_py.language import registry, signature
+from karamelo_py.language.interpreter import MEANINGS
+from karamelo_py.language.kinds import StyleOf
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.hub import Catalogue, Hub
+from karamelo_py.scene.modify import Fix
 from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS
-from karamelo_py.script.interpreter import MEANINGS
-from karamelo_py.signature import Argument
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Catalogue, Hub
-    from karamelo_py.modify import Fix
 
 
 def scheme(hub: Hub, style: StyleOf("scheme")) -> None:
@@ -241,7 +239,7 @@ def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
 def _warn_if_idle(hub: Hub, style: str, item: Fix) -> None:
     """A fix that overrides nothing does nothing: perhaps a hook is misspelled."""
     from karamelo_py.kernels.hooks import STAGES
-    from karamelo_py.modify import Fix
+    from karamelo_py.scene.modify import Fix
 
     if item.for_method or item.hooks() or type(item).refresh is not Fix.refresh:
         return

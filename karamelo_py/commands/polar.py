@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from karamelo_py.domain import require_domain
-from karamelo_py.forms import Forms, place_of
-from karamelo_py.group import ParticleGroup
-from karamelo_py.placement import MAX_POINTS, Placement
-from karamelo_py.regions.base import Region, check_radius
+from karamelo_py.language.forms import Forms, place_of
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.placement import MAX_POINTS, Placement
+from karamelo_py.scene.region import Region, check_radius
+from karamelo_py.scene.solid import Solid, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.signature import Argument
-from karamelo_py.solid import Solid, warn_of_coinciding
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
 
 FORMS = Forms(
     "populate_cylindrical_coordinates(solidID, regionID, {names})",

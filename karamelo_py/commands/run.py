@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from math import isnan
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from karamelo_py.runner import Runner
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.run.runner import Runner
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.update import DEFAULT_DT_FACTOR
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.signature import NonNegative, Positive
-from karamelo_py.update import DEFAULT_DT_FACTOR
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
 
 
 def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import copy
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from karamelo_py import registry, signature
-from karamelo_py.domain import require_domain
-from karamelo_py.group import ALL, KINDS, NOTHING_THERE
-from karamelo_py.kinds import StyleOf
-from karamelo_py.regions.base import Region
+from karamelo_py.language import registry, signature
+from karamelo_py.language.kinds import StyleOf
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.region import Region
+from karamelo_py.scene.solid import Solid, own_grids, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.signature import Argument
-from karamelo_py.solid import Solid, own_grids, warn_of_coinciding
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
 
 
 def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> None:

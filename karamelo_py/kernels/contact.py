@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import kernel, point_function
+from karamelo_py.compiler.compile import kernel, point_function
 from karamelo_py.kernels.arrays import DT, TIMESTEP
 from karamelo_py.kernels.step import touch, touch_velocity
 from karamelo_py.points.kinematics import dimension

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import index, kernel, point_function
+from karamelo_py.compiler.compile import index, kernel, point_function
+from karamelo_py.compiler.tuples import put_at, record, row, scale
 from karamelo_py.kernels.stages import place_at
 from karamelo_py.points.basis import entry, locate, reach, support
 from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     cauchy_stress,
     damage,
     damage_initiation,
@@ -22,7 +23,6 @@ from karamelo_py.points.materials import (
     temperature,
     with_stress,
 )
-from karamelo_py.tensors import put_at, record, row, scale
 
 STRAIN, JACOBIAN, ENERGY = 6, 12, 13
 EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point

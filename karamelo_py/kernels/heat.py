@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import (
+from karamelo_py.compiler.compile import (
     fma,
     index,
     over_blocks,
@@ -35,6 +35,7 @@ from karamelo_py.compile import (
     round_off,
     shared,
 )
+from karamelo_py.compiler.tuples import add_scaled, leading, put_at, record, row, scale, subtract
 from karamelo_py.kernels.arrays import (
     CAPACITY,
     CONDUCTANCE,
@@ -75,7 +76,7 @@ from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import drawn_back, thinning
 from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import Line, dimension, vector_at
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     conductivity,
     heat_capacity,
     initial_state,
@@ -84,7 +85,6 @@ from karamelo_py.points.materials import (
     temperature,
     with_temperature,
 )
-from karamelo_py.tensors import add_scaled, leading, put_at, record, row, scale, subtract
 
 
 class Conducting(NamedTuple):

@@ -24,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compile import caller_of, kernel, point_function
+from karamelo_py.compiler.compile import caller_of, kernel, point_function
+from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.kernels.arrays import (
     ADDRESS,
     BEFORE,
@@ -53,7 +54,6 @@ from karamelo_py.kernels.arrays import (
     USES_SHARE,
     VALUE,
 )
-from karamelo_py.kernels.formula import BLOCK, call_evaluate
 from karamelo_py.points.kinematics import dimension
 
 _F8 = types.float64

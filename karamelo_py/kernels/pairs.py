@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import kernel
+from karamelo_py.compiler.compile import kernel
+from karamelo_py.compiler.tuples import record, row, subtract
 from karamelo_py.points.kinematics import dimension, vector_at
-from karamelo_py.points.materials import initial_state, jacobian, specific_volume
+from karamelo_py.points.laws import initial_state, jacobian, specific_volume
 from karamelo_py.points.pairs import force_between, radius
-from karamelo_py.tensors import record, row, subtract
 
 
 class Bodies(NamedTuple):

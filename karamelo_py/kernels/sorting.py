@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from karamelo_py.compile import kernel
+from karamelo_py.compiler.compile import kernel
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.stages import place_at
 from karamelo_py.points.basis import extent
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
-from karamelo_py.tensors import record
 
 
 @kernel

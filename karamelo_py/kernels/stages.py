@@ -14,7 +14,22 @@ from typing import NamedTuple
 
 from numba import types
 
-from karamelo_py.compile import by_type, fma, index, point_function, real, shared
+from karamelo_py.compiler.compile import by_type, fma, index, point_function, real, shared
+from karamelo_py.compiler.tuples import (
+    add_optional,
+    add_row,
+    add_scaled,
+    add_to_optional,
+    clear_optional,
+    optional_row,
+    put_at,
+    put_from,
+    put_optional,
+    record,
+    row,
+    scale,
+    subtract,
+)
 from karamelo_py.points.basis import (
     blank,
     carried,
@@ -48,7 +63,7 @@ from karamelo_py.points.kinematics import (
     volume_ratio,
     zero_tensor,
 )
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     advance,
     deformation,
     driven,
@@ -67,21 +82,6 @@ from karamelo_py.points.transfers import (
     straining,
     updated_velocity,
     zero_moment,
-)
-from karamelo_py.tensors import (
-    add_optional,
-    add_row,
-    add_scaled,
-    add_to_optional,
-    clear_optional,
-    optional_row,
-    put_at,
-    put_from,
-    put_optional,
-    record,
-    row,
-    scale,
-    subtract,
 )
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compile import kernel, over_blocks, point_function, real, shared
+from karamelo_py.compiler.compile import kernel, over_blocks, point_function, real, shared
+from karamelo_py.compiler.tuples import record, row, subtract
 from karamelo_py.kernels.arrays import (
     COURANT,
     DRIFT,
@@ -77,9 +78,8 @@ from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import Total, Updated, follows, thinning
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import dimension, largest_component, vector_at
-from karamelo_py.points.materials import initial_state, wave_speed_squared
+from karamelo_py.points.laws import initial_state, wave_speed_squared
 from karamelo_py.points.transfers.xpic import XPIC
-from karamelo_py.tensors import record, row, subtract
 
 
 class Fused(NamedTuple):

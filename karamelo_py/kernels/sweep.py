@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from numba import prange
 
-from karamelo_py.compile import index, kernel, point_function
+from karamelo_py.compiler.compile import index, kernel, point_function
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.stages import (
     Work,
     at_node,
@@ -25,8 +26,7 @@ from karamelo_py.kernels.stages import (
 )
 from karamelo_py.points.basis import locate, support
 from karamelo_py.points.kinematics import vector_at
-from karamelo_py.points.materials import assemble, separate
-from karamelo_py.tensors import record
+from karamelo_py.points.laws import assemble, separate
 
 
 class Serial(NamedTuple):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from karamelo_py.compile import by_type, define, point_function, real, shared
+from karamelo_py.compiler.compile import by_type, define, point_function, real, shared
+from karamelo_py.compiler.tuples import multiply_each
 from karamelo_py.points.grid import Grid, in_cells, pick
-from karamelo_py.tensors import multiply_each
 
 
 class ReflectingGrid(Grid):

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import point_function, real
+from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
 from karamelo_py.points.kinematics import (
     Axisymmetric,
     Line,
@@ -26,7 +27,6 @@ from karamelo_py.points.kinematics import (
     planar,
     zero_tensor,
 )
-from karamelo_py.tensors import add_scaled, leading, scale, subtract
 
 
 class Updated(NamedTuple):

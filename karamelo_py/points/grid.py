@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import shared
+from karamelo_py.compiler.compile import shared
 from karamelo_py.points.kinematics import dimension
 
 

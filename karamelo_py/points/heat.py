@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from karamelo_py.compile import point_function, real
+from karamelo_py.compiler.compile import point_function, real
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import pi, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compile import point_function
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.tuples import add_scaled, scale
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, dimension
-from karamelo_py.tensors import add_scaled, scale
 
 
 class Hertz(NamedTuple):

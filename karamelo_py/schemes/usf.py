@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import shared
+from karamelo_py.compiler.compile import shared
 from karamelo_py.kernels.arrays import (
     FINAL_INTEGRATE,
     INITIAL_INTEGRATE,

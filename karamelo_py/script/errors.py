@@ -36,7 +36,7 @@ class ScriptError(Exception):
         Where; filled in by whoever knows it when the raiser does not.
     argument
         Name or index (from 0) of the argument of a style or command that is to blame;
-        `karamelo_py.signature.call` turns it into a place.
+        `karamelo_py.language.signature.call` turns it into a place.
     expected
         What would have been right.
     hint

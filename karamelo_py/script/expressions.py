@@ -7,19 +7,15 @@ the time, a published value), the result is a `Formula`, with the numbers folded
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
+from karamelo_py.compiler.formula import Program
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import FUNCTIONS, compute, compute_quietly
 from karamelo_py.script.syntax import Binary, Function, Name, Node, Number, Raw, Text, Unary
-
-if TYPE_CHECKING:
-    from karamelo_py.hub import Hub
-    from karamelo_py.kernels.formula import Program
-    from karamelo_py.script.values import Values
-    from karamelo_py.signature import Argument
+from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
 GLOBAL_SEEDS = ("time", "timestep", "dt")
@@ -147,8 +143,8 @@ class Formula:
         return _evaluate(self._term, values)
 
     def program(self, values: Values) -> Program:
-        """The formula for :func:`karamelo_py.kernels.formula.evaluate`."""
-        from karamelo_py.kernels import formula as kernels
+        """The formula for :func:`karamelo_py.compiler.formula.evaluate`."""
+        from karamelo_py.compiler import formula as kernels
 
         code: list[tuple[int, int]] = []
         constants: dict[float, int] = {}
@@ -176,7 +172,7 @@ class Formula:
         """
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
-        from karamelo_py.kernels import formula as kernels
+        from karamelo_py.compiler import formula as kernels
 
         x = _three_columns(x)
         x0 = x if x0 is None else _three_columns(x0)
@@ -198,7 +194,7 @@ class Expression:
         self.formula = Formula.of(value)
 
     @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> Expression:
+    def from_script(cls, hub: Any, argument: Any) -> Expression:
         """The expression that a script's argument stands for."""
         value = argument.value(hub)
         if isinstance(value, str):

@@ -1,6 +1,6 @@
 """The functions of the script language, for plain numbers.
 
-The same functions for many points at once are in :mod:`karamelo_py.kernels.formula`.
+The same functions for many points at once are in :mod:`karamelo_py.compiler.formula`.
 """
 
 from __future__ import annotations

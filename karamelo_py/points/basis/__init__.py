@@ -27,7 +27,7 @@ steep_edge
     light nodes do to the strain.
 """
 
-from karamelo_py.compile import point_function
+from karamelo_py.compiler.compile import point_function
 
 
 @point_function(tags=2)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import index, point_function, real, shared
+from karamelo_py.compiler.compile import index, point_function, real, shared
+from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.basis import (
     blank,
     carried,
@@ -32,10 +33,6 @@ from karamelo_py.points.kinematics import (
     stretch,
     volume_ratio,
 )
-from karamelo_py.tensors import scale
-
-if TYPE_CHECKING:
-    from karamelo_py.solid import Solid
 
 # Half sizes that weights are made with, in cells.
 LEAST = 1e-3
@@ -59,7 +56,7 @@ class CPGIMPDet(NamedTuple):
     steep_edge = True
 
     @staticmethod
-    def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
+    def shapes(kin: NamedTuple, solid: Any) -> np.ndarray:
         """Half sizes of the domains of a solid's points, (n, d)."""
         return solid.half_size
 
@@ -81,7 +78,7 @@ class CPGIMPDiagonal(NamedTuple):
     steep_edge = True
 
     @staticmethod
-    def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
+    def shapes(kin: NamedTuple, solid: Any) -> np.ndarray:
         """Half sizes now and at the start, and F, of a solid's points, (n, 2 d + d d)."""
         return _sizes_and_deformation(solid)
 
@@ -104,7 +101,7 @@ class CPGIMPStretch(NamedTuple):
     steep_edge = True
 
     @staticmethod
-    def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
+    def shapes(kin: NamedTuple, solid: Any) -> np.ndarray:
         """Half sizes now and at the start, and F, of a solid's points, (n, 2 d + d d)."""
         return _sizes_and_deformation(solid)
 
@@ -129,7 +126,7 @@ class CPGIMPCorners(NamedTuple):
     steep_edge = True
 
     @staticmethod
-    def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
+    def shapes(kin: NamedTuple, solid: Any) -> np.ndarray:
         """Half sizes of the domains of a solid's points, (n, d)."""
         return solid.half_size
 
@@ -169,7 +166,7 @@ class CPGIMP(NamedTuple):
     default_variant = "stretch"
 
 
-def _sizes_and_deformation(solid: Solid) -> np.ndarray:
+def _sizes_and_deformation(solid: Any) -> np.ndarray:
     half = solid.half_size
     n, d = half.shape
     return np.concatenate([half, half, np.tile(np.eye(d).ravel(), (n, 1))], axis=1)

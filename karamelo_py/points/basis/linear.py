@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import real
+from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.basis import mapped_again
 from karamelo_py.points.basis.product import along, register
 from karamelo_py.points.grid import cells_along, in_cells
-from karamelo_py.tensors import scale
 
 
 class Linear(NamedTuple):

@@ -6,7 +6,7 @@ first node and, for each direction, what `along` returned.
 
 from __future__ import annotations
 
-from karamelo_py.compile import index, point_function, real, shared
+from karamelo_py.compiler.compile import index, point_function, real, shared
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 

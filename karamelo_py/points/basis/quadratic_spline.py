@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import real, shared
+from karamelo_py.compiler.compile import real, shared
 from karamelo_py.points.basis.product import along, register
 from karamelo_py.points.grid import cells_along, in_cells
 

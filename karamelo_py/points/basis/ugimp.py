@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import real, shared
+from karamelo_py.compiler.compile import real, shared
 from karamelo_py.points.basis import blank
 from karamelo_py.points.basis.product import along, register
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, dimension
-
-if TYPE_CHECKING:
-    from karamelo_py.solid import Solid
 
 
 class UGIMP(NamedTuple):
@@ -36,7 +33,7 @@ class UGIMP(NamedTuple):
     steep_edge = True
 
     @staticmethod
-    def shapes(kin: NamedTuple, solid: Solid) -> np.ndarray:
+    def shapes(kin: NamedTuple, solid: Any) -> np.ndarray:
         """Half sizes of the domains of a solid's points, (n, d)."""
         return solid.half_size
 

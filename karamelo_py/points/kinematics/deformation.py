@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-from karamelo_py.compile import point_function, real, shared
+from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.tensors import scale
 
 
 @point_function()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from karamelo_py.compile import fma, point_function, real, shared
+from karamelo_py.compiler.compile import fma, point_function, real, shared
 from karamelo_py.points.kinematics.deformation import inverse, zero_tensor
 from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
 

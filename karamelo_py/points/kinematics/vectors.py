@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from karamelo_py.compile import fma, point_function
+from karamelo_py.compiler.compile import fma, point_function
 from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
 
 

@@ -19,8 +19,8 @@ inverts_spread
 What is not defined for a class is that of FLIP and PIC: nothing is kept, v alone is mapped.
 """
 
-from karamelo_py.compile import point_function
-from karamelo_py.tensors import add_scaled
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.tuples import add_scaled
 
 
 @point_function()

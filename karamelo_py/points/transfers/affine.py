@@ -9,10 +9,10 @@ eqs. 15 to 18).
 
 from __future__ import annotations
 
+from karamelo_py.compiler.tuples import add_scaled, scale
 from karamelo_py.points.basis import affine_weight, reach
 from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
 from karamelo_py.points.transfers import add_moment, add_momentum, zero_moment
-from karamelo_py.tensors import add_scaled, scale
 
 
 def register(transfer: type) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import real, shared
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.tuples import add, add_scaled, scale
 from karamelo_py.points.transfers import updated_velocity
-from karamelo_py.tensors import add, add_scaled, scale
 
 
 class FLIP(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compile import point_function
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.points.basis import affine_weight
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.transfers import (

@@ -8,10 +8,10 @@ stays the same; for splines as far as velocity is linear over their support.
 
 from __future__ import annotations
 
+from karamelo_py.compiler.tuples import add, add_scaled
 from karamelo_py.points.basis import reach
 from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
 from karamelo_py.points.transfers import add_moment, add_momentum, zero_moment
-from karamelo_py.tensors import add, add_scaled
 
 
 def register(transfer: type) -> None:

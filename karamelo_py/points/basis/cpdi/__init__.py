@@ -12,7 +12,7 @@ A family of domains is one file; it gives only :func:`domain`, its place, and ca
 :func:`karamelo_py.points.basis.cpdi.corners.register`.
 """
 
-from karamelo_py.compile import point_function
+from karamelo_py.compiler.compile import point_function
 
 
 @point_function(tags=2)

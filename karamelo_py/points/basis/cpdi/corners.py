@@ -6,7 +6,8 @@ from math import inf
 
 from numba.extending import overload
 
-from karamelo_py.compile import define, index, point_function, real, shared
+from karamelo_py.compiler.compile import define, index, point_function, real, shared
+from karamelo_py.compiler.tuples import add, add_row, add_scaled, scale, subtract
 from karamelo_py.points.basis import (
     affine_weight,
     blank,
@@ -25,7 +26,6 @@ from karamelo_py.points.basis.cpdi import domain
 from karamelo_py.points.basis.product import hoop, inverse_radius
 from karamelo_py.points.grid import cells_along, in_cells, pick
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
-from karamelo_py.tensors import add, add_row, add_scaled, scale, subtract
 
 _INLINED = {"forceinline": True}
 KINEMATICS = {2: (PlaneStrain, Axisymmetric), 3: (Space,)}

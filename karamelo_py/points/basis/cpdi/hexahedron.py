@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import real, shared
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.tuples import add, scale, subtract
 from karamelo_py.points.basis.cpdi import domain
 from karamelo_py.points.basis.cpdi.corners import register_carried, upright
 from karamelo_py.points.basis.cpdi.initial import element_corners, turned
 from karamelo_py.points.kinematics import Space
-from karamelo_py.tensors import add, scale, subtract
 
 # The order of a mesh: around the lower face, then around the upper.
 SIGNS = np.array([(x, y, z) for z in (-1, 1) for x, y in [(-1, -1), (1, -1), (1, 1), (-1, 1)]])

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import define, point_function, real
+from karamelo_py.compiler.compile import define, point_function, real
 from karamelo_py.points.basis import blank, deformed, extent
 from karamelo_py.points.basis.cpdi import domain
 from karamelo_py.points.basis.cpdi.corners import KINEMATICS, register

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compile import real
+from karamelo_py.compiler.compile import real
 from karamelo_py.points.basis.cpdi import domain
 from karamelo_py.points.basis.cpdi.corners import register_carried, upright
 from karamelo_py.points.basis.cpdi.initial import element_corners, turned

@@ -3,9 +3,9 @@
 from math import exp
 from typing import Annotated
 
-from karamelo_py.group import ParticleGroup
-from karamelo_py.modify import Fix, PointsView
-from karamelo_py.signature import NonNegative
+from karamelo_py.language.signature import NonNegative
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.modify import Fix, PointsView
 
 
 class Drag(Fix):

@@ -2,10 +2,11 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compile import real
-from karamelo_py.material import Material
+from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.tuples import scale
+from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import add_pressure, volume_ratio, zero_symmetric
-from karamelo_py.points.materials import (
+from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
     elastic_strain,
@@ -16,8 +17,7 @@ from karamelo_py.points.materials import (
     specific_volume,
     wave_speed_squared,
 )
-from karamelo_py.signature import Positive
-from karamelo_py.tensors import scale
+from karamelo_py.scene.material import Material
 
 
 class ElasticFluidLaw(NamedTuple):

@@ -1,6 +1,6 @@
 """compute momentum."""
 
-from karamelo_py.modify import Compute
+from karamelo_py.scene.modify import Compute
 
 
 class Momentum(Compute):

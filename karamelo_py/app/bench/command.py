@@ -1,0 +1,99 @@
+"""The subcommand karamelo-py bench: how fast this machine runs known scenes.
+
+Speeds are of the fastest of several repetitions; they are meant for comparison within one run of
+this command, since machines are shared and their clocks change.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentTypeError
+from math import inf
+
+from karamelo_py.app.bench import measure
+from karamelo_py.app.bench.workloads import WORKLOADS
+from karamelo_py.app.cli import CommandLine, threads_option
+from karamelo_py.run.report import point_fields
+from karamelo_py.script.errors import ScriptError, nearest
+
+ELSEWHERE = "published, one core of another machine, a small AMD EPYC"
+
+
+def explanation() -> str:
+    """How the subcommand is called, and what it can measure."""
+    width = max(map(len, WORKLOADS))
+    workloads = "".join(f"  {name:<{width}}  {w.title}\n" for name, w in WORKLOADS.items())
+    return f"""\
+karamelo-py bench [WORKLOAD ...] [options]
+
+Measures the speed of this machine on known scenes, all or those that are named: particle-steps per
+second of the fastest of five repetitions, bytes per particle, and the time of each stage of a step.
+
+workloads:
+{workloads}
+options:
+  -var NAME VALUE    set a variable of the scenes, such as N, their fineness
+  --threads N        threads to use (default: 1)
+  --seconds S        how long each scene is measured (default: 2)
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """The subcommand."""
+    parser = CommandLine(prog="karamelo-py bench", add_help=False, allow_abbrev=False)
+    parser.add_argument("workloads", nargs="*")
+    parser.add_argument("-var", nargs=2, action="append", default=[])
+    parser.add_argument("--threads", type=threads_option, default=1)
+    parser.add_argument("--seconds", type=_positive, default=2.0)
+    parser.add_argument("--debug", action="store_true")
+    options = parser.parse_args(arguments)
+    for name in options.workloads:
+        if name not in WORKLOADS:
+            close = nearest(name, WORKLOADS)
+            raise ScriptError(
+                f"unknown workload '{name}'",
+                expected="one of " + ", ".join(WORKLOADS),
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+    import numba
+
+    available = numba.config.NUMBA_NUM_THREADS
+    threads = min(options.threads or available, available)
+    numba.set_num_threads(threads)
+    triad = measure.bandwidth(threads)
+    print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")
+    for name in options.workloads or WORKLOADS:
+        _print(name, dict(options.var), threads, options.seconds, triad)
+    return 0
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < inf:
+        raise ArgumentTypeError(f"'{text}' is not a number of seconds above 0")
+    return value
+
+
+def _print(name: str, presets: dict[str, str], threads: int, seconds: float, triad: float) -> None:
+    workload = WORKLOADS[name]
+    simulation = measure.build(workload, threads, presets)
+    best, median = measure.speed(simulation, seconds, workload.lead)
+    per_step = measure.traffic(simulation)
+    per_point = sum(size for _, _, size in point_fields(simulation.setup.blocks[0]))
+    roof = triad / per_step
+    print(f"\n{name}: {workload.title}; {simulation.count} points")
+    print(f"  {'particle-steps/s':<34} {best / 1e6:8.2f} million (median {median / 1e6:.2f})")
+    if workload.karamelo is not None and not presets:
+        print(f"  {'of Karamelo in C++':<34} {workload.karamelo:8.2f} million ({ELSEWHERE})")
+        print(f"  {'ratio of the two':<34} {best / 1e6 / workload.karamelo:8.1f}")
+    print(f"  {'bytes per particle':<34} {per_point:8d}")
+    print(f"  {'bytes moved per particle-step':<34} {per_step:8.0f}")
+    print(f"  {'share of the memory roofline':<34} {100 * best / roof:8.1f} %")
+    parts = measure.stages(simulation, seconds / 4)
+    for stage, per in parts.items():
+        print(f"    {stage:<32} {1e9 * per / simulation.count:8.2f} ns")
+    print(f"    {'together, in one compiled loop':<32} {1e9 / best:8.2f} ns")
+    if simulation.count < 10_000:
+        print("    (one by one, each stage costs some microseconds to call from Python)")

@@ -1,0 +1,343 @@
+"""How the package compiles: a cache folder for each state of the sources, point functions.
+
+Numba does not notice when a function in *another* file changes, so the folder of its on-disk cache
+is named by a hash of every source that can end up in a kernel: this package's and every plug-in's.
+"""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import os
+import re
+import shutil
+import sys
+from collections.abc import Callable
+from importlib import metadata, util
+from pathlib import Path
+from typing import Any
+
+import numba
+from llvmlite import binding as llvm
+from llvmlite import ir
+from numba import cfunc, config, njit
+from numba.core import event
+from numba.extending import intrinsic, overload
+
+import karamelo_py.compiler.melting  # noqa: F401  (has to be there before anything is compiled)
+
+_KEPT_CACHES = 6
+_COMPILED_PARTS = ("compiler", "points", "kernels", "schemes", "styles", "run")
+
+
+def _source_folders() -> list[Path]:
+    """What may end up in a kernel: parts of this package, and every package with a plug-in."""
+    here = Path(__file__).parents[1]
+    folders = [here / name for name in _COMPILED_PARTS]
+    points = metadata.entry_points()
+    groups = [group for group in points.groups if group.startswith("karamelo_py.")]
+    packages = {
+        entry.value.partition(":")[0].partition(".")[0]
+        for group in groups
+        for entry in points.select(group=group)
+    }
+    for package in packages - {"karamelo_py"}:
+        try:
+            origin = getattr(util.find_spec(package), "origin", None)
+        except (ImportError, ValueError):
+            continue
+        if origin:
+            path = Path(origin)
+            folders.append(path.parent if path.name == "__init__.py" else path)
+    return sorted(set(folders))
+
+
+def _sources_hash() -> str:
+    digest = hashlib.sha256(f"{sys.version}|{numba.__version__}".encode())
+    for folder in _source_folders():
+        for source in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder]:
+            digest.update(source.relative_to(folder.parent).as_posix().encode())
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _use_cache_folder() -> Path:
+    """Point Numba's cache at the folder of these sources and forget the oldest of the others."""
+    import platformdirs
+
+    home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
+    root = Path(home) / "kernels"
+    folder = root / _sources_hash()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        folder.touch()
+        ours = [path for path in root.iterdir() if re.fullmatch("[0-9a-f]{16}", path.name)]
+        others = sorted(ours, key=lambda path: path.stat().st_mtime, reverse=True)
+        for old in others[_KEPT_CACHES:]:
+            shutil.rmtree(old, ignore_errors=True)
+    except OSError:
+        return folder  # Numba then keeps its cache beside the sources or in memory.
+    config.CACHE_DIR = str(folder)
+    return folder
+
+
+CACHE_FOLDER = _use_cache_folder()
+
+# The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in
+# registers and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
+llvm.set_option("", "--unroll-threshold=4000")
+
+
+class _NoCollections(event.Listener):
+    """While Numba compiles, Python's collector of cycles would walk its many objects in vain."""
+
+    depth = 0
+    was_on = False
+
+    def on_start(self, event: Any) -> None:
+        if self.depth == 0:
+            self.was_on = gc.isenabled()
+        self.depth += 1
+        gc.disable()
+
+    def on_end(self, event: Any) -> None:
+        self.depth -= 1
+        if self.depth == 0 and self.was_on:
+            gc.enable()
+
+
+event.register("numba:compile", _NoCollections())
+
+# Threads that wait for each other spin a little, then sleep (GNU OpenMP). Where another program
+# takes a core, waiting at full speed makes two threads twenty times slower than one; sleeping at
+# once costs a fifth where none does.
+os.environ.setdefault("GOMP_SPINCOUNT", "500")
+
+
+# Point functions must melt into the loops that call them, however large they get.
+_INLINED = {"forceinline": True, "no_cfunc_wrapper": True}
+
+
+def kernel(function: Callable | None = None, **options: Any) -> Callable:
+    """Compile a loop over points or nodes; cached on disk, free of the interpreter lock.
+
+    No fast mathematics: where products and sums contract would depend on what a loop is inlined
+    into, so that results would differ between one thread and two, or a run in pieces and a whole.
+    `fma` says where. Kernels allocate nothing, so Numba's reference counting is left out.
+    """
+    if function is None:
+        return lambda f: kernel(f, **options)
+    options = {"forceinline": False, "no_cfunc_wrapper": True} | options
+    return njit(cache=True, nogil=True, error_model="numpy", _nrt=False, **options)(function)
+
+
+def by_type(function: Callable) -> Callable:
+    """Decorate the chooser of what `function` is in a kernel, from the types of its arguments."""
+    return overload(function, _INLINED, strict=False)
+
+
+def shared(function: Callable) -> Callable:
+    """Mark a helper of point functions that needs no choice by type: kernels may call it."""
+    by_type(function)(lambda *arguments: function)
+    return function
+
+
+def tag_class(numba_type: Any) -> Any:
+    """The Python class that a Numba type stands for, as far as point functions select by it."""
+    return getattr(numba_type, "instance_class", None)
+
+
+def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
+    """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
+
+    The decorated function gives name, parameters and docstring. Implementations are added with
+    ``name.on(Class, ...)`` and serve both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and
+    inside kernels, where the types are known at compile time and no branch is left. A plug-in adds
+    its own in the same way. ``name.otherwise`` marks what classes without their own get.
+    """
+
+    def declare(stub: Callable) -> Callable:
+        table: dict[tuple[type, ...], Callable] = {}
+        fallback: list[Callable] = []
+
+        def find(classes: tuple) -> Callable | None:
+            return table.get(classes) or (fallback[0] if fallback else None)
+
+        def missing(classes: tuple) -> str:
+            names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
+            return f"{stub.__name__} is not defined for ({names})"
+
+        def dispatch(*arguments: Any) -> Any:
+            classes = tuple(type(a) for a in arguments[:tags])
+            chosen = find(classes)
+            if chosen is None:
+                raise TypeError(missing(classes))
+            return chosen(*arguments)
+
+        dispatch.__name__ = stub.__name__
+        dispatch.__qualname__ = stub.__qualname__
+        dispatch.__module__ = stub.__module__
+        dispatch.__doc__ = stub.__doc__
+
+        def choose(*arguments: Any) -> Callable | None:
+            return find(tuple(tag_class(a) for a in arguments[:tags]))
+
+        by_type(dispatch)(choose)
+
+        def on(*classes: type) -> Callable[[Callable], Callable]:
+            def register(implementation: Callable) -> Callable:
+                table[classes] = implementation
+                return implementation
+
+            return register
+
+        def otherwise(implementation: Callable) -> Callable:
+            fallback[:] = [implementation]
+            return implementation
+
+        dispatch.on = on
+        dispatch.otherwise = otherwise
+        dispatch.defined = lambda *classes: classes in table
+        return dispatch
+
+    return declare
+
+
+def real(value: float, like: Any) -> Any:
+    """`value` in the number type of `like`.
+
+    In a kernel, a bare Python number next to a single-precision one makes the result double;
+    every literal in a point function therefore passes through here (it costs nothing at run time).
+    """
+    return type(like)(value)
+
+
+@by_type(real)
+def _real(value, like):
+    if like is numba.types.float32:
+        return lambda value, like: numba.float32(value)
+    return lambda value, like: numba.float64(value)
+
+
+def round_off(like: Any) -> Any:
+    """The relative error of one operation, in the number type of `like`."""
+    return type(like)(_ROUND_OFF.get(type(like).__name__, 2.0**-52))
+
+
+_ROUND_OFF = {"float32": 2.0**-23}
+
+
+@by_type(round_off)
+def _round_off(like):
+    if like is numba.types.float32:
+        return lambda like: numba.float32(2.0**-23)
+    return lambda like: numba.float64(2.0**-52)
+
+
+def fma(a: float, b: float, c: float) -> float:
+    """a b + c with one rounding, where compiled: always so, whatever surrounds it."""
+    return a * b + c
+
+
+@intrinsic
+def _fused(typing_context, a, b, c):
+    def codegen(context, builder, signature, arguments):
+        return builder.fma(*arguments)
+
+    return a(a, b, c), codegen
+
+
+@by_type(fma)
+def _fma(a, b, c):
+    if a == b == c and isinstance(a, numba.types.Float):
+        return lambda a, b, c: _fused(a, b, c)
+    return lambda a, b, c: a * b + c
+
+
+def index(i: int) -> int:
+    """`i` as an array index that is known not to be negative.
+
+    Saves Numba's test for indices counted from the end at every access (a tenth of a sweep).
+    """
+    return i
+
+
+@by_type(index)
+def _index(i):
+    return lambda i: numba.uint64(i)
+
+
+def over_blocks(per_block: Callable) -> Callable:
+    """Make ``f(setup, ...)`` that calls ``per_block(block, setup, ...)`` for each of setup.blocks.
+
+    The blocks have different types (one for each constitutive law), which a loop in a kernel cannot
+    run over: the calls are written out once per number of blocks.
+    """
+
+    shared(per_block)
+
+    def loop(setup: Any, *arguments: Any) -> None:
+        for block in setup.blocks:
+            per_block(block, setup, *arguments)
+
+    def written_out(setup: Any, *arguments: Any) -> Callable:
+        names = "".join(f", a{k}" for k in range(len(arguments)))
+        count = len(setup[setup.fields.index("blocks")])
+        lines = [f"per_block(setup.blocks[{k}], setup{names})" for k in range(count)]
+        return define(f"setup{names}", *lines, per_block=per_block)
+
+    by_type(loop)(written_out)
+    return loop
+
+
+_uncompiled: list[Callable] = []
+_addresses: dict[Callable, int] = {}
+_keep_alive: list = []
+
+
+def address_of(function: Callable, signature: numba.types.Type) -> int:
+    """Compile `function` (cached on disk) and return the address that kernels call it by.
+
+    Whoever calls by address does not contain the function: it need not be compiled anew for
+    another one, and the function is compiled once for all its callers.
+    """
+    if function not in _addresses:
+        if config.DISABLE_JIT:
+            _uncompiled.append(function)
+            _addresses[function] = len(_uncompiled) - 1
+        else:
+            compiled = cfunc(signature, cache=True, error_model="numpy")(function)
+            _keep_alive.append(compiled)
+            _addresses[function] = compiled.address
+    return _addresses[function]
+
+
+def caller_of(signature: numba.types.Type) -> Callable:
+    """Make ``call(address, ...)``, which calls a function of this signature by its address."""
+    result, parameters = signature.return_type, signature.args
+
+    if config.DISABLE_JIT:
+        return lambda address, *arguments: _uncompiled[address](*arguments)
+
+    def codegen(context, builder, _, arguments):
+        kind = ir.FunctionType(
+            context.get_value_type(result), [context.get_value_type(p) for p in parameters]
+        )
+        pointer = builder.inttoptr(arguments[0], kind.as_pointer())
+        return builder.call(pointer, arguments[1:])
+
+    names = ", ".join(f"a{k}" for k in range(len(parameters)))
+    call = define(
+        f"typing_context, address, {names}",
+        "return typed, codegen",
+        typed=result(numba.types.int64, *parameters),
+        codegen=codegen,
+    )
+    return intrinsic(call)
+
+
+def define(parameters: str, *lines: str, **names: Any) -> Callable:
+    """The function with these `parameters` and body `lines`, which may use `names`."""
+    body = "\n    ".join(lines or ("pass",))
+    exec(f"def spelled({parameters}):\n    {body}", names)
+    return names["spelled"]

@@ -1,0 +1,288 @@
+"""Algebra on flat tuples of any length: sums, multiples, products.
+
+Tuples have no length-generic arithmetic in Numba, so each operation is written out for the length
+it meets (`spell` builds the text once per length); in plain Python they are comprehensions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from numba import types
+
+from karamelo_py.compiler.compile import by_type, define, fma
+
+
+def spell(parameters: str, term: str, length: int) -> Callable:
+    """The function ``(term with k = 0, ..., term with k = length - 1)`` of `parameters`."""
+    items = "".join(term.replace("[k]", f"[{k}]") + ", " for k in range(length))
+    return define(parameters, f"return ({items})", fma=fma)
+
+
+def add(a, b):
+    """a + b, component by component."""
+    return tuple(x + y for x, y in zip(a, b, strict=True))
+
+
+@by_type(add)
+def _add(a, b):
+    return spell("a, b", "a[k] + b[k]", len(a))
+
+
+def subtract(a, b):
+    """a - b, component by component."""
+    return tuple(x - y for x, y in zip(a, b, strict=True))
+
+
+@by_type(subtract)
+def _subtract(a, b):
+    return spell("a, b", "a[k] - b[k]", len(a))
+
+
+def scale(factor, a):
+    """factor * a."""
+    return tuple(factor * x for x in a)
+
+
+@by_type(scale)
+def _scale(factor, a):
+    return spell("factor, a", "factor * a[k]", len(a))
+
+
+def add_scaled(a, factor, b):
+    """a + factor * b."""
+    return tuple(fma(factor, y, x) for x, y in zip(a, b, strict=True))
+
+
+@by_type(add_scaled)
+def _add_scaled(a, factor, b):
+    return spell("a, factor, b", "fma(factor, b[k], a[k])", len(a))
+
+
+def multiply_each(a, b):
+    """a b, component by component."""
+    return tuple(x * y for x, y in zip(a, b, strict=True))
+
+
+@by_type(multiply_each)
+def _multiply_each(a, b):
+    return spell("a, b", "a[k] * b[k]", len(a))
+
+
+def put_at(array, i, first, values):
+    """array[i, first + k] = values[k]."""
+    for k, value in enumerate(values):
+        array[i, first + k] = value
+
+
+@by_type(put_at)
+def _put_at(array, i, first, values):
+    lines = [f"array[i, first + {k}] = values[{k}]" for k in range(len(values))]
+    return define("array, i, first, values", *lines)
+
+
+def row(array, i, first, like):
+    """(array[i, first], ..., array[i, first + len(like) - 1])."""
+    return tuple(array[i, first + k] for k in range(len(like)))
+
+
+@by_type(row)
+def _row(array, i, first, like):
+    items = "".join(f"array[i, first + {k}], " for k in range(len(like)))
+    return define("array, i, first, like", f"return ({items})")
+
+
+def record(table, i):
+    """A NamedTuple of arrays, seen at index `i`: the same NamedTuple of scalars.
+
+    NamedTuples of arrays in it become NamedTuples of scalars, too.
+    """
+    return type(table)(*(record(c, i) if isinstance(c, tuple) else c[i] for c in table))
+
+
+@by_type(record)
+def _record(table, i):
+    terms = [
+        f"record(table[{k}], i)" if isinstance(column, types.BaseNamedTuple) else f"table[{k}][i]"
+        for k, column in enumerate(table)
+    ]
+    made = f"return make({', '.join(terms)})"
+    return define("table, i", made, make=table.instance_class, record=record)
+
+
+def optional_row(array, i, like):
+    """Row `i` of an array that may be absent (None): then, and for an empty `like`, empty."""
+    return () if array is None else row(array, i, 0, like)
+
+
+@by_type(optional_row)
+def _optional_row(array, i, like):
+    if isinstance(array, types.NoneType):
+        return lambda array, i, like: ()
+    return lambda array, i, like: row(array, i, 0, like)
+
+
+def put_optional(array, i, values):
+    """Store into row `i` of an array that may be absent (None)."""
+    if array is not None:
+        put_at(array, i, 0, values)
+
+
+@by_type(put_optional)
+def _put_optional(array, i, values):
+    if isinstance(array, types.NoneType):
+        return lambda array, i, values: None
+    return lambda array, i, values: put_at(array, i, 0, values)
+
+
+def add_optional(a, factor, b):
+    """a + factor * b, where an empty `b` counts as zero."""
+    return add_scaled(a, factor, b) if len(b) else a
+
+
+@by_type(add_optional)
+def _add_optional(a, factor, b):
+    if len(b) == 0:
+        return lambda a, factor, b: a
+    return lambda a, factor, b: add_scaled(a, factor, b)
+
+
+def add_to_optional(array, i, factor, values):
+    """Add factor * values to row `i` of an array that may be absent (None).
+
+    Values beyond the length of the row are left out.
+    """
+    if array is not None:
+        for k in range(array.shape[1]):
+            array[i, k] += factor * values[k]
+
+
+@by_type(add_to_optional)
+def _add_to_optional(array, i, factor, values):
+    if isinstance(array, types.NoneType):
+        return lambda array, i, factor, values: None
+
+    def add(array, i, factor, values):
+        for k in range(array.shape[1]):
+            array[i, k] = fma(factor, values[k], array[i, k])
+
+    return add
+
+
+def clear_optional(array, i):
+    """Set row `i` of an array that may be absent (None) to zero."""
+    if array is not None:
+        array[i, :] = 0
+
+
+@by_type(clear_optional)
+def _clear_optional(array, i):
+    if isinstance(array, types.NoneType):
+        return lambda array, i: None
+
+    def clear(array, i):
+        for k in range(array.shape[1]):
+            array[i, k] = 0
+
+    return clear
+
+
+def put_from(array, i, first, values):
+    """array[i, k] = values[k] for k >= first."""
+    for k in range(first, len(values)):
+        array[i, k] = values[k]
+
+
+@by_type(put_from)
+def _put_from(array, i, first, values):
+    def put(array, i, first, values):
+        for k in range(first, len(values)):
+            array[i, k] = values[k]
+
+    return put
+
+
+def add_row(a, first, b):
+    """`a` with b[k] added to a[first + k]."""
+    return tuple(x + (b[k - first] if first <= k < first + len(b) else 0) for k, x in enumerate(a))
+
+
+@by_type(add_row)
+def _add_row(a, first, b):
+    items = []
+    for k in range(len(a)):
+        term = f"a[{k}]"
+        for j in range(min(len(b), k + 1)):
+            term = f"(a[{k}] + b[{j}] if first == {k - j} else {term})"
+        items.append(term)
+    return define("a, first, b", f"return ({''.join(item + ', ' for item in items)})")
+
+
+def leading(values, like):
+    """The first len(like) of `values`."""
+    return values[: len(like)]
+
+
+@by_type(leading)
+def _leading(values, like):
+    return define("values, like", f"return values[:{len(like)}]" if len(like) else "return ()")
+
+
+def following(values, like):
+    """What comes after the first len(like) of `values`, perhaps nothing."""
+    return values[len(like) :]
+
+
+@by_type(following)
+def _following(values, like):
+    rest = range(len(like), len(values))
+    items = "".join(f"values[{k}], " for k in rest)
+    return define("values, like", f"return ({items})")
+
+
+def plus(number, present):
+    """number + present[0], or the number alone where `present` is empty."""
+    return number + present[0] if len(present) else number
+
+
+@by_type(plus)
+def _plus(number, present):
+    if len(present) == 0:
+        return lambda number, present: number
+    return lambda number, present: number + present[0]
+
+
+def times(number, present):
+    """number * present[0], or the number alone where `present` is empty."""
+    return number * present[0] if len(present) else number
+
+
+@by_type(times)
+def _times(number, present):
+    if len(present) == 0:
+        return lambda number, present: number
+    return lambda number, present: number * present[0]
+
+
+def increased(present, change):
+    """(present[0] + change,), or nothing where `present` is empty."""
+    return (present[0] + change,) if len(present) else ()
+
+
+@by_type(increased)
+def _increased(present, change):
+    if len(present) == 0:
+        return lambda present, change: ()
+    return lambda present, change: (present[0] + change,)
+
+
+def either(first, second):
+    """`first`, or `second` where `first` is empty."""
+    return first if len(first) else second
+
+
+@by_type(either)
+def _either(first, second):
+    if len(first) == 0:
+        return lambda first, second: second
+    return lambda first, second: first

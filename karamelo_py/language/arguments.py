@@ -1,0 +1,122 @@
+"""Arguments as a script has them: text first, evaluated only when a value is asked for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.expressions import Value
+from karamelo_py.script.parser import parse_expression
+from karamelo_py.script.syntax import Raw
+
+NULL = "NULL"
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_NAME = re.compile(r"[^\W\d]\w*")
+_QUOTED = re.compile(r'"([^"]*)"')
+_KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
+
+
+class Argument:
+    """One argument of a call as the script has it, not evaluated.
+
+    Attributes
+    ----------
+    text : str
+        What is written, without blanks around it.
+    place : Place
+        Where it stands.
+    """
+
+    def __init__(self, raw: Raw, interpreter: Any):
+        code = raw.code
+        start = raw.start + len(code) - len(code.lstrip())
+        self._raw = Raw(raw.source, start, start + len(code.strip()))
+        self._interpreter = interpreter
+        self.text = code.strip()
+        if "\n" in raw.source.text[self._raw.start : self._raw.end]:
+            self.text = re.sub(r"\s+", " ", self.text)
+
+    @property
+    def place(self) -> Place:
+        return self._raw.place
+
+    def __repr__(self) -> str:
+        return f"Argument({self.text!r})"
+
+    @property
+    def is_null(self) -> bool:
+        """Whether it is the word NULL."""
+        return self.text == NULL
+
+    def word(self) -> str | None:
+        """The word it is: bare, in quotes, or the content of a text variable; None for arithmetic.
+
+        Words such as ``neo-hookean`` or ``dump.*.gz`` count unless a name in them is known, which
+        makes them arithmetic.
+        """
+        quoted = _QUOTED.fullmatch(self.text)
+        if quoted:
+            return quoted[1]
+        if _NAME.fullmatch(self.text):
+            variable = self._interpreter.variables.get(self.text)
+            return variable if isinstance(variable, str) else self.text
+        if not self.text or re.search(r'[\s()",=<>]', self.text) or NUMBER.fullmatch(self.text):
+            return None
+        names = _NAME.findall(self.text)
+        known = not names or any(self._interpreter.knows(name) for name in names)
+        return None if known else self.text
+
+    def words(self, known: Sequence[str] = ()) -> str:
+        """The text it stands for where only a word will do, arithmetic or not.
+
+        Raises
+        ------
+        ScriptError
+            If it cannot be meant as a word.
+        """
+        if self.text in known:
+            return self.text
+        quoted = _QUOTED.fullmatch(self.text)
+        if quoted:
+            return quoted[1]
+        if '"' in self.text:
+            value = self.value(None)
+            if isinstance(value, str):
+                return value
+            raise ScriptError(f"{self.text} is not a text", place=self.place)
+        variable = self._interpreter.variables.get(self.text)
+        if isinstance(variable, str):
+            return variable
+        if re.search(r"\s", self.text):
+            first, second = self.text.split()[:2]
+            raise ScriptError(
+                f"'{self.text}' is more than one word",
+                place=self.place,
+                hint=f'is a comma missing: "{first}, {second}"? A name with blanks needs quotes',
+            )
+        return self.text
+
+    def value(self, hub: Scene | None) -> Value:
+        """The number, text or formula it stands for.
+
+        Raises
+        ------
+        ScriptError
+            With the place of what is wrong inside the argument.
+        """
+        if self.is_null:
+            raise ScriptError(
+                "NULL cannot be used here", place=self.place, expected="a number or a formula"
+            )
+        return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
+
+    def keyword(self) -> tuple[str, Argument] | None:
+        """Name and value if it is written ``name = value``."""
+        match = _KEYWORD.match(self.text)
+        if not match:
+            return None
+        start = self._raw.source.text.index("=", self._raw.start) + 1
+        return match[1], Argument(Raw(self._raw.source, start, self._raw.end), self._interpreter)

@@ -1,0 +1,61 @@
+"""Exceptions in code of a style or plug-in, told with the place in the script that uses it."""
+
+from __future__ import annotations
+
+import inspect
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from karamelo_py.language import registry
+from karamelo_py.script.errors import Place, Quit, ScriptError
+
+# These are told elsewhere in words of their own.
+_KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
+
+
+@contextmanager
+def told(name: str, where: str, code: Any, place: Place | None) -> Iterator[None]:
+    """Turn an exception of a style into an error of the script.
+
+    Parameters
+    ----------
+    name
+        What uses the code: ``fix drag``.
+    where
+        Which part of it is at work, such as the name of a hook.
+    code
+        The class or function, whose file is looked for in the traceback.
+    place
+        Where the script asks for it.
+    """
+    try:
+        yield
+    except _KNOWN:
+        raise
+    except Exception as error:
+        family, _, style = name.partition(" ")
+        family, style = (family, style) if style else ("command", family)
+        known = registry.knows(family, style)
+        package = f" (of {registry.origin(family, style)})" if known else ""
+        what = f"{type(error).__name__}: {error}{_line(error, code)}"
+        fault = ScriptError(
+            f"{name}{package}: {where}: {what}",
+            place=place,
+            hint=f"tell the author of {style}; --debug shows the traceback",
+        )
+        fault.complete = True
+        raise fault from error
+
+
+def _line(error: Exception, code: Any) -> str:
+    """`` (spring.py:28)``: the last line of the style's own file that took part."""
+    frames = traceback.extract_tb(error.__traceback__)
+    try:
+        file = inspect.getsourcefile(code)
+    except TypeError:
+        file = None
+    own = [frame for frame in frames if frame.filename == file] or frames[-1:]
+    return f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""

@@ -1,0 +1,170 @@
+"""Argument lists whose length follows from the dimension, such as those of dimension() and block.
+
+A signature says which kinds of arguments a style takes; which *names* they have in 1D, 2D and 3D
+is said here once, and every error shows the form for the dimension in use.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.script.errors import ScriptError, nearest
+
+# Karamelo's own stand-in for infinity; scripts that write it mean INF.
+_HUGE = 1e20
+
+
+class Forms:
+    """The forms of one argument list, by dimension.
+
+    Parameters
+    ----------
+    pattern
+        How a call is written, with ``{names}`` and perhaps ``{dimension}`` in it.
+    names
+        The names of the arguments for each dimension; dimensions left out have no form.
+    words
+        Arguments that are one of a few words, by name.
+    open_ends
+        What INF and EDGE mean for an argument, by name (-inf for a lower end, inf for an upper).
+    """
+
+    def __init__(
+        self,
+        pattern: str,
+        names: Mapping[int, Sequence[str]],
+        *,
+        words: Mapping[str, Sequence[str]] | None = None,
+        open_ends: Mapping[str, float] | None = None,
+    ):
+        self.pattern = pattern
+        self.names = names
+        self.words = words or {}
+        self.open_ends = open_ends or {}
+
+    def line(self, dimension: int) -> str:
+        """The call as it is written in `dimension`."""
+        names = ", ".join(self.names[dimension])
+        return self.pattern.format(dimension=dimension, names=names)
+
+    def read(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> dict[str, float | str]:
+        """The values of `arguments` by name, for `dimension`.
+
+        Raises
+        ------
+        ScriptError
+            For a dimension without a form, a wrong count, or a value of the wrong kind.
+        """
+        if dimension not in self.names:
+            known = sorted(self.names)
+            raise ScriptError(
+                f"there is no form for {dimension}D",
+                expected=f"a domain with {' or '.join(str(d) for d in known)} dimensions",
+            )
+        names = self.names[dimension]
+        if len(arguments) != len(names):
+            self._refuse_count(arguments, dimension)
+        return {
+            name: self._convert(hub, argument, name, dimension)
+            for name, argument in zip(names, arguments, strict=True)
+        }
+
+    def _refuse_count(self, arguments: Sequence[Any], dimension: int) -> None:
+        names = self.names[dimension]
+        got = len(arguments)
+        missing = names[got:]
+        message = (
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing in {dimension}D"
+            if missing
+            else f"{got - len(names)} argument{'s' if got - len(names) > 1 else ''} too many "
+            f"in {dimension}D"
+        )
+        fitting = [d for d, other in self.names.items() if len(other) == got and d != dimension]
+        raise ScriptError(
+            message,
+            place=None if missing else arguments[len(names)].place,
+            expected=self.line(dimension),
+            hint=f"{got} arguments are the form for {fitting[0]}D" if fitting and got else None,
+        )
+
+    def _convert(self, hub: Scene, argument: Any, name: str, dimension: int) -> float | str:
+        if name in self.words:
+            return self._word(argument, name, dimension)
+        end = self.open_ends.get(name)
+        if end is not None:
+            text = (argument.word() or argument.text).replace(" ", "")
+            if text in ("INF", "EDGE"):
+                return end
+            if text in ("+INF", "-INF"):
+                if (text == "-INF") == (end < 0):
+                    return end
+                raise ScriptError(f"{name} cannot be {text}", place=argument.place, expected="INF")
+        value = number(hub, argument, name, expected=self.line(dimension))
+        if end is not None and abs(value) >= _HUGE and (value < 0) == (end < 0):
+            return end
+        return value
+
+    def _word(self, argument: Any, name: str, dimension: int) -> str:
+        word, known = argument.word(), self.words[name]
+        if word in known:
+            return word
+        close = nearest(word, known) if word else None
+        raise ScriptError(
+            f"{name} must be one of {', '.join(known)}",
+            place=argument.place,
+            expected=self.line(dimension),
+            hint=f"did you mean '{close}'?" if close else None,
+        )
+
+
+def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
+    """The finite, constant number that `argument` stands for.
+
+    A number that is not known before a run has been made is NaN in a rehearsal, and passes.
+
+    Raises
+    ------
+    ScriptError
+        For a text, a formula, NaN or infinity.
+    """
+    value = argument.value(hub)
+    if isinstance(value, str):
+        raise ScriptError(
+            f"{name} must be a number, not the text '{value}'",
+            place=argument.place,
+            expected=expected,
+        )
+    if not isinstance(value, (int, float)):
+        raise ScriptError(
+            f"{name} must be a constant number, not a formula",
+            place=argument.place,
+            expected=expected,
+            hint=f"value({argument.text}) is its present value",
+        )
+    return finite(hub, float(value), name, argument)
+
+
+def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> float:
+    """`value`, unless it is NaN or infinite (NaN passes in a rehearsal).
+
+    Raises
+    ------
+    ScriptError
+        Naming the argument.
+    """
+    if math.isfinite(value) or (math.isnan(value) and hub.rehearsing):
+        return value
+    raise ScriptError(
+        f"{name} must be a finite number, not {value}",
+        place=argument.place if argument is not None else None,
+        argument=None if argument is not None else name,
+    )
+
+
+def place_of(names: Sequence[str], arguments: Sequence[Any], name: str):
+    """Where in the script the argument called `name` stands (None if it was not given)."""
+    index = list(names).index(name)
+    return arguments[index].place if index < len(arguments) else None

@@ -1,0 +1,336 @@
+"""Kinds of arguments: what an annotation asks for, how to say it, how to make it."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import os
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from karamelo_py.language import registry
+from karamelo_py.language.arguments import NULL, NUMBER, Argument
+from karamelo_py.language.scene import Scene
+from karamelo_py.script.errors import Place, ScriptError, nearest
+from karamelo_py.script.expressions import Expression, Formula, Value, number_text
+from karamelo_py.script.functions import WORDS
+
+# Beyond it a number cannot tell one integer from the next.
+_LARGEST_INTEGER = 2**53
+
+# ---- constraints and files ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """What a number has to fulfil: `text` says it, `holds` decides."""
+
+    text: str
+    holds: Callable[[float], bool]
+
+
+Positive = Constraint("above 0", lambda value: value > 0)
+NonNegative = Constraint("of at least 0", lambda value: value >= 0)
+
+
+def AtLeast(least: float) -> Constraint:
+    """A number of at least `least`."""
+    return Constraint(f"of at least {least:g}", lambda value: value >= least)
+
+
+def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
+    """A number between `lo` and `hi`; the ends named by `open` (True: both) are excluded."""
+    above = open in (True, "lo", "both")
+    below = open in (True, "hi", "both")
+
+    def holds(value: float) -> bool:
+        return (value > lo if above else value >= lo) and (value < hi if below else value <= hi)
+
+    text = f"from {lo:g} to {hi:g}"
+    if above and below:
+        text = f"between {lo:g} and {hi:g}, both excluded"
+    elif above or below:
+        text += f", {lo if above else hi:g} excluded"
+    return Constraint(text, holds)
+
+
+class InputFile:
+    """For signatures: a file to read, looked for in the current folder, then beside the script."""
+
+    script_kind = "the name of a file"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Path:
+        """The path of the file."""
+        name = _file_name(argument)
+        folders = [getattr(hub, "folder", Path()), argument._interpreter.folder]
+        for folder in folders:
+            path = folder / name
+            if path.is_file():
+                return path
+        here = folders[-1] / name
+        siblings = [p.name for p in here.parent.iterdir()] if here.parent.is_dir() else []
+        close = nearest(here.name, siblings)
+        what = "is a folder, not a file" if here.is_dir() else "does not exist"
+        raise ScriptError(
+            f"the file {name} {what}",
+            place=argument.place,
+            expected="a file in the current folder or beside the script",
+            hint=f"did you mean {close}?" if close else None,
+        )
+
+
+class OutputFile:
+    """For signatures: a file to write; its folder must exist."""
+
+    script_kind = "the name of a file"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Path:
+        """The path of the file."""
+        name = _file_name(argument)
+        path = getattr(hub, "folder", Path()) / name
+        if not path.parent.is_dir():
+            parent = Path(name).parent
+            raise ScriptError(
+                f"the folder {parent} does not exist",
+                place=argument.place,
+                expected="a file in a folder that exists",
+                hint=f"mkdir {parent}",
+            )
+        if path.is_dir() or name.endswith(("/", "\\")):
+            raise ScriptError(
+                f"{name} is a folder", place=argument.place, expected="the name of a file"
+            )
+        return Path(name)
+
+
+def _file_name(argument: Argument) -> str:
+    name = argument.words()
+    if not name.strip() or "\0" in name or name == NULL:
+        raise ScriptError(
+            "a file name is missing", place=argument.place, expected="the name of a file"
+        )
+    return os.path.expanduser(name)
+
+
+# ---- conversion ---------------------------------------------------------------------------------
+
+
+class Unfit(Exception):
+    """An argument is of another kind; `got` says what it is."""
+
+    def __init__(self, got: str, place: Place | None = None, hint: str | None = None):
+        super().__init__(got)
+        self.got = got
+        self.place = place
+        self.hint = hint
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What an argument has to be: said in words, and how to make it from an argument.
+
+    `words` are the only ones that fit, where there are such; `family` is that of styles that it
+    names.
+    """
+
+    text: str
+    convert: Callable[[Any, Argument], Any]
+    words: tuple[str, ...] = ()
+    nullable: bool = False
+    family: str | None = None
+
+
+def _shown(value: Value) -> str:
+    if isinstance(value, str):
+        return f"the text '{value}'"
+    if isinstance(value, Formula):
+        return f"the formula {value.text}"
+    return number_text(value)
+
+
+def _to_number(hub: Any, argument: Argument) -> float:
+    if argument.is_null:
+        raise Unfit(NULL)
+    if argument.text.lstrip("+-") in WORDS and argument.text not in argument._interpreter.variables:
+        raise Unfit(argument.text)
+    value = argument.value(hub)
+    if isinstance(value, Formula):
+        raise Unfit(
+            f"a formula of {', '.join(sorted(value.names))}",
+            hint=f"value({argument.text}) is its present value",
+        )
+    if isinstance(value, str):
+        raise Unfit(_shown(value))
+    if math.isnan(value) and not getattr(hub, "rehearsing", False):
+        raise Unfit("NaN, which is not a number")
+    return value
+
+
+def _to_integer(hub: Any, argument: Argument) -> int:
+    value = _to_number(hub, argument)
+    if math.isnan(value):
+        return 1  # A result that a rehearsal does not have; 1 passes every check.
+    if math.isinf(value) or value != math.floor(value):
+        raise Unfit(number_text(value))
+    if abs(value) > _LARGEST_INTEGER:
+        raise Unfit(f"{number_text(value)}, which is too large")
+    return int(value)
+
+
+def _to_text(hub: Any, argument: Argument) -> str:
+    if argument.is_null:
+        raise Unfit(NULL)
+    word = argument.words()
+    if word == argument.text:
+        if NUMBER.fullmatch(word):
+            raise Unfit(f"the number {word}", hint=f"begin it with a letter, such as n{word}")
+        if re.search(r"[(),=]", word):
+            raise Unfit(word, hint="a word with such signs needs quotes")
+    if not word:
+        raise Unfit("an empty text")
+    return word
+
+
+@dataclass(frozen=True)
+class StyleOf:
+    """Annotation of a word that names a style: the name of one wins over a variable."""
+
+    family: str
+    script_kind = "a word"
+
+    def from_script(self, hub: Any, argument: Argument) -> str:
+        """The name as it stands, or what a text variable of another name holds."""
+        if registry.knows(self.family, argument.text):
+            return argument.text
+        joined = "-".join(argument.text.split())
+        if registry.knows(self.family, joined):
+            raise Unfit(f"'{argument.text}'", hint=f"did you mean '{joined}'?")
+        return _to_text(hub, argument)
+
+
+def _to_expression(hub: Any, argument: Argument) -> Expression:
+    if argument.is_null:
+        raise Unfit(NULL)
+    value = argument.value(hub)
+    if isinstance(value, str):
+        raise Unfit(_shown(value))
+    return Expression(value)
+
+
+def _of_words(words: tuple[str, ...]) -> Callable[[Any, Argument], str]:
+    def convert(hub: Any, argument: Argument) -> str:
+        word = argument.words(words)
+        if word not in words:
+            close = nearest(word, words)
+            raise Unfit(
+                f"'{word}'" if word != NULL else NULL,
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+        return word
+
+    return convert
+
+
+_SIMPLE = {
+    float: Kind("a number", _to_number),
+    int: Kind("a whole number", _to_integer),
+    str: Kind("a word", _to_text),
+    bool: Kind(
+        "true or false",
+        lambda hub, argument: _of_words(("true", "false"))(hub, argument) == "true",
+        words=("true", "false"),
+    ),
+    Expression: Kind("a number or a formula", _to_expression),
+    Argument: Kind("anything", lambda hub, argument: argument),
+    Any: Kind("anything", lambda hub, argument: argument),
+    inspect.Parameter.empty: Kind("anything", lambda hub, argument: argument),
+}
+
+
+def kind_of(annotation: Any) -> Kind:
+    """What an annotation asks for.
+
+    Raises
+    ------
+    TypeError
+        If the annotation is none of those that are understood.
+    """
+    if annotation in (None, NoneType):
+        return Kind(NULL, lambda hub, argument: None, nullable=True)
+    if get_origin(annotation) is Annotated:
+        base, *constraints = get_args(annotation)
+        return _constrained(kind_of(base), [c for c in constraints if isinstance(c, Constraint)])
+    if get_origin(annotation) is Literal:
+        words = tuple(str(word) for word in get_args(annotation))
+        text = f"the word {words[0]}" if len(words) == 1 else f"one of {', '.join(words)}"
+        return Kind(text, _of_words(words), words)
+    if get_origin(annotation) in (Union, UnionType):
+        return _union([kind_of(member) for member in get_args(annotation)])
+    try:
+        return _SIMPLE[annotation]
+    except (KeyError, TypeError):
+        pass
+    if hasattr(annotation, "from_script"):
+        family = getattr(annotation, "family", None)
+        return Kind(_class_kind(annotation), annotation.from_script, family=family)
+    raise TypeError(f"a signature cannot have the annotation {annotation!r}")
+
+
+def is_raw(kind: Kind) -> bool:
+    """Whether arguments of this kind are left to the callee as they are."""
+    return kind is _SIMPLE[Argument]
+
+
+def _class_kind(cls: type) -> str:
+    if hasattr(cls, "script_kind"):
+        return cls.script_kind
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", cls.__name__).lower()
+    if words in ("any group", "group"):
+        words = "group"
+    return f"the ID of a {words}" if words != "quantity" else "a quantity"
+
+
+def _constrained(kind: Kind, constraints: list[Constraint]) -> Kind:
+    def convert(hub: Any, argument: Argument) -> Any:
+        value = kind.convert(hub, argument)
+        number = value.constant if isinstance(value, Expression) and value.is_constant else value
+        if isinstance(number, (int, float)) and not math.isnan(number):
+            for constraint in constraints:
+                if not constraint.holds(number):
+                    raise Unfit(number_text(number))
+        return value
+
+    text = " ".join([kind.text, *(constraint.text for constraint in constraints)])
+    return Kind(text, convert, kind.words, kind.nullable)
+
+
+def _union(kinds: list[Kind]) -> Kind:
+    nullable = any(kind.nullable for kind in kinds)
+    words = tuple(word for kind in kinds for word in kind.words)
+    # Words first: a literal word that is known wins over a variable of that name.
+    others = [kind for kind in kinds if not kind.words and kind.text != NULL]
+    choosers = [kind for kind in kinds if kind.words]
+
+    def convert(hub: Any, argument: Argument) -> Any:
+        if nullable and argument.is_null:
+            return None
+        last: Exception | None = None
+        for kind in choosers:
+            try:
+                return kind.convert(hub, argument)
+            except (Unfit, ScriptError) as error:
+                last = error
+        for kind in others:
+            try:
+                return kind.convert(hub, argument)
+            except (Unfit, ScriptError) as error:
+                last = error
+        raise last or Unfit(argument.text)
+
+    return Kind(" or ".join(kind.text for kind in kinds), convert, words, nullable)

@@ -1,0 +1,138 @@
+"""Families of commands and styles: built-in ones are listed in styles.toml, others by packages.
+
+A package offers a style with a line in its pyproject.toml, for example::
+
+    [project.entry-points."karamelo_py.fix"]
+    gravity = "my_package:Gravity"
+
+Nothing is imported before it is used.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
+
+from karamelo_py import __version__
+from karamelo_py.script.elsewhere import instead
+from karamelo_py.script.errors import ScriptError, nearest
+
+PREFIX = "karamelo_py."
+BUILT_IN = Path(__file__).parents[1] / "styles.toml"
+
+_loaded: dict[tuple[str, str], Any] = {}
+
+
+@cache
+def _families() -> dict[str, dict[str, list[EntryPoint]]]:
+    """Family -> name -> entry points (more than one where packages clash)."""
+    table = {
+        family: {name: [EntryPoint(name, PREFIX + at, PREFIX + family)] for name, at in one.items()}
+        for family, one in tomllib.loads(BUILT_IN.read_text(encoding="utf-8")).items()
+    }
+    everything = entry_points()
+    for group in sorted(everything.groups):
+        if not group.startswith(PREFIX):
+            continue
+        styles = table.setdefault(group.removeprefix(PREFIX), {})
+        for entry in everything.select(group=group):
+            if entry.value.startswith(PREFIX):
+                continue  # of an installation from when built-in styles were entry points
+            known = styles.setdefault(entry.name, [])
+            if (entry.value, _origin(entry)) not in [(e.value, _origin(e)) for e in known]:
+                known.append(entry)
+    return table
+
+
+def _origin(entry: EntryPoint) -> str:
+    dist = entry.dist
+    if dist is not None:
+        return f"{dist.name} {dist.version}"
+    built_in = entry.value.startswith(PREFIX)
+    return f"karamelo-py {__version__}" if built_in else "an unknown package"
+
+
+def families() -> list[str]:
+    """Names of all families of words for scripts, such as command, fix, region."""
+    return [family for family in _families() if family != "engine"]
+
+
+def names(family: str) -> list[str]:
+    """Names of all styles of `family`, sorted."""
+    return sorted(_families().get(family, {}), key=lambda name: (name.lower(), name))
+
+
+def knows(family: str, name: str) -> bool:
+    """Whether `family` has a style of this name (which may still be broken)."""
+    return name in _families().get(family, {})
+
+
+def name_of(family: str, style: type) -> str:
+    """What a script calls a class; the name of the class where it calls it nothing."""
+    value = f"{style.__module__}:{style.__qualname__}"
+    for name, entries in _families().get(family, {}).items():
+        if any(entry.value == value for entry in entries):
+            return name
+    return style.__name__
+
+
+def origin(family: str, name: str) -> str:
+    """The package that offers a style, with its version."""
+    return " and ".join(_origin(entry) for entry in _entries(family, name))
+
+
+def find(family: str, name: str) -> Any:
+    """The class or function behind a style; imported when it is first asked for.
+
+    Raises
+    ------
+    ScriptError
+        If there is no such style, it cannot be imported, or two packages offer it.
+    """
+    key = family, name
+    if key not in _loaded:
+        entries = _entries(family, name)
+        if len(entries) > 1:
+            packages = " and ".join(_origin(entry) for entry in entries)
+            raise ScriptError(
+                f"{family} '{name}' is offered by two packages: {packages}",
+                expected="one package for each style",
+                hint="uninstall one of them (pip uninstall ...)",
+            )
+        (entry,) = entries
+        try:
+            _loaded[key] = entry.load()
+        except ScriptError:
+            raise
+        except Exception as error:  # A plug-in may fail in any way.
+            raise ScriptError(
+                f"{family} '{name}' of {_origin(entry)} cannot be loaded: "
+                f"{type(error).__name__}: {error}",
+                hint=f"reinstall or repair {_origin(entry).split()[0]}; it names {entry.value}",
+            ) from error
+    return _loaded[key]
+
+
+def _entries(family: str, name: str) -> list[EntryPoint]:
+    styles = _families().get(family, {})
+    if name in styles:
+        return styles[name]
+    close = nearest(name, styles)
+    hint = instead(family, name) or (f"did you mean '{close}'?" if close else None)
+    others = [other for other in families() if other != "command" and knows(other, name)]
+    if hint is None and others:
+        hint = f"'{name}' is a style of {' and of '.join(others)}"
+    raise ScriptError(
+        f"unknown {family if family == 'command' else family + ' style'} '{name}'",
+        expected="one of " + ", ".join(names(family)) if styles else f"no {family} is installed",
+        hint=hint,
+    )
+
+
+def forget() -> None:
+    """Look for packages anew (tests install and remove them)."""
+    _families.cache_clear()
+    _loaded.clear()

@@ -1,0 +1,49 @@
+"""What parts below the hub may ask of the scene that they belong to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Protocol
+
+
+class Scene(Protocol):
+    """The hub, as parts see it that the hub itself is made of (:mod:`karamelo_py.scene.hub`)."""
+
+    console: Any
+    settings: Any
+    folder: Path
+    place: Any
+    rehearsing: bool
+    checking: bool
+    interpreter: Any
+    domain: Any
+    regions: Any
+    materials: Any
+    solids: Any
+    groups: Any
+    fixes: Any
+    computes: Any
+    dumps: Any
+    values: Any
+    update: Any
+    output: Any
+    fields: Any
+
+    @property
+    def simulation(self) -> Any:
+        """The arrays of the scene as it is now."""
+
+    @property
+    def lattices(self) -> list:
+        """The grids of the scene."""
+
+    def refresh_values(self) -> None:
+        """Let computes and fixes measure the present state."""
+
+    def warn(
+        self, message: str, place: Any = None, hint: str | None = None, expected: str | None = None
+    ) -> None:
+        """Tell the user of something that may not be meant."""
+
+    def rehearse(self) -> None:
+        """Try the rest of the script, once, before the first work that takes time."""

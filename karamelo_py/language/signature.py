@@ -1,0 +1,388 @@
+"""The signature is the syntax: from a script's arguments to a Python call, and to help about it.
+
+Commands are functions and styles are classes; the first parameter is the hub, the others say by
+their annotations what a script has to give::
+
+    class Gravity(Fix):
+        def __init__(self, hub, group: NodeGroup, g: Annotated[float, Positive] = 9.81):
+
+Annotations that are understood: float, int, bool, str, Literal words, Expression, InputFile,
+OutputFile, Argument (left to the callee), any class with a classmethod
+``from_script(cls, hub, argument)``, and unions of these, where None is the word NULL. Constraints
+are added with Annotated. ``*args`` take any number, keyword-only parameters are given as
+``name=value``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from karamelo_py.language import docstrings, registry
+from karamelo_py.language.arguments import NULL, Argument
+from karamelo_py.language.docstrings import documented
+from karamelo_py.language.faults import told
+from karamelo_py.language.kinds import (
+    AtLeast,
+    Constraint,
+    In,
+    InputFile,
+    Kind,
+    NonNegative,
+    OutputFile,
+    Positive,
+    Unfit,
+    is_raw,
+    kind_of,
+)
+from karamelo_py.script.errors import Place, ScriptError, nearest
+
+__all__ = [
+    "Argument",
+    "AtLeast",
+    "Constraint",
+    "Help",
+    "In",
+    "InputFile",
+    "NonNegative",
+    "OutputFile",
+    "Parameter",
+    "Positive",
+    "call",
+    "describe",
+    "documented",
+    "kind_of",
+    "parameters",
+    "syntax",
+]
+
+# Two words with nothing but blanks between them.
+_GAP = re.compile(r'[\w)"]\s+["\w.]')
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a command or style, as a script sees it."""
+
+    name: str
+    kind: Kind
+    variadic: bool = False
+    keyword: bool = False
+    optional: bool = False
+    default: Any = None
+    description: str = ""
+
+    @property
+    def shown(self) -> str:
+        """How it appears in a line of syntax."""
+        if self.keyword:
+            return f"{self.name}={'|'.join(self.kind.words) or self.name}"
+        if len(self.kind.words) == 1:
+            return self.kind.words[0]
+        if self.kind.words and self.kind.text.startswith("one of "):
+            return "|".join(self.kind.words)
+        return self.name
+
+
+_signatures: dict[Any, list[Parameter]] = {}
+
+
+def parameters(target: Callable) -> list[Parameter]:
+    """The parameters of a command or style, without the hub.
+
+    Raises
+    ------
+    TypeError
+        If the signature cannot be understood (a fault of whoever wrote it).
+    """
+    if target not in _signatures:
+        function = target.__init__ if inspect.isclass(target) else target
+        function = inspect.unwrap(function)
+        found = list(inspect.signature(function).parameters.values())
+        skipped = 2 if inspect.isclass(target) else 1  # self and hub
+        _signatures[target] = [_parameter(p, function) for p in found[skipped:]]
+    return _signatures[target]
+
+
+def _parameter(parameter: inspect.Parameter, function: Any) -> Parameter:
+    annotation = parameter.annotation
+    if isinstance(annotation, str):
+        # One by one: types that are imported for checking only may stand elsewhere.
+        try:
+            annotation = eval(annotation, function.__globals__)
+        except Exception as error:
+            raise TypeError(
+                f"the annotation {annotation!r} of {parameter.name} cannot be evaluated ({error}); "
+                "import it outside of TYPE_CHECKING"
+            ) from error
+    optional = parameter.default is not parameter.empty
+    return Parameter(
+        parameter.name,
+        kind_of(annotation),
+        variadic=parameter.kind is parameter.VAR_POSITIONAL,
+        keyword=parameter.kind is parameter.KEYWORD_ONLY,
+        optional=optional,
+        default=parameter.default if optional else None,
+    )
+
+
+def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -> Any:
+    """Call a command or make a style with a script's arguments.
+
+    Parameters
+    ----------
+    target
+        Function or class.
+    hub
+        Its first argument.
+    arguments
+        What the script gives.
+    name
+        What the user calls it: ``run`` or ``fix body_force``.
+
+    Raises
+    ------
+    ScriptError
+        For a wrong count or kind, and whatever the target raises; with a place in the script.
+    """
+    try:
+        expected = parameters(target)
+    except TypeError as error:
+        raise ScriptError(f"{name} is broken: {error}") from error
+    bound: dict[str, list[Argument]] = {}
+    try:
+        positional, keywords = _bind(target, expected, arguments, name, bound)
+        values, named = [], {}
+        for number, (parameter, argument) in enumerate(positional, 1):
+            values.append(_convert(hub, parameter, argument, number))
+        for parameter, argument in keywords:
+            named[parameter.name] = _convert(hub, parameter, argument, None)
+        try:
+            if not inspect.isclass(target):
+                return target(hub, *values, **named)
+            with told(name, "__init__", target, getattr(hub, "place", None)):
+                return target(hub, *values, **named)
+        except OSError as error:
+            what = f"{error.filename}: " if error.filename else ""
+            raise ScriptError(f"{what}{error.strerror or error}") from error
+        except OverflowError as error:
+            raise ScriptError(
+                "a number is too large for what is done with it",
+                expected="numbers in proportion to each other",
+            ) from error
+        except MemoryError as error:
+            raise ScriptError(
+                "there is not enough memory for this", hint="use larger cells or fewer points"
+            ) from error
+    except ScriptError as error:
+        if not error.complete:
+            error.place = error.place or _guilty(error, arguments, bound)
+            error.command = error.command or name
+        raise
+
+
+def _bind(
+    target: Callable,
+    expected: list[Parameter],
+    arguments: Sequence[Argument],
+    name: str,
+    bound: dict[str, list[Argument]],
+) -> tuple[list[tuple[Parameter, Argument]], list[tuple[Parameter, Argument]]]:
+    """Pair arguments with parameters by position, and by name where a name is given."""
+    by_name = {p.name: p for p in expected if p.keyword}
+    slots = [p for p in expected if not p.keyword]
+    variadic = next((p for p in slots if p.variadic), None)
+    positional: list[tuple[Parameter, Argument]] = []
+    keywords: list[tuple[Parameter, Argument]] = []
+    given = []
+    variadic = next((p for p in slots if p.variadic), None)
+    for argument in arguments:
+        pair = argument.keyword()
+        # Raw arguments are passed on to a style, which knows the names.
+        passed_on = variadic is not None and is_raw(variadic.kind)
+        if pair is None or (passed_on and pair[0] not in by_name):
+            given.append(argument)
+            continue
+        word, value = pair
+        if word not in by_name:
+            if variadic is not None and is_raw(variadic.kind):
+                # For the style that the command passes its arguments on to.
+                given.append(argument)
+                continue
+            raise _unknown_keyword(word, argument, expected, by_name)
+        if word in bound:
+            raise ScriptError(f"{word} is given twice", place=argument.place)
+        bound[word] = [value]
+        keywords.append((by_name[word], value))
+    needed = sum(1 for p in slots if not p.optional and not p.variadic)
+    missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
+    if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
+        surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
+        gap = next((argument for argument in given if _GAP.search(argument.text)), None)
+        missing = [p.shown for p in slots[len(given) : needed]] or [f"{m}=..." for m in missing]
+        raise ScriptError(
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+            if missing
+            else "one argument too many"
+            if len(given) == len(slots) + 1
+            else f"{len(given) - len(slots)} arguments too many",
+            place=gap.place if gap else surplus.place if surplus else None,
+            expected=syntax(target, name),
+            hint=f"is a comma missing in '{gap.text}'?" if gap else None,
+        )
+    for k, argument in enumerate(given):
+        parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic
+        assert parameter is not None
+        positional.append((parameter, argument))
+        bound.setdefault(parameter.name, []).append(argument)
+    return positional, keywords
+
+
+def _unknown_keyword(
+    word: str, argument: Argument, expected: list[Parameter], by_name: dict
+) -> ScriptError:
+    close = nearest(word, by_name)
+    if any(p.name == word for p in expected):
+        hint: str | None = f"arguments are given by position: leave out '{word} ='"
+    else:
+        hint = f"did you mean '{close}'?" if close else f"leave out '{word} ='; == compares"
+    known = ", ".join(f"{name}=..." for name in by_name)
+    return ScriptError(
+        f"there is no argument to be given as '{word} = ...'",
+        place=argument.place,
+        expected=known or "arguments in their order, without names",
+        hint=hint,
+    )
+
+
+def _convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None) -> Any:
+    if argument.is_null and not parameter.kind.nullable and not is_raw(parameter.kind):
+        raise _misfit(parameter, argument, number, Unfit(NULL))
+    try:
+        return parameter.kind.convert(hub, argument)
+    except Unfit as unfit:
+        raise _misfit(parameter, argument, number, unfit) from None
+    except ScriptError as error:
+        error.place = error.place or argument.place
+        error.expected = error.expected or f"{parameter.name}: {parameter.kind.text}"
+        raise
+
+
+def _misfit(
+    parameter: Parameter, argument: Argument, number: int | None, unfit: Unfit
+) -> ScriptError:
+    which = f"argument {number} '{parameter.name}'" if number else f"'{parameter.name}'"
+    return ScriptError(
+        f"{which} must be {parameter.kind.text}, not {unfit.got}",
+        place=unfit.place or argument.place,
+        expected=parameter.kind.text,
+        hint=unfit.hint,
+    )
+
+
+def _guilty(
+    error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
+) -> Place | None:
+    """The place of the argument that an error names, or else of the word it quotes."""
+    if isinstance(error.argument, int) and 0 <= error.argument < len(arguments):
+        return arguments[error.argument].place
+    if isinstance(error.argument, str) and bound.get(error.argument):
+        return bound[error.argument][0].place
+    for word in re.findall(r"'([^']+)'", error.message):
+        for argument in arguments:
+            if argument.text in (word, f'"{word}"'):
+                return argument.place
+    return None
+
+
+def _joined(expected: list[Parameter]) -> str:
+    """``a, b[, c[, d]][, e=...]``: arguments as they are written."""
+    text, open_brackets = "", 0
+    for parameter in expected:
+        comma = ", " if text else ""
+        shown = comma + parameter.shown + (", ..." if parameter.variadic else "")
+        if parameter.keyword:
+            text += "]" * open_brackets + (f"[{shown}]" if parameter.optional else shown)
+            open_brackets = 0
+        elif parameter.optional or parameter.variadic:
+            text += f"[{shown}"
+            open_brackets += 1
+        else:
+            text += shown
+    return text + "]" * open_brackets
+
+
+def _arguments(target: Callable) -> str:
+    """The arguments as they are written: the target's own `syntax`, or from its signature."""
+    own = getattr(target, "syntax", None)
+    return own if isinstance(own, str) else _joined(parameters(target))
+
+
+def syntax(target: Callable, name: str) -> str:
+    """The line that shows how a command or style is called."""
+    own = _arguments(target)
+    family, _, style = name.partition(" ")
+    if not style:
+        return f"{name}({own})"
+    before = []
+    if registry.knows("command", family):
+        outer = [p for p in parameters(registry.find("command", family)) if not p.variadic]
+        # The last of the command's own arguments is the one that names the style.
+        before = [p.shown for p in outer[:-1] if not p.keyword]
+    if own.startswith("["):
+        own = own.replace("[", "[, ", 1)
+    elif own:
+        own = ", " + own
+    return f"{family}({', '.join([*before, style])}{own})"
+
+
+# ---- help ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Help:
+    """What there is to say about a command or style.
+
+    Attributes
+    ----------
+    syntax
+        How it is called.
+    summary, text
+        First line and the rest of the docstring's head.
+    parameters
+        With kinds, defaults and descriptions.
+    sections
+        The other sections of the docstring: Example, Notes, See Also.
+    """
+
+    name: str
+    syntax: str
+    summary: str
+    text: str
+    parameters: list[Parameter]
+    sections: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def example(self) -> str:
+        """Lines of script."""
+        return self.sections.get("Example", "")
+
+
+def describe(target: Callable, name: str) -> Help:
+    """Help about a command or style, from its signature and its docstring."""
+    doc = inspect.cleandoc(target.__doc__ or "")
+    if inspect.isclass(target) and "Parameters\n---" not in doc and target.__init__.__doc__:
+        doc = doc + "\n\n" + inspect.cleandoc(target.__init__.__doc__)
+    head, sections = docstrings.sections(doc)
+    summary, _, text = head.partition("\n\n")
+    descriptions = docstrings.descriptions(sections.pop("Parameters", ""))
+    described = [
+        Parameter(**{**vars(p), "description": descriptions.get(p.name, "")})
+        for p in parameters(target)
+    ]
+    return Help(
+        name, syntax(target, name), " ".join(summary.split()), text.strip(), described, sections
+    )

@@ -1,0 +1,311 @@
+"""Fields of points and nodes for output, in the order of their ids."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import SUPPLY
+from karamelo_py.kernels.export import (
+    ENERGY,
+    EXPORTED,
+    JACOBIAN,
+    STRAIN,
+    Damage,
+    DamageInitiation,
+    DissipatedEnergy,
+    PlasticStrain,
+    StoredEnergy,
+    Temperature,
+    export,
+    export_state,
+    export_velocity_moment,
+)
+from karamelo_py.kernels.laws import can
+from karamelo_py.language.scene import Scene
+from karamelo_py.points.laws import dissipated_energy, energy_density, plastic_strain
+from karamelo_py.points.laws.damages import damage_begun
+from karamelo_py.points.laws.temperatures import initial_heat
+
+AXES = "xyz"
+COMPONENTS = ("11", "22", "33", "12", "13", "23")
+PARTICLE_NAMES = (
+    ["id", "type"]
+    + list(AXES)
+    + [axis + "0" for axis in AXES]
+    + ["v" + axis for axis in AXES]
+    + ["s" + c for c in COMPONENTS]
+    + ["e" + c for c in COMPONENTS]
+    + ["seq", "volume", "mass", "damage", "damage_init", "bx", "by", "bz", "ep", "epdot"]
+    + ["T", "ienergy", "gamma"]
+)
+NODE_NAMES = (
+    ["id", "type"]
+    + list(AXES)
+    + ["v" + axis for axis in AXES]
+    + ["v" + axis + "_update" for axis in AXES]
+    + ["f" + axis for axis in AXES]
+    + ["mass", "mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez"]
+)
+
+
+# Columns of Karamelo that are zero here: nothing keeps them apart, or only some materials do.
+ABSENT_AT_POINTS = (
+    "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
+)  # fmt: skip
+
+# What only some materials have: the number, and the function that shows that a law has it.
+OF_SOME = {
+    "ep": (PlasticStrain(), plastic_strain),
+    "damage": (Damage(), damage_begun),
+    "damage_init": (DamageInitiation(), damage_begun),
+    "T": (Temperature(), initial_heat),
+}
+ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez")
+
+
+class Fields:
+    """Named fields of the running scene; arrays are copies that are safe to keep.
+
+    N counts all points there have ever been: deleted ones (boundary delete) have zeros. `members`
+    and `particle` leave them out.
+    """
+
+    def __init__(self, hub: Scene):
+        self.hub = hub
+        self._key: Any = None
+        self._cache: dict[str, Any] = {}
+
+    @property
+    def _simulation(self):
+        """The simulation; the cache of derived fields is forgotten when it has gone on."""
+        simulation = self.hub.simulation
+        key = (id(simulation), simulation.step, simulation.version)
+        if key != self._key:
+            self._key = key
+            self._cache.clear()
+        return simulation
+
+    def _cached(self, name: str, make) -> Any:
+        simulation = self._simulation
+        if name not in self._cache:
+            self._cache[name] = make(simulation)
+        return self._cache[name]
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return self._simulation.count
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes."""
+        return sum(lattice.node_count for lattice in self.hub.lattices)
+
+    @property
+    def position(self) -> np.ndarray:
+        """(N, d) positions."""
+        return self._cached("x", lambda s: s.x)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(N, d) velocities."""
+        return self._cached("v", lambda s: s.v)
+
+    @property
+    def mass(self) -> np.ndarray:
+        """(N,) masses."""
+        return self._cached("mass", lambda s: s.mass)
+
+    @property
+    def reference_position(self) -> np.ndarray:
+        """(N, d) positions before the first step."""
+        return self._simulation.x0
+
+    @property
+    def reference_volume(self) -> np.ndarray:
+        """(N,) volumes before the first step."""
+        return np.concatenate([s.volume0 for s in self.hub.solids.values()])
+
+    @property
+    def velocity_moment(self) -> np.ndarray | None:
+        """(N, d d) moment of velocity, sum N v (X - x), of transfers that keep it, or None."""
+        simulation = self._simulation
+        if simulation.setup.blocks[0].points.moment is None:
+            return None
+        return simulation.by_id(self._velocity_moment)
+
+    def _velocity_moment(self, block: Any) -> np.ndarray:
+        s = self._simulation.setup
+        kept = block.points.moment
+        if not getattr(s.transfer, "keeps_gradient", False):
+            return kept
+        where = block.x[self._simulation.now] if block.home is None else block.home
+        moment = np.zeros_like(kept)
+        export_velocity_moment(s.basis, s.kin, s.grids, block.grid, where, kept, moment)
+        return moment
+
+    @property
+    def has_point_forces(self) -> bool:
+        """Whether a fix puts forces on points."""
+        return self._simulation.setup.blocks[0].points.force is not None
+
+    def members(self, group: Any) -> np.ndarray:
+        """Ids (0-based) of a particle group."""
+        return self._simulation.members(group)
+
+    def kinetic_energy(self, group: Any) -> float:
+        """sum m v^2 / 2 of a particle group."""
+        v, mass = self.velocity.astype(float), self.mass.astype(float)
+        energy = 0.5 * mass * np.einsum("ij,ij->i", v, v)
+        return float(energy.sum() if group.all else energy[group.ids].sum())
+
+    def strain_energy(self, group: Any) -> float:
+        """Stored energy of a particle group."""
+        return self._energy(group, StoredEnergy(), energy_density)
+
+    def dissipated_energy(self, group: Any) -> float:
+        """Dissipated energy of a particle group."""
+        return self._energy(group, DissipatedEnergy(), dissipated_energy)
+
+    def _energy(self, group: Any, what: Any, function: Any) -> float:
+        energy = self._cached(type(what).__name__, lambda s: _measured(s, what, function))
+        return float(energy.sum() if group.all else energy[group.ids].sum())
+
+    def particle_names(self) -> list[str]:
+        """Names that `particle` knows."""
+        return list(PARTICLE_NAMES)
+
+    def node_names(self) -> list[str]:
+        """Names that `node` knows."""
+        return list(NODE_NAMES)
+
+    def absent_at_points(self) -> list[str]:
+        """Names that `particle` knows, but that are 0 because no material has them."""
+        laws = [material.law for material in self.hub.materials.values()]
+        present = {name for name, (_, has) in OF_SOME.items() if any(can(law, has) for law in laws)}
+        if self.hub.update.thermal:
+            present.add("gamma")
+        return [name for name in ABSENT_AT_POINTS if name not in present]
+
+    def absent_at_nodes(self) -> list[str]:
+        """Names that `node` knows, but that are 0 in this scene."""
+        present = {"T"} if self.hub.update.thermal else set()
+        return [name for name in ABSENT_AT_NODES if name not in present]
+
+    def particle(self, name: str) -> np.ndarray:
+        """A field of the points that there are, (n,), by id.
+
+        What the scene does not have is zero, as in Karamelo. Deleted points are left out.
+        """
+        values = self._particle(name)
+        present = self._simulation.present
+        return values if present.all() else values[present]
+
+    def _particle(self, name: str) -> np.ndarray:
+        simulation = self._simulation
+        if name == "id":
+            return np.arange(1, simulation.count + 1)
+        if name == "type":
+            return simulation.solid_of + 1
+        if name in AXES:
+            return _column(self.position, AXES.index(name))
+        if name[:1] in AXES and name[1:] == "0":
+            return _column(self.reference_position, AXES.index(name[0]))
+        if name in ("vx", "vy", "vz"):
+            return _column(self.velocity, AXES.index(name[1]))
+        if name == "mass":
+            return self.mass.astype(float)
+        if name == "volume":
+            return self.reference_volume * self._exported[:, JACOBIAN]
+        if name == "ienergy":
+            return self._exported[:, ENERGY].copy()
+        if name in OF_SOME:
+            return self._cached(name, lambda s: _measured(s, *OF_SOME[name])).copy()
+        if name == "seq":
+            return _von_mises(self._exported[:, :STRAIN])
+        if name[:1] in "se" and name[1:] in COMPONENTS:
+            first = 0 if name[0] == "s" else STRAIN
+            return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
+        if name in ("bx", "by", "bz") and self.has_point_forces:
+            return _column(simulation.by_id(lambda b: b.points.force), AXES.index(name[1]))
+        if name == "gamma" and self.hub.update.thermal:
+            return _column(simulation.by_id(lambda b: b.points.heat), SUPPLY)
+        return np.zeros(simulation.count)
+
+    def node(self, name: str) -> np.ndarray:
+        """A field of all nodes, (n,); nodes without mass are at rest."""
+        self._simulation.show_on_nodes()
+        nodes = self._simulation.setup.nodes
+        d = self.hub.domain.dimension
+        mass = nodes.sums[:, 0].astype(float)
+        if name == "id":
+            return np.arange(self.node_count)
+        if name == "type":
+            counts = [lattice.node_count for lattice in self.hub.lattices]
+            return np.repeat(np.arange(1, 1 + len(counts)), counts)
+        if name in AXES:
+            axis = AXES.index(name)
+            return np.concatenate([lattice.positions()[:, axis] for lattice in self.hub.lattices])
+        if name == "mass":
+            return mass
+        if name == "T" and self.hub.update.thermal:
+            heat = self._simulation.setup.heat.nodes
+            return np.where(heat.sums[:, 0] > 0, heat.velocity[:, 0], 0.0)
+        if name in ABSENT_AT_NODES:
+            return np.zeros(self.node_count)
+        axis = AXES.index(name[1])
+        if axis >= d:
+            return np.zeros(self.node_count)
+        field = {
+            "v": nodes.velocity[:, axis],
+            "u": nodes.update[:, axis],
+            "f": nodes.sums[:, 1 + d + axis],
+        }["u" if name.endswith("_update") else name[0]]
+        return np.where(mass > 0, field, 0.0)
+
+    @property
+    def _exported(self) -> np.ndarray:
+        return self._cached("exported", _exported_state)
+
+
+def _of_points(
+    simulation: Any, fill: Callable, *columns: int, has: Callable = lambda laws: True
+) -> np.ndarray:
+    """What `fill(kin, like, points, laws, rows)` says of all points, by id, (N, *columns).
+
+    Points are left at 0 where the scene's laws do not have it.
+    """
+    s = simulation.setup
+    out = np.zeros((simulation.count, *columns))
+    for block in s.blocks:
+        if has(block.laws):
+            rows = np.zeros((len(block.id), *columns))
+            fill(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
+            out[block.id] = rows
+    return out
+
+
+def _exported_state(simulation: Any) -> np.ndarray:
+    # A kinematics fills its own components: in the plane the fourth is 12, as in space.
+    return _of_points(simulation, export_state, EXPORTED)
+
+
+def _measured(simulation: Any, what: Any, function: Any) -> np.ndarray:
+    """A number of all points (`kernels.export.measured`)."""
+    return _of_points(simulation, partial(export, what), has=lambda laws: can(laws, function))
+
+
+def _column(field: np.ndarray, k: int) -> np.ndarray:
+    if k >= field.shape[1]:
+        return np.zeros(len(field))
+    return field[:, k].astype(float)
+
+
+def _von_mises(s: np.ndarray) -> np.ndarray:
+    xx, yy, zz, xy, xz, yz = s.T
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return np.sqrt(0.5 * normal + 3 * (xy**2 + xz**2 + yz**2))

@@ -1,0 +1,101 @@
+"""The log: one line of numbers per output, in log.mpm and on the terminal."""
+
+from __future__ import annotations
+
+from typing import TextIO
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.output.quantity import Quantity
+from karamelo_py.script.errors import ScriptError
+
+FILE = "log.mpm"
+STEP_WIDTH = 10
+# Sign, ten digits, point and exponent: "-1.234567891e-05" has 16 characters.
+NUMBER_WIDTH = 16
+
+
+class Log:
+    """The table of logged quantities.
+
+    The file has one header line and one row per output. Columns are separated by spaces and begin
+    at the margin, so that ``numpy.loadtxt("log.mpm", skiprows=1)`` and
+    ``pandas.read_csv("log.mpm", sep=r"\\s+")`` both read it. A further run goes on in the same
+    table; if the columns have changed, a comment line starting with ``#`` names the new ones.
+    """
+
+    def __init__(self, hub: Scene):
+        self.hub = hub
+        self.every = 1
+        self.columns: list[Quantity] = []
+        self.last_step: int | None = None
+        self._file: TextIO | None = None
+        self._header: str | None = None
+        self._widths: list[int] = []
+
+    def default(self) -> None:
+        """Log step, dt and time."""
+        self.columns = []
+
+    def begin(self) -> None:
+        """Write the header: to the file where it is new, to the terminal always."""
+        if not self.columns:
+            self.columns = [Quantity(self.hub, name) for name in ("step", "dt", "time")]
+        headings = [column.heading for column in self.columns]
+        self._widths = [
+            max(len(heading), STEP_WIDTH if heading == "Step" else NUMBER_WIDTH)
+            for heading in headings
+        ]
+        header = _row(headings, self._widths)
+        if header != self._header:
+            if self._file is None:
+                self._open()
+                self._put(header)
+            else:
+                self._put("# " + header)
+            self._header = header
+            self.last_step = None
+        self.hub.console.log_line(header, header=True)
+
+    def write(self) -> None:
+        """Write one line: the quantities now."""
+        cells = []
+        for column in self.columns:
+            number = column.read()
+            if isinstance(number, int):
+                cells.append(str(number))
+            else:
+                # A blank keeps the place of the minus sign; the first column starts at the margin
+                # for pandas' sake.
+                cells.append(f"{number: .10g}" if cells else f"{number:.10g}")
+        line = _row(cells, self._widths)
+        self._put(line)
+        self.hub.console.log_line(line)
+
+    def close(self) -> None:
+        """Close the file; a later `begin` would start a new one."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def _open(self) -> None:
+        path = self.hub.folder / FILE
+        try:
+            # Line buffering: each line is in the file at once, also when the run is killed.
+            self._file = path.open("w", buffering=1, encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise ScriptError(
+                f"cannot write the log file {path}: {error.strerror or error}"
+            ) from error
+
+    def _put(self, line: str) -> None:
+        assert self._file is not None
+        try:
+            self._file.write(line + "\n")
+        except OSError as error:
+            raise ScriptError(
+                f"cannot write the log file {FILE}: {error.strerror or error}"
+            ) from error
+
+
+def _row(cells: list[str], widths: list[int]) -> str:
+    return " ".join(c.ljust(w) for c, w in zip(cells, widths, strict=True)).rstrip()

@@ -1,0 +1,146 @@
+"""Output: what is written when. The log, the dumps and the plots share one rhythm."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import Any, Protocol
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.output.log import FILE, Log
+from karamelo_py.output.plots import Plots
+from karamelo_py.script.errors import ScriptError
+
+
+class Periodic(Protocol):
+    """Something written every so many steps; `last_step` is the step it last wrote."""
+
+    every: int
+    last_step: int | None
+
+    def write(self) -> None:
+        """Write the state now."""
+
+
+class Output:
+    """Writes log, dumps and plots when they are due.
+
+    Each of them is due at the first and the last state of every run and at the multiples of its
+    `every`, counted in absolute steps, so that a further run goes on in the same rhythm. No state
+    is written twice to the same file. In a rehearsal nothing is written.
+
+    A run calls ``begin``, then again and again ``next_step`` and ``write``, then ``end``;
+    ``abort`` stands in for ``end`` when the run breaks off.
+    """
+
+    def __init__(self, hub: Scene):
+        self.hub = hub
+        self.log = Log(hub)
+        self.plots = Plots(hub)
+        # Which dump a file belongs to.
+        self.files: dict[Path, str] = {}
+
+    def check_file(self, file: Path) -> None:
+        """Refuse to write to `file` if that is the log or a script, or cannot be done.
+
+        Raises
+        ------
+        ScriptError
+            With the argument ``file``.
+        """
+        path = self.hub.folder / file
+        scripts = getattr(self.hub.interpreter, "files", ())
+        if _may_be(path, self.hub.folder / FILE):
+            what = f"{file} is the log"
+        elif any(_may_be(path, script) for script in scripts):
+            what = f"{file} is the script itself"
+        elif path.exists() and not os.access(path, os.W_OK):
+            what = f"{file} is there and cannot be overwritten"
+        elif not path.exists() and path.parent.is_dir() and not os.access(path.parent, os.W_OK):
+            what = f"nothing can be written to the folder {path.parent}"
+        else:
+            return
+        raise ScriptError(what, argument="file", expected="the name of another file")
+
+    def begin(self, run: Any = None) -> None:
+        """Write the headers and the first state of a run."""
+        if self.hub.rehearsing:
+            return
+        self.log.begin()
+        self.write(last=True)
+
+    def next_step(self, step: int) -> int:
+        """The first step after `step` at which something is due."""
+        return min((step // item.every + 1) * item.every for item in self._items())
+
+    def write(self, last: bool = False) -> None:
+        """Write what is due at the present step; with `last`, everything not yet written."""
+        if self.hub.rehearsing:
+            return
+        step = self.hub.update.step
+        due = [i for i in self._items() if i.last_step != step and (last or step % i.every == 0)]
+        if any(item is self.log or item in self.plots for item in due):
+            # Computes and energy fixes only work when somebody looks.
+            self.hub.refresh_values()
+        for item in due:
+            try:
+                item.write()
+            except ScriptError as error:
+                raise _located(error, item) from error.__cause__
+            except OSError as error:
+                what = f"cannot write {error.filename or 'a file'}: {error.strerror or error}"
+                raise _located(ScriptError(what), item) from error
+            item.last_step = step
+
+    def end(self, last: bool = True) -> None:
+        """Write the last state of a run (unless `last` is false) and draw the plots."""
+        if self.hub.rehearsing:
+            return
+        if last:
+            self.write(last=True)
+        self._save_plots()
+
+    def abort(self) -> None:
+        """Draw the plots and close the log of a run that breaks off.
+
+        No further state is written: a caller that holds a sound one calls ``write(last=True)``
+        before. What prevents the plots is told as a warning, as another error is on its way.
+        """
+        if self.hub.rehearsing:
+            return
+        try:
+            self._save_plots()
+        except ScriptError as error:
+            self.hub.console.warn(error.render())
+        finally:
+            self.log.close()
+
+    def _save_plots(self) -> None:
+        try:
+            self.plots.save()
+        except ScriptError as error:
+            raise _located(error, self.plots) from error.__cause__
+
+    def _items(self) -> list[Periodic]:
+        return [self.log, *self.hub.dumps.values(), *self.plots]
+
+
+def _located(error: ScriptError, item: Any) -> ScriptError:
+    """The error of an output, with the place of the command that asked for it."""
+    place = getattr(item, "place", None)
+    if error.place is None and place is not None:
+        error.place = place
+        error.complete = True
+    return error
+
+
+def _may_be(path: Path, other: Path) -> bool:
+    """Whether `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
+    if "*" not in str(path):
+        try:
+            return path.resolve() == other.resolve() or path.samefile(other)
+        except OSError:
+            return False
+    pattern = re.escape(str(path.absolute())).replace(r"\*", r"\d+", 1)
+    return re.fullmatch(pattern, str(other.absolute())) is not None

@@ -1,0 +1,112 @@
+"""What a log line or a plot reads at each output: anything with a name."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.language.signature import Argument
+from karamelo_py.output.fields import PARTICLE_NAMES
+from karamelo_py.script.errors import ScriptError, nearest
+
+KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
+PER_POINT = frozenset({"x", "y", "z", "x0", "y0", "z0"})
+
+
+class Quantity:
+    """A named number of the running scene.
+
+    It is one of the words ``step``, ``dt``, ``time``; a variable of the script; a value published
+    by a fix or a compute (``Ek``, ``v_x``); or a formula written on the spot (``Ek + Es``).
+
+    Parameters
+    ----------
+    hub
+        The hub of the scene.
+    name
+        What the script says.
+    formula
+        The formula to evaluate when `name` is a formula written on the spot.
+
+    Raises
+    ------
+    ScriptError
+        If nothing of that name exists, or it is not a single number.
+    """
+
+    def __init__(self, hub: Scene, name: str, formula: Any = None):
+        self.hub = hub
+        self.name = name
+        self.formula = formula
+        if formula is None and name not in self.names(hub):
+            close = nearest(name, self.names(hub))
+            raise ScriptError(
+                f"unknown quantity '{name}'",
+                expected="step, dt, time, a variable, or a value of a fix or compute",
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+        source = self._source()
+        if isinstance(source, str):
+            raise ScriptError(f"'{name}' is text, not a number")
+        per_point = PER_POINT & getattr(source, "names", frozenset())
+        if per_point:
+            raise ScriptError(
+                f"'{name}' depends on {min(per_point)}, which differs from point to point",
+                expected="a formula of time and of values of fixes and computes",
+            )
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Quantity:
+        """The quantity that a script's argument means; errors mark the argument."""
+        text = argument.text.strip().strip('"')
+        try:
+            if text in cls.names(hub):
+                return cls(hub, text)
+            return cls(hub, text, argument.value(hub))
+        except ScriptError as error:
+            if error.place is None:
+                error.place = argument.place
+            if error.message == f"unknown name '{text}'":
+                error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
+                close = nearest(text, KEYWORDS)
+                error.hint = f"did you mean '{close}'?" if close else error.hint
+                if text in PARTICLE_NAMES:
+                    error.hint = f"{text} differs from point to point: dump(...) writes it"
+            raise
+
+    @staticmethod
+    def names(hub: Scene) -> list[str]:
+        """Every name that can be logged now."""
+        return [*KEYWORDS, *_variables(hub), *hub.values.names()]
+
+    @property
+    def heading(self) -> str:
+        """The name as it heads a column: as Karamelo writes it, and without blanks."""
+        return KEYWORDS.get(self.name, "".join(self.name.split()))
+
+    def read(self) -> float | int:
+        """The number now."""
+        source = self._source()
+        if isinstance(source, str):
+            raise ScriptError(f"'{self.name}' is text, not a number")
+        if hasattr(source, "evaluate"):
+            return float(source.evaluate(self.hub.values))
+        return source
+
+    def _source(self) -> Any:
+        """The formula, the content of the variable, or the number behind the name.
+
+        Looked up each time, as the script may set a variable anew between two runs.
+        """
+        if self.formula is not None:
+            return self.formula
+        if self.name in KEYWORDS:
+            return getattr(self.hub.update, self.name)
+        variables = _variables(self.hub)
+        if self.name in variables:
+            return variables[self.name]
+        return float(self.hub.values.get(self.name))
+
+
+def _variables(hub: Scene) -> dict[str, Any]:
+    return getattr(hub.interpreter, "variables", None) or {}

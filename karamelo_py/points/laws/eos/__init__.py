@@ -1,0 +1,82 @@
+"""Equations of state of one point: pressure from volume. One file each.
+
+An equation of state is a NamedTuple of parameters (its class is the tag), a part of a composed law
+(`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is
+the volume over the reference volume, `heat` the temperature (T,), or () where the law has none.
+What it remembers of the past is its memory, a flat tuple, nothing for most. It also has a
+`specific_volume`, as a law does.
+"""
+
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.points.laws import specific_volume
+
+
+@point_function()
+def initial_energy(eos, like):
+    """The memory of a point without a past, in the number type of `like`."""
+
+
+@initial_energy.otherwise
+def _(eos, like):
+    return ()
+
+
+@point_function()
+def compressed(eos, memory, before, j, heating):
+    """The memory after the volume ratio went from `before` to j, and heating by work.
+
+    `heating` is per reference volume: plastic and viscous work.
+    """
+
+
+@compressed.otherwise
+def _(eos, memory, before, j, heating):
+    return memory
+
+
+@point_function()
+def kept_heat(eos, loss):
+    """How much of the dissipated energy is in the memory and so in `compression_energy`."""
+
+
+@kept_heat.otherwise
+def _(eos, loss):
+    return loss - loss
+
+
+@point_function()
+def pressure(eos, j, memory, heat):
+    """Pressure at the volume ratio j."""
+
+
+@point_function()
+def bulk_modulus(eos, j, memory, heat):
+    """-j dp/dj, the stiffness against a further change of volume."""
+
+
+@point_function()
+def compression_energy(eos, j, memory):
+    """Integral of p dj from j to 1: the energy stored by compression, per reference volume."""
+
+
+@point_function()
+def ratio_at_pressure(eos, p, heat):
+    """The volume ratio at which the pressure is p, or is nearest to it."""
+
+
+@point_function()
+def at_pressure(eos, j, memory, p, heat):
+    """Volume ratio and memory of a point with the pressure p (fix initial_stress)."""
+
+
+@at_pressure.otherwise
+def _(eos, j, memory, p, heat):
+    return ratio_at_pressure(eos, p, heat), memory
+
+
+def give_specific_volume(eos: type) -> None:
+    """Give `eos` (a class with a field ``specific_volume``) the point function of that name."""
+
+    @specific_volume.on(eos)
+    def _(eos):
+        return eos.specific_volume

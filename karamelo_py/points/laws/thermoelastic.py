@@ -1,0 +1,175 @@
+"""Elastic laws with a temperature: they expand, and know what conduction has to know."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.tuples import following, leading
+from karamelo_py.points.kinematics import add_pressure
+from karamelo_py.points.laws import (
+    advance,
+    assemble,
+    cauchy_stress,
+    conductivity,
+    deformation,
+    elastic_strain,
+    energy_density,
+    heat_capacity,
+    initial_state,
+    jacobian,
+    kirchhoff_stress,
+    separate,
+    specific_volume,
+    temperature,
+    wave_speed_squared,
+    with_stress,
+    with_temperature,
+)
+from karamelo_py.points.laws.temperatures import initial_heat, thermal_pressure
+
+
+class Expansion(NamedTuple):
+    """Temperature of an elastic law: stress -3 K alpha (T - T0)."""
+
+    cp: float  # heat capacity per mass
+    kappa: float  # conductivity
+    alpha: float  # coefficient of linear expansion
+    pressure: float  # 3 K alpha, pressure per kelvin
+    initial_temperature: float  # T0 of the solid, known when the scene is lowered
+
+
+class Thermoelastic(NamedTuple):
+    """An elastic law and its temperature; the state is that of the elastic law, then T."""
+
+    elastic: Any
+    heat: Any
+
+
+class ThermoelasticParts(NamedTuple):
+    """Tag of the law while its parts travel one by one."""
+
+
+@initial_heat.on(Expansion)
+def _(heat, like):
+    return (heat.initial_temperature,)
+
+
+@thermal_pressure.on(Expansion)
+def _(heat, T):
+    return (heat.pressure * (T[0] - heat.initial_temperature),)
+
+
+@separate.on(Thermoelastic)
+def _(law):
+    return ThermoelasticParts(), (law.elastic, law.heat, (), (), ())
+
+
+@assemble.on(ThermoelasticParts)
+def _(tag, first, second, third, fourth, fifth):
+    return Thermoelastic(first, second)
+
+
+@shared
+def mechanical(law, kin, state):
+    """The state of the elastic law."""
+    return leading(state, initial_state(law.elastic, kin, law.heat.alpha))
+
+
+@shared
+def heat_of(law, kin, state):
+    """(T,) of the state."""
+    return following(state, mechanical(law, kin, state))
+
+
+@shared
+def thermal_pressure_of(law, kin, state):
+    """3 K alpha (T - T0)."""
+    return thermal_pressure(law.heat, heat_of(law, kin, state))[0]
+
+
+@initial_state.on(Thermoelastic)
+def _(law, kin, like):
+    return initial_state(law.elastic, kin, like) + initial_heat(law.heat, like)
+
+
+@advance.on(Thermoelastic)
+def _(law, kin, state, dl, dt):
+    new = advance(law.elastic, kin, mechanical(law, kin, state), dl, dt)
+    return new + heat_of(law, kin, state)
+
+
+@cauchy_stress.on(Thermoelastic)
+def _(law, kin, state):
+    elastic = cauchy_stress(law.elastic, kin, mechanical(law, kin, state))
+    return add_pressure(kin, real(1, elastic[0]), elastic, -thermal_pressure_of(law, kin, state))
+
+
+@kirchhoff_stress.on(Thermoelastic)
+def _(law, kin, state):
+    elastic = kirchhoff_stress(law.elastic, kin, mechanical(law, kin, state))
+    p = jacobian(law, kin, state) * thermal_pressure_of(law, kin, state)
+    return add_pressure(kin, real(1, p), elastic, -p)
+
+
+@jacobian.on(Thermoelastic)
+def _(law, kin, state):
+    return jacobian(law.elastic, kin, mechanical(law, kin, state))
+
+
+@deformation.on(Thermoelastic)
+def _(law, kin, state):
+    return deformation(law.elastic, kin, mechanical(law, kin, state))
+
+
+@wave_speed_squared.on(Thermoelastic)
+def _(law, kin, state):
+    return wave_speed_squared(law.elastic, kin, mechanical(law, kin, state))
+
+
+@energy_density.on(Thermoelastic)
+def _(law, kin, state):
+    """What unloading gives back at this temperature."""
+    j = jacobian(law, kin, state)
+    elastic = energy_density(law.elastic, kin, mechanical(law, kin, state))
+    return elastic + thermal_pressure_of(law, kin, state) * (real(1, j) - j)
+
+
+@elastic_strain.on(Thermoelastic)
+def _(law, kin, state):
+    strain = elastic_strain(law.elastic, kin, mechanical(law, kin, state))
+    warmer = heat_of(law, kin, state)[0] - law.heat.initial_temperature
+    return add_pressure(kin, real(1, warmer), strain, -law.heat.alpha * warmer)
+
+
+@with_stress.on(Thermoelastic)
+def _(law, kin, state, stress):
+    p = thermal_pressure_of(law, kin, state)
+    elastic = add_pressure(kin, real(1, p), stress, p)
+    new = with_stress(law.elastic, kin, mechanical(law, kin, state), elastic)
+    return new + heat_of(law, kin, state)
+
+
+@specific_volume.on(Thermoelastic)
+def _(law):
+    return specific_volume(law.elastic)
+
+
+@temperature.on(Thermoelastic)
+def _(law, kin, state):
+    return heat_of(law, kin, state)[0]
+
+
+@with_temperature.on(Thermoelastic)
+def _(law, kin, state, T):
+    return mechanical(law, kin, state) + (T,)
+
+
+@heat_capacity.on(Thermoelastic)
+def _(law, like):
+    return law.heat.cp
+
+
+@conductivity.on(Thermoelastic)
+def _(law, like):
+    return law.heat.kappa

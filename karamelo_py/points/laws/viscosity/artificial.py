@@ -1,0 +1,39 @@
+"""Artificial viscosity: quadratic (von Neumann & Richtmyer) and linear (Landshoff)."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+from karamelo_py.compiler.compile import real
+from karamelo_py.points.laws.viscosity import (
+    initial_viscous_pressure,
+    viscous_pressure,
+    viscous_speed,
+)
+
+
+class ArtificialViscosity(NamedTuple):
+    """q = rho h (Q1 h d^2 - Q2 c d) where the rate of volume change d is negative."""
+
+    Q1: float  # quadratic coefficient
+    Q2: float  # linear coefficient
+    cell_size: float  # h, known when the scene is lowered
+
+
+@initial_viscous_pressure.on(ArtificialViscosity)
+def _(viscosity, like):
+    return (real(0, like),)
+
+
+@viscous_pressure.on(ArtificialViscosity)
+def _(viscosity, rate, density, sound):
+    closing = max(-rate, real(0, rate))
+    h = viscosity.cell_size
+    return (density * h * closing * (viscosity.Q1 * h * closing + viscosity.Q2 * sound),)
+
+
+@viscous_speed.on(ArtificialViscosity)
+def _(viscosity, memory, density, sound):
+    # nu / h = Q1 h |d| + Q2 c, and q / rho >= Q1 (h d)^2
+    return (sqrt(viscosity.Q1 * memory[0] / density) + viscosity.Q2 * sound,)

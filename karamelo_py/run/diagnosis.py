@@ -1,0 +1,201 @@
+"""What went wrong in a run: found, explained, and the last good state written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import Block
+from karamelo_py.kernels.step import ABOVE_LIMIT, SHRUNK
+from karamelo_py.points.basis import carried, extent
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import Place, ScriptError
+
+LAST_GOOD = "last_good.*.LAMMPS"
+
+
+def warn_about_precision(hub: Hub, simulation: Simulation) -> None:
+    """Say so when single precision cannot hold what a step adds to a position."""
+    if hub.settings.precision != "single":
+        return
+    x, v = np.abs(simulation.x).max(), np.abs(simulation.v).max()
+    step, spacing = float(v) * simulation.dt, float(np.spacing(np.float32(x)))
+    if 0 < step < 16 * spacing:
+        hub.warn(
+            f"a step moves points by {step:.2g} at most, and in single precision positions have "
+            f"a spacing of {spacing:.2g}: motion will be lost to rounding",
+            hint="precision(double), or a domain around the origin",
+        )
+
+
+def warn_about_groups(hub: Hub) -> None:
+    """Say so, once, where the solids have brought no nodes to a group that waited for them."""
+    for group in hub.groups.values():
+        if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
+            group.awaits_solids = False
+            hub.warn(f"group '{group.id}' holds no nodes; {NOTHING_THERE}", place=group.place)
+
+
+def warn_about_step(hub: Hub, simulation: Simulation) -> None:
+    """Say so before the first step when the step is above the stable limit."""
+    update, limit = hub.update, simulation.limit
+    if update.fixed_dt is not None and update.fixed_dt > limit * (1 + 1e-12):
+        hub.warn(
+            f"the step {update.fixed_dt:g} of set_dt is above the stable limit {limit:.4g}: "
+            "the run will most likely blow up, and be stopped then",
+            hint=f"set_dt({0.9 * limit:.3g}) or less, or leave set_dt out",
+        )
+    elif update.fixed_dt is None and update.dt_factor > 1:
+        hub.warn(
+            f"dt_factor {update.dt_factor:g} puts the step above the stable limit {limit:.4g}: "
+            "the run will most likely blow up, and be stopped then",
+            hint="dt_factor(0.9) or less",
+        )
+
+
+def stop(
+    hub: Hub, simulation: Simulation, status: int, snapshot: list, place: Place | None
+) -> NoReturn:
+    """Return to the last good state, write it, and raise what the user should know."""
+    step, time = simulation.step, simulation.time
+    if status == ABOVE_LIMIT:
+        message, hint = _above_limit(hub, simulation)
+        _write_last_good(hub)
+    elif status == SHRUNK:
+        message, hint = _shrunk(hub, simulation)
+        _write_last_good(hub)
+    else:
+        message, hint = _wrong_point(hub, simulation)
+        simulation.restore(snapshot)
+        if step > simulation.step:
+            simulation.advance(step - simulation.step)
+        message = f"step {step + 1}, time {time:.6g}: {message}"
+        _write_last_good(hub)
+    name = LAST_GOOD.replace("*", str(simulation.step))
+    raise ScriptError(message, place=place, hint=f"{hint}. The last good state is in {name}")
+
+
+def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+    limit = simulation.limit
+    message = (
+        f"step {simulation.step}, time {simulation.time:.6g}: the step {simulation.dt:g} is above "
+        f"the stable limit, which has fallen to {limit:.4g}"
+    )
+    speeds = np.abs(simulation.v).max(axis=1)
+    fastest = int(np.argmax(speeds))
+    message += f" ({_named(hub, simulation, fastest)} moves at {speeds[fastest]:.4g})"
+    return message, f"set_dt({0.5 * limit:.3g}) or less, or leave set_dt out"
+
+
+def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+    here = np.flatnonzero(simulation.present)
+    speeds = np.abs(simulation.v[here]).max(axis=1)
+    volumes = hub.fields.particle("volume") / hub.fields.reference_volume[here]
+    fastest, widest = int(np.argmax(speeds)), int(np.argmax(volumes))
+    message = (
+        f"step {simulation.step}, time {simulation.time:.6g}: the stable step has fallen to "
+        f"{simulation.limit:.3g}, less than a millionth of the first "
+        f"({_named(hub, simulation, here[fastest])} moves at {speeds[fastest]:.3g}, "
+        f"{_named(hub, simulation, here[widest])} has {volumes[widest]:.3g} times its volume)"
+    )
+    smaller = _smaller_step(hub, simulation)
+    return message, f"something went wrong before: look at the dumps; {smaller}"
+
+
+def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+    """What is wrong with the first point that went wrong, and what can be done."""
+    wrong = [(int(block.id[p]), block, p) for block, p in simulation.wrong_points()]
+    if not wrong and hub.update.thermal:
+        return (
+            "the temperature of a point is not a number",
+            "look at the fixes that act on heat: a formula that gives NaN, or heat without bounds",
+        )
+    if not wrong:
+        return "a point went wrong", "use a smaller step"
+    number, block, p = min(wrong, key=lambda item: item[0])
+    now = simulation.now
+    d = hub.domain.dimension
+    old, new = (block.x[k][p, :d].astype(float) for k in (now, 1 - now))
+    name = _named(hub, simulation, number)
+    smaller = _smaller_step(hub, simulation)
+    if not np.isfinite(old).all():
+        return f"{name} has no position (NaN)", f"look for a formula that gives NaN; {smaller}"
+    if not np.isfinite(new).all() or not np.isfinite(block.points.v[p]).all():
+        return (
+            f"{name} at {_place(old)} gets a velocity that is not a number",
+            f"look for a formula that gives NaN, such as a division by zero; else {smaller}",
+        )
+    lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
+    if hub.update.method.frame.moves and ((new < lo).any() or (new > hi).any()):
+        side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
+        if simulation.above_limit():
+            return f"{name} at {_place(old)} is thrown out of the domain", smaller
+        return (
+            f"{name} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
+            f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
+            "make the domain larger, hold the point back with fix velocity_nodes at the wall, let "
+            f"it go with boundary(delete), or, if it should not have got there, {smaller}",
+        )
+    move = float(np.abs(new - old).max()) / hub.lattices[block.grid[p]].h
+    if move > 1:
+        return (
+            f"{name} at {_place(old)} moves by {move:.3g} cells in one step",
+            f"the run is unstable: {smaller}",
+        )
+    tangled = _tangled(simulation, block, p)
+    if tangled is not None:
+        plain = "R4" if d == 2 else "R8"
+        instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
+        return (
+            f"the domain of {name} at {_place(old)} is tangled: one of its corners folds over",
+            f"finer points, so that the corners of a domain move more alike{instead}, or method "
+            f"tlcpdi, whose domains keep their shape; or {smaller}",
+        )
+    return (
+        f"{name} at {_place(old)} is turned inside out (det F <= 0)",
+        f"{smaller}, or a finer grid, or a law that resists the compression (neo-hookean)",
+    )
+
+
+def _tangled(simulation: Simulation, block: Block, p: int) -> str | None:
+    """The name of the basis where the domain of a point, whose corners move, is folded over."""
+    s = simulation.setup
+    if not s.frame.moves or carried(s.basis, s.kin) == 0:
+        return None
+    grid = record(s.grids, int(block.grid[p]))
+    place = tuple(float(a) for a in block.x[1 - simulation.now][p])
+    return None if np.isfinite(extent(s.basis, s.kin, grid, place)) else type(s.basis).__name__
+
+
+def _smaller_step(hub: Hub, simulation: Simulation) -> str:
+    """How to take a smaller step, and whether the present one is too large for sure."""
+    if simulation.above_limit():
+        return (
+            f"the step {simulation.dt:.4g} is above the stable limit {simulation.limit:.4g}: "
+            "set_dt to less, or leave set_dt out and dt_factor at 0.9"
+        )
+    fixed = hub.update.fixed_dt is not None
+    return "use a smaller step (set_dt)" if fixed else "use a smaller dt_factor"
+
+
+def _named(hub: Hub, simulation: Simulation, number: int) -> str:
+    solid = list(hub.solids.values())[int(simulation.solid_of[number])]
+    return f"point {number + 1} of solid '{solid.id}'"
+
+
+def _place(x: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
+
+
+def _write_last_good(hub: Hub) -> None:
+    """Write the present state: to the dumps of the script, and to a file of its own."""
+    from karamelo_py.styles.dumps.particle import Particle
+
+    hub.output.write(last=True)
+    columns = ["x", "y", "z", "vx", "vy", "vz", "s11", "s22", "s33", "s12", "s13", "s23", "volume"]
+    Particle(hub, 1, Path(LAST_GOOD), *columns).write()

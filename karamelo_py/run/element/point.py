@@ -1,0 +1,263 @@
+"""A point of a material that goes along a load path, increment by increment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.laws import (
+    advance,
+    cauchy_stress,
+    energy_density,
+    initial_state,
+    jacobian,
+    specific_volume,
+    wave_speed_squared,
+)
+from karamelo_py.run.element.load_path import COMPONENTS, LoadPath
+
+# Where the components of the velocity gradient lie in the flat tuples of each kinematics.
+_PLANE = ((0, 0), (0, 1), (1, 0), (1, 1))
+GRADIENT = {
+    Line: ((0, 0),),
+    PlaneStrain: _PLANE,
+    Axisymmetric: (*_PLANE, (2, 2)),
+    Space: tuple((i, j) for i in range(3) for j in range(3)),
+}
+# Strains that each kinematics has.
+FREE = {
+    Line: ("xx",),
+    PlaneStrain: ("xx", "yy", "xy"),
+    Axisymmetric: ("xx", "yy", "zz", "xy"),
+    Space: COMPONENTS,
+}
+SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
+
+ITERATIONS = 40
+HALVINGS = 8  # of a Newton step that leads away
+DIVISIONS = 8  # of an increment that does not converge, into halves
+TOLERANCE = 1e-10  # of the stress, or of what an increment would change in an elastic material
+ROUNDING = 1e-13  # stress that cannot be resolved, over the modulus
+
+
+class Unreachable(Exception):
+    """No strain was found that gives the prescribed stress."""
+
+
+class Motion(NamedTuple):
+    """What a whole path does to the point, and the stress at its ends."""
+
+    strain: np.ndarray  # (6,) change of strain, 0 where the stress is prescribed
+    turn: float
+    shear: tuple[int, ...]  # components in simple shear
+    held: np.ndarray  # indices of the components whose stress is prescribed
+    begin: np.ndarray  # their stress
+    end: np.ndarray
+
+
+class Point:
+    """A point of a material, and where it has come to.
+
+    Attributes
+    ----------
+    law, kin
+        The law's NamedTuple and the kinematics' tag.
+    state
+        State of the law.
+    strain : ndarray (6,)
+        Sum of the strain increments, the symmetric parts of dt grad v.
+    time
+        Time.
+    work
+        Work of the stress per reference volume.
+    """
+
+    def __init__(self, law: NamedTuple, kin: NamedTuple):
+        self.law, self.kin = law, kin
+        self.state = initial_state(law, kin, 1.0)
+        self.strain = np.zeros(6)
+        self.time = 0.0
+        self.work = 0.0
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Components of strain that the kinematics has."""
+        return FREE[type(self.kin)]
+
+    @property
+    def stress(self) -> np.ndarray:
+        """(6,) Cauchy stress."""
+        return self._stress(self.state)
+
+    def _stress(self, state: tuple) -> np.ndarray:
+        found = cauchy_stress(self.law, self.kin, state)
+        return np.pad(found, (0, 6 - len(found)))
+
+    def follow(self, path: LoadPath, observe: Callable[[], None]) -> None:
+        """Go along a path; `observe` is called after every increment.
+
+        Raises
+        ------
+        Unreachable
+            With what went wrong and in which increment.
+        """
+        held = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
+        motion = Motion(
+            strain=path.strain_at_end(self.strain, self.free) - self.strain,
+            turn=path.turn,
+            shear=tuple(COMPONENTS.index(name) for name in path.shear),
+            held=held,
+            begin=self.stress[held],
+            end=np.array([path.stress[COMPONENTS[k]] for k in held]),
+        )
+        begun = self.time
+        rate = np.zeros(len(held))  # of the strains that are looked for, in paths
+        marks = np.arange(path.increments + 1) / path.increments
+        for number, (a, b) in enumerate(pairwise(marks), 1):
+            try:
+                rate = self._go(motion, path.duration, a, b, rate, DIVISIONS)
+            except Unreachable as error:
+                raise Unreachable(f"increment {number} of {path.increments}: {error}") from None
+            # Not the sum of many small steps, so that tables have round numbers.
+            self.time = begun + b * path.duration
+            observe()
+
+    def _go(
+        self, motion: Motion, duration: float, a: float, b: float, rate: np.ndarray, divisions: int
+    ) -> np.ndarray:
+        """Go from the part `a` of a motion to the part `b`, in halves where it must be."""
+        try:
+            found = self._solve(motion, (b - a) * duration, a, b, rate)
+        except Unreachable:
+            middle = (a + b) / 2
+            if divisions == 0 or not len(motion.held):
+                raise
+            rate = self._go(motion, duration, a, middle, rate, divisions - 1)
+            return self._go(motion, duration, middle, b, rate, divisions - 1)
+        return found / (b - a)
+
+    def _solve(self, motion: Motion, dt: float, a: float, b: float, rate: np.ndarray) -> np.ndarray:
+        """One increment: Newton's iteration for the strains whose stress is prescribed."""
+        held, target = motion.held, motion.begin + b * (motion.end - motion.begin)
+        increment = (b - a) * motion.strain
+        rigid = self._turned((b - a) * motion.turn, dt)
+
+        def state_after(unknown: np.ndarray) -> tuple:
+            increment[held] = unknown
+            dl = self._flat(self._strained(increment, motion) + rigid)
+            return advance(self.law, self.kin, self.state, dl, dt)
+
+        def misfit(unknown: np.ndarray) -> np.ndarray:
+            try:
+                state = state_after(unknown)
+                if jacobian(self.law, self.kin, state) > 0:
+                    return self._stress(state)[held] - target
+            except (ArithmeticError, ValueError):
+                pass  # a logarithm of what is turned inside out, an overflow
+            return np.full(len(held), np.inf)
+
+        unknown = self._newton(misfit, rate * (b - a), increment, target)
+        try:
+            new = state_after(unknown)
+            sound = jacobian(self.law, self.kin, new) > 0 and np.isfinite(self._stress(new)).all()
+        except (ArithmeticError, ValueError):
+            sound = False
+        if not sound:
+            raise Unreachable("the point is turned inside out (det F <= 0) or has no stress")
+        self._accept(new, increment)
+        return unknown
+
+    def _newton(
+        self,
+        misfit: Callable[[np.ndarray], np.ndarray],
+        guess: np.ndarray,
+        increment: np.ndarray,
+        target: np.ndarray,
+    ) -> np.ndarray:
+        """The strains at which `misfit` vanishes, by a tangent from finite differences."""
+        if not len(guess):
+            return guess
+        modulus = self._modulus()
+        unknown, found = guess, misfit(guess)
+        if not np.isfinite(found).all():
+            unknown = np.zeros(len(guess))
+            found = misfit(unknown)
+        for _ in range(ITERATIONS):
+            size = np.linalg.norm(found)
+            largest = float(np.abs(increment).max())
+            stresses = [modulus * largest, *np.abs(target), *np.abs(self.stress)]
+            if size <= TOLERANCE * max(stresses) + ROUNDING * modulus:
+                return unknown
+            if not np.isfinite(size):
+                break
+            # Small enough to stay on one side of yield mostly, large enough against rounding.
+            small = float(np.clip(1e-3 * np.abs(unknown).max(), 1e-9, 1e-6))
+            columns = [(misfit(unknown + small * e) - found) / small for e in np.eye(len(unknown))]
+            tangent = np.stack(columns, axis=1)
+            if not np.isfinite(tangent).all():
+                break
+            # Least squares: a component that no stiffness holds is left where it is.
+            step = np.linalg.lstsq(tangent, -found, rcond=1e-12)[0]
+            for halving in range(HALVINGS):
+                trial = unknown + step / 2**halving
+                there = misfit(trial)
+                if np.linalg.norm(there) < size:
+                    break
+            else:
+                break
+            unknown, found = trial, there
+        raise Unreachable("the law does not reach the prescribed stress")
+
+    def _modulus(self) -> float:
+        """Density times the square of the speed of waves."""
+        volume = specific_volume(self.law) * jacobian(self.law, self.kin, self.state)
+        return wave_speed_squared(self.law, self.kin, self.state) / volume
+
+    def _strained(self, increment: np.ndarray, motion: Motion) -> np.ndarray:
+        """(3, 3) dt grad v of a strain increment: pure, or simple where the motion says so."""
+        full = np.diag(increment[:3])
+        for k, (i, j) in SHEARS.items():
+            simple = k in motion.shear
+            full[i, j] = (2 if simple else 1) * increment[k]
+            full[j, i] = 0 if simple else increment[k]
+        return full
+
+    def _turned(self, angle: float, dt: float) -> np.ndarray:
+        """(3, 3) dt grad v of a turn about z, in the form that the law takes for rigid.
+
+        To first order that is a skew tensor. To second order a law takes its strain from the
+        symmetric part, its volume from det F, or all from F, and the three disagree.
+        """
+        if angle == 0:
+            return np.zeros((3, 3))
+        skew = np.zeros((3, 3))
+        skew[1, 0], skew[0, 1] = angle, -angle
+        # (1 + a) ((1 + a)^2 + angle^2) = 1 in the first form with a volume that stays
+        roots = np.roots([1, 0, angle**2, -1])
+        same_volume = float(roots[np.argmin(np.abs(roots - 1))].real) - 1
+        exact = np.sin(angle) / angle * skew + (np.cos(angle) - 1) * np.diag([1, 1, 0])
+        forms = [skew, skew + same_volume * np.eye(3), exact]
+        before = energy_density(self.law, self.kin, self.state)
+
+        def stored(form: np.ndarray) -> float:
+            state = advance(self.law, self.kin, self.state, self._flat(form), dt)
+            return abs(energy_density(self.law, self.kin, state) - before)
+
+        return min(forms, key=stored)
+
+    def _flat(self, gradient: np.ndarray) -> tuple:
+        """A (3, 3) tensor as the kinematics has it."""
+        return tuple(float(gradient[place]) for place in GRADIENT[type(self.kin)])
+
+    def _accept(self, state: tuple, increment: np.ndarray) -> None:
+        """Take the new state; the work is that of the mean Kirchhoff stress."""
+        weights = np.where(np.arange(6) < 3, 1, 2)
+        before = jacobian(self.law, self.kin, self.state) * self.stress
+        self.state = state
+        after = jacobian(self.law, self.kin, self.state) * self.stress
+        self.work += float(weights * (before + after) / 2 @ increment)
+        self.strain = self.strain + increment

@@ -1,0 +1,97 @@
+"""Compiled hooks of the fixes of a scene, as the tables that kernels read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.compiler.compile import address_of
+from karamelo_py.compiler.formula import BLOCK, EVALUATE, MAX_DEPTH, STACK, evaluate_in_table
+from karamelo_py.kernels.arrays import HOOK_COLUMNS, Hooks, NoHooks
+from karamelo_py.kernels.hooks import (
+    NODE_FUNCTION,
+    POINT_FUNCTION,
+    STAGES,
+    CompiledHook,
+)
+from karamelo_py.scene.hub import Hub
+
+
+def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
+    """Tables of the compiled hooks of `fixes`, in their order."""
+    dimension = hub.domain.dimension
+    count = sum(len(s.x0) for s in hub.solids.values())
+    builder = _Builder(hub, count)
+    for fix in fixes:
+        for name, hook in fix.hooks().items():
+            if isinstance(hook, CompiledHook):
+                builder.add(fix, STAGES[name], hook)
+    if not builder.rows:
+        return NoHooks()
+    x0 = np.concatenate([s.x0 for s in hub.solids.values()]) if builder.on_points else None
+    return Hooks(
+        evaluate=address_of(evaluate_in_table, EVALUATE),
+        table=np.array(builder.rows, np.int64).reshape(-1, HOOK_COLUMNS),
+        members=np.concatenate([np.empty(0, np.int64), *builder.members]),
+        code=np.concatenate([np.empty((0, 2), np.int64), *builder.code]),
+        constants=np.concatenate([np.empty(0), *builder.constants]),
+        x0=np.empty((0, dimension)) if x0 is None else x0,
+        chosen=np.zeros(BLOCK, np.int64),
+        scratch=np.zeros((STACK + MAX_DEPTH, BLOCK)),
+    )
+
+
+class _Builder:
+    """Collects rows, members and programs."""
+
+    def __init__(self, hub: Hub, points: int):
+        self.hub = hub
+        self.points = points
+        self.on_points = False
+        self.rows: list[list[int]] = []
+        self.members: list[np.ndarray] = []
+        self.code: list[np.ndarray] = []
+        self.constants: list[np.ndarray] = []
+
+    def add(self, fix: Any, stage: int, hook: CompiledHook) -> None:
+        """Add one compiled hook of a fix."""
+        begin, end = self._members(fix.group, hook)
+        slot = -1
+        if hook.publishes and fix.published:
+            # Components lie one after another, from x on; a total without direction stands alone.
+            first = "x" if "x" in fix.published else fix.published[0]
+            slot = self.hub.values.slot(f"{fix.id}_{first}")
+        signature = NODE_FUNCTION if hook.on_nodes else POINT_FUNCTION
+        address = address_of(hook.function, signature)
+        row = [address, stage, begin, end, slot, int(hook.uses_before), int(hook.uses_share)]
+        for formula in fix.formulas:
+            row += self._program(formula)
+        if len(row) > HOOK_COLUMNS:
+            raise ValueError(f"fix '{fix.id}' has more formulas than there are directions, three")
+        row += [-1] * (HOOK_COLUMNS - len(row))
+        self.rows.append(row)
+        self.on_points |= not hook.on_nodes
+
+    def _members(self, group: Any, hook: CompiledHook) -> tuple[int, int]:
+        if group.all:
+            return -1, -1
+        if hook.on_nodes:
+            members = group.nodes
+        else:
+            members = np.zeros(self.points, np.int64)
+            members[group.ids] = 1
+        begin = sum(len(m) for m in self.members)
+        self.members.append(members)
+        return begin, begin + len(members)
+
+    def _program(self, formula: Any) -> list[int]:
+        if formula is None:
+            return [-1, -1, -1, -1]
+        program = formula.program(self.hub.values)
+        ranges = []
+        for pieces, piece in ((self.code, program.code), (self.constants, program.constants)):
+            begin = sum(len(p) for p in pieces)
+            pieces.append(piece)
+            ranges += [begin, begin + len(piece)]
+        return ranges

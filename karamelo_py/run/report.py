@@ -1,0 +1,106 @@
+"""karamelo-py check: what a scene needs, before it runs."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.laws import law_kind
+from karamelo_py.kernels.step import Fused, Staged
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.material import Material
+
+
+def report(hub: Hub, end_time: float = inf) -> None:
+    """Print fields with bytes, stages, tiles, memory and the first dt of a run to `end_time`."""
+    simulation = hub.simulation
+    simulation.begin(end_time)
+    simulation.sort_if_due()
+    say = hub.console.say
+    s = simulation.setup
+    say(f"dimension      {s.kin.dimension} ({s.kin.word})")
+    say(f"method         {hub.update.words}")
+    say(f"precision      {hub.settings.precision}")
+    say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")
+    lattices = hub.lattices
+    shapes = ", ".join(" x ".join(map(str, lattice.shape)) for lattice in lattices[:8])
+    more = ", ..." if len(lattices) > 8 else ""
+    say(f"nodes          {hub.fields.node_count} ({shapes}{more})")
+    tiles = simulation.tiles
+    used = int(np.count_nonzero(tiles.used == 1))
+    near = int(np.count_nonzero(tiles.used))
+    nodes = int(np.sum(s.spans[1 : 1 + s.spans[0, 0], 1] - s.spans[1 : 1 + s.spans[0, 0], 0]))
+    say(f"tiles          {used} of {tiles.count} hold points, {near} in use ({nodes} nodes)")
+    say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
+    say(f"threads        {simulation.threads}")
+    say("")
+    say(f"{'':<34}numbers     bytes")
+    total = 0
+    for block in s.blocks:
+        say(f"fields of a point of {', '.join(m.words for m in materials(hub, block))}")
+        of_one = 0
+        for name, shape, size in point_fields(block):
+            say(f"  {name:<30}  {shape:<10} {size:>6}")
+            of_one += size
+        say(f"  {'together':<30}  {'':<10} {of_one:>6}")
+        total += of_one * len(block.id)
+    say("fields of a node")
+    per_node = 0
+    for name, array in node_fields(s):
+        size = array.itemsize * array.shape[1]
+        per_node += size
+        say(f"  {name:<30}  {array.shape[1]!s:<10} {size:>6}")
+    say(f"memory         {(total + per_node * nodes) / 2**20:.3g} MiB touched")
+    say("")
+    say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")
+    for stage in stages(hub, simulation):
+        say(f"  {stage}")
+
+
+def materials(hub: Hub, block: Any) -> list[Material]:
+    """The materials of the points of this block: those in use whose laws are of its kind."""
+    used = dict.fromkeys(solid.material for solid in hub.solids.values())
+    return [material for material in used if law_kind(material.law) == law_kind(block.laws)]
+
+
+def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
+    """The arrays of the nodes, and of those that heat flows through, with their names."""
+    fields = list(s.nodes._asdict().items())
+    if isinstance(s.heat, Conducting):
+        fields += [(f"{name} (heat)", array) for name, array in s.heat.nodes._asdict().items()]
+    return [(name, array) for name, array in fields if array is not None]
+
+
+def point_fields(block: Any) -> list[tuple[str, str, int]]:
+    """Name, shape and bytes of each field that a point of this block carries."""
+    fields = [("x", block.x[0]), ("x moved", block.x[1])]
+    fields += [(name, array) for name, array in block.points._asdict().items() if array is not None]
+    fields += [("id", block.id), ("grid", block.grid)]
+    if block.home is not None:
+        fields.append(("home", block.home))
+    out = []
+    for name, array in fields:
+        shape = str(array.shape[1]) if array.ndim > 1 else "1"
+        out.append((name, shape, array.itemsize * (array.shape[1] if array.ndim > 1 else 1)))
+    return out
+
+
+def stages(hub: Hub, simulation: Simulation) -> list[str]:
+    """The stages of a step with the fixes that act in them."""
+    visits = Staged if simulation.staged else Fused
+    acting: dict[str, list[str]] = {}
+    for fix in hub.fixes.values():
+        for name in fix.hooks():
+            once = " (first step only)" if fix.first_step_only else ""
+            acting.setdefault(name, []).append(fix.id + once)
+    lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
+    first = type(hub.update.scheme).stages[0 if visits is Fused else 1]
+    if not lines:
+        lines = ["no fix acts between them"]
+    if hub.update.thermal:
+        lines.insert(0, "before v*: heat to the nodes, its flow, temperature of the points")
+    return [*first, *lines]

@@ -1,0 +1,251 @@
+"""One run command: steps in chunks, outputs when they are due, and an eye on what goes wrong."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import inf, isfinite
+from typing import Any
+
+from karamelo_py.kernels.step import DONE
+from karamelo_py.run import diagnosis
+from karamelo_py.run.lowering import check_scene
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.scene import boundary
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import Quit, ScriptError
+
+CHUNK = 100  # steps between two looks at the run, and between two snapshots, at most
+PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
+
+
+class Interrupted(Exception):
+    """The user pressed Ctrl-C; everything is written."""
+
+
+class Runner:
+    """Runs a scene for a number of steps, to a time, or by a condition."""
+
+    def __init__(
+        self,
+        hub: Hub,
+        *,
+        steps: int | None = None,
+        end_time: float = inf,
+        condition: Any = None,
+        until: bool = False,
+    ):
+        self.hub = hub
+        self.steps = steps
+        self.end_time = end_time
+        self.condition = condition
+        self.until = until
+        self.place = hub.place
+        self.spent = {"compilation": 0.0, "steps": 0.0, "output": 0.0}
+        self.interrupted = False
+
+    def run(self) -> None:
+        """Do it."""
+        hub = self.hub
+        check_scene(hub)
+        self._check_condition()
+        if hub.rehearsing:
+            return
+        hub.rehearse()
+        if hub.checking:
+            from karamelo_py.run.report import report
+
+            report(hub, self.end_time)
+            raise Quit
+        with self._telling_of_compilation():
+            self._run(hub.simulation)
+
+    def _check_condition(self) -> None:
+        names = self.condition.names if self.condition is not None else frozenset()
+        per_point = names & {"x", "y", "z", "x0", "y0", "z0"}
+        if per_point:
+            raise ScriptError(
+                f"the condition depends on {min(per_point)}, which differs from point to point",
+                argument="condition",
+                expected="a formula of time, timestep, dt and values of fixes and computes",
+            )
+
+    def _run(self, simulation: Simulation) -> None:
+        hub = self.hub
+        started = time.perf_counter()
+        simulation.begin(self.end_time)
+        diagnosis.warn_about_groups(hub)
+        diagnosis.warn_about_step(hub, simulation)
+        diagnosis.warn_about_precision(hub, simulation)
+        first_step = simulation.step
+        first_time = simulation.time
+        self._banner(simulation)
+        with self._timed("output"):
+            hub.output.begin(self)
+        hub.console.begin_run(simulation.step, 0.0)
+        try:
+            with self._interruptible():
+                self._loop(simulation, first_step, first_time)
+            with self._timed("output"):
+                hub.console.end_run()
+                hub.output.end()
+        except BaseException:
+            hub.console.end_run()
+            hub.output.abort()
+            raise
+        self._summary(simulation, first_step, time.perf_counter() - started)
+        if self.interrupted:
+            raise Interrupted
+
+    def _loop(self, simulation: Simulation, first_step: int, first_time: float) -> None:
+        hub, output = self.hub, self.hub.output
+        last_step = first_step + self.steps if self.steps is not None else inf
+        chunk = 1
+        snapshot, kept = simulation.snapshot(), simulation.step
+        while simulation.step < last_step and simulation.time < self.end_time:
+            if self.condition is not None and not self._goes_on():
+                break
+            if self.interrupted:
+                break
+            step = simulation.step
+            target = min(output.next_step(step), last_step, step + chunk)
+            if self.condition is not None:
+                target = step + 1
+            if step - kept >= CHUNK or kept == first_step < step:
+                snapshot, kept = simulation.snapshot(), step
+            begun, compiled = time.perf_counter(), self.spent["compilation"]
+            status = simulation.advance(int(target) - step)
+            elapsed = time.perf_counter() - begun - (self.spent["compilation"] - compiled)
+            self.spent["steps"] += elapsed
+            if status != DONE:
+                if not boundary.delete_leaving(hub, simulation, snapshot):
+                    diagnosis.stop(hub, simulation, status, snapshot, self.place)
+                snapshot, kept = simulation.snapshot(), simulation.step
+                continue
+            boundary.tell_of_bounces(hub, simulation)
+            if compiled < self.spent["compilation"]:
+                # A rate that counts compilation would promise hours.
+                hub.console.end_run()
+                hub.console.begin_run(
+                    simulation.step, self._fraction(simulation, first_step, first_time) or 0.0
+                )
+            taken = max(simulation.step - step, 1)
+            chunk = int(min(CHUNK, max(1, PATIENCE * taken / max(elapsed, 1e-9))))
+            with self._timed("output"):
+                if simulation.step < last_step and simulation.time < self.end_time:
+                    output.write()
+                hub.console.progress(
+                    simulation.step,
+                    simulation.time,
+                    self._fraction(simulation, first_step, first_time),
+                )
+
+    def _goes_on(self) -> bool:
+        values = self.hub.values
+        if self.condition.names - {"time", "timestep", "dt"}:
+            self.hub.refresh_values()
+        holds = bool(self.condition.evaluate(values))
+        return holds != self.until
+
+    def _fraction(self, simulation: Simulation, first_step: int, first_time: float) -> float | None:
+        if self.steps:
+            return (simulation.step - first_step) / self.steps
+        if isfinite(self.end_time) and self.end_time > first_time:
+            return (simulation.time - first_time) / (self.end_time - first_time)
+        return None
+
+    # --- around the loop ----------------------------------------------------------------------
+
+    @contextmanager
+    def _timed(self, name: str) -> Iterator[None]:
+        begun, compiled = time.perf_counter(), self.spent["compilation"]
+        yield
+        compilation = self.spent["compilation"] - compiled
+        self.spent[name] += time.perf_counter() - begun - compilation
+
+    @contextmanager
+    def _interruptible(self) -> Iterator[None]:
+        """Ctrl-C ends the run after the present chunk; a second one at once."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def note(number: int, frame: Any) -> None:
+            if self.interrupted:
+                raise KeyboardInterrupt
+            self.interrupted = True
+
+        before = signal.signal(signal.SIGINT, note)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+    @contextmanager
+    def _telling_of_compilation(self) -> Iterator[None]:
+        """Say so when kernels are compiled, and count the time."""
+        from numba.core import event
+
+        runner = self
+
+        class Listener(event.Listener):
+            depth = 0
+            begun = 0.0
+            said = False
+
+            def on_start(self, _: Any) -> None:
+                self.depth += 1
+                if self.depth == 1:
+                    self.begun = time.perf_counter()
+                    if not self.said:
+                        self.said = True
+                        runner.hub.console.say(
+                            "Compiling for this kind of scene (only the first time) ..."
+                        )
+
+            def on_end(self, _: Any) -> None:
+                self.depth -= 1
+                if self.depth == 0:
+                    runner.spent["compilation"] += time.perf_counter() - self.begun
+
+        listener = Listener()
+        event.register("numba:compile", listener)
+        try:
+            yield
+        finally:
+            event.unregister("numba:compile", listener)
+
+    def _banner(self, simulation: Simulation) -> None:
+        hub = self.hub
+        hub.console.banner(
+            "Run",
+            {
+                "method": hub.update.words,
+                "points": int(simulation.present.sum()),
+                "nodes": hub.fields.node_count,
+                "dt": simulation.dt,
+                "stable dt": simulation.limit,
+                "threads": simulation.threads,
+                "precision": hub.settings.precision,
+            },
+        )
+
+    def _summary(self, simulation: Simulation, first_step: int, wall: float) -> None:
+        steps = simulation.step - first_step
+        rate = steps * simulation.count / self.spent["steps"] if self.spent["steps"] > 0 else 0.0
+        stages = list(self.spent.items())
+        stages.append(("rest", max(wall - sum(self.spent.values()), 0.0)))
+        self.hub.console.summary(
+            {
+                "wall time": f"{wall:.3g} s",
+                "steps": steps,
+                "time": simulation.time,
+                "particle-steps/s": f"{rate:.3g}",
+                **boundary.counted(self.hub, simulation),
+            },
+            [(name, seconds) for name, seconds in stages if seconds > 0],
+            title="Run interrupted" if self.interrupted else "Run finished",
+        )

@@ -1,0 +1,470 @@
+"""A lowered scene and the way it runs: in chunks of compiled steps, watched from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import (
+    COURANT,
+    DRIFT,
+    DRIFT_LIMIT,
+    DT,
+    DT_FACTOR,
+    END_TIME,
+    FIRST_LIMIT,
+    FIXED_DT,
+    INITIAL_INTEGRATE,
+    LIMIT,
+    NOW,
+    OVER_LIMIT,
+    SUPPLY_HEAT,
+    TIME,
+    TIMESTEP,
+    WATCH_LIMIT,
+    Hooks,
+    NoHooks,
+)
+from karamelo_py.kernels.export import impose_stress
+from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, show_heat
+from karamelo_py.kernels.hooks import ON_VELOCITY, POINT_STAGES, STAGES, CompiledHook
+from karamelo_py.kernels.laws import can, elastic_law, law_kind
+from karamelo_py.kernels.stages import Everything, SumsToVelocity
+from karamelo_py.kernels.step import (
+    DONE,
+    SORT,
+    Fused,
+    Staged,
+    advance,
+    at_nodes,
+    at_points,
+    choose_dt,
+    map_to_nodes,
+    measure,
+    run_steps,
+    step_size,
+)
+from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
+from karamelo_py.points.kinematics import identity
+from karamelo_py.points.laws import with_stress
+from karamelo_py.run.hooks import lower_hooks
+from karamelo_py.run.lowering import (
+    State,
+    chosen,
+    lower,
+    stable_courant,
+    thread_count,
+)
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import puts_force_on_points
+from karamelo_py.scene.views import NodesView, PointsView
+from karamelo_py.script.errors import ScriptError
+
+
+def scene_key(hub: Hub) -> tuple:
+    """What the arrays of a simulation depend on: while it stays the same, so do they."""
+    update = hub.update
+    return (
+        hub.domain,
+        hub.domain.h if hub.domain else None,
+        tuple(hub.solids.values()),
+        update.method,
+        update.transfer,
+        type(update.transfer),
+        update.thermal,
+        update.anti_locking,
+        update.boundary,
+        puts_force_on_points(hub),
+        hub.settings.precision,
+        hub.settings.threads,
+    )
+
+
+def _sets_initial_state(fix: Any) -> bool:
+    """Whether all a fix does is a hook in Python before the first step."""
+    hooks = fix.hooks()
+    return set(hooks) == {"initial_integrate"} and not isinstance(
+        hooks["initial_integrate"], CompiledHook
+    )
+
+
+class PythonHooks:
+    """Hooks of a step when some fixes act from Python: theirs, and the compiled ones."""
+
+    def __init__(self, simulation: Simulation, fixes: list):
+        self.simulation = simulation
+        self.compiled = lower_hooks(simulation.hub, fixes)
+        self.by_stage: dict[int, list[tuple[Any, Callable]]] = {}
+        for fix in fixes:
+            for name, hook in fix.hooks().items():
+                if not isinstance(hook, CompiledHook):
+                    self.by_stage.setdefault(STAGES[name], []).append((fix, hook))
+
+
+@at_nodes.on(PythonHooks)
+def _(hooks, stage, target, s):
+    at_nodes(hooks.compiled, stage, target, s)
+    for fix, hook in hooks.by_stage.get(stage, ()):
+        hook(NodesView(s, fix.group, stage, before_update=target == ON_VELOCITY))
+
+
+@at_points.on(PythonHooks)
+def _(hooks, stage, then, s):
+    at_points(hooks.compiled, stage, then, s)
+    if stage == INITIAL_INTEGRATE:
+        hooks.simulation.clear_forces()
+    for fix, hook in hooks.by_stage.get(stage, ()):
+        view = PointsView(hooks.simulation, fix.group, bool(then))
+        hook(view)
+        if view.moved and stage == INITIAL_INTEGRATE:
+            hooks.simulation.sort()
+        elif view.moved:
+            s.control.real[DRIFT] = np.inf
+
+
+@at_heat_nodes.on(PythonHooks)
+def _(hooks, stage, target, s):
+    at_heat_nodes(hooks.compiled, stage, target, s)
+    # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
+    for fix, hook in hooks.by_stage.get(stage, ()):
+        heat = s._replace(nodes=s.heat.nodes)
+        hook(NodesView(heat, fix.group, stage, before_update=target == ON_VELOCITY))
+
+
+@at_heated_points.on(PythonHooks)
+def _(hooks, s):
+    at_heated_points(hooks.compiled, s)
+    for fix, hook in hooks.by_stage.get(SUPPLY_HEAT, ()):
+        hook(PointsView(hooks.simulation, fix.group, then=False))
+
+
+class Simulation:
+    """The arrays of a scene, and how they go forward in time."""
+
+    def __init__(self, hub: Hub, previous: Simulation | None = None):
+        self.hub = hub
+        self.key = scene_key(hub)
+        state = previous.state() if previous else None
+        self.setup, self.tiles = lower(hub, state)
+        self.count = sum(len(s.x0) for s in hub.solids.values())
+        self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
+        if state is not None:
+            self.present[: state.count] = state.present
+        self.x0 = np.concatenate([s.x0 for s in hub.solids.values()])
+        self.solid_of = np.concatenate(
+            [np.full(len(s.x0), k, np.int32) for k, s in enumerate(hub.solids.values())]
+        )
+        self.threads = thread_count(hub, self.count)
+        self.mode = Threaded() if self.threads > 1 else Serial()
+        self.version = 0  # grows when fields change without a step
+        self._measured = -1  # the version whose fastest point is known
+        # Fixes of the first step that have acted: not again when the scene is lowered anew.
+        self._begun: set[Any] = set(previous._begun) if previous else set()
+        self.staged = False
+        self.hooks: Hooks | NoHooks = NoHooks()
+        self._first: PythonHooks | None = None
+        self._first_fixes: list = []
+        self._mapped = False  # whether the nodes show a state of this simulation
+
+    def fits(self, hub: Hub) -> bool:
+        """Whether the arrays are still those of the scene."""
+        return self.key == scene_key(hub)
+
+    # --- fields by id -------------------------------------------------------------------------
+
+    @property
+    def now(self) -> int:
+        """Which of the two position arrays is the present one."""
+        return int(self.setup.control.whole[NOW])
+
+    def by_id(self, field: Callable) -> np.ndarray:
+        """A field of all points in the order of their ids; `field` takes it from a block.
+
+        It is zero for points that were deleted.
+        """
+        blocks = self.setup.blocks
+        first = field(blocks[0])
+        out = np.zeros((self.count, *first.shape[1:]), first.dtype)
+        for block in blocks:
+            out[block.id] = field(block)
+        return out
+
+    def members(self, group: Any) -> np.ndarray:
+        """Ids (0-based) of a particle group, without deleted points."""
+        ids = np.arange(self.count) if group.all else group.ids
+        return ids if self.present.all() else ids[self.present[ids]]
+
+    @property
+    def x(self) -> np.ndarray:
+        """(N, d) present positions by id."""
+        d = self.setup.kin.dimension
+        return self.by_id(lambda block: block.x[self.now][:, :d])
+
+    @property
+    def v(self) -> np.ndarray:
+        """(N, d) velocities by id."""
+        return self.by_id(lambda block: block.points.v)
+
+    @property
+    def mass(self) -> np.ndarray:
+        """(N,) masses by id."""
+        return self.by_id(lambda block: block.points.mass)
+
+    def state(self) -> State:
+        """All that a new lowering takes over."""
+        laws = {}
+        for block in self.setup.blocks:
+            points = block.points
+            rows = np.zeros((self.count, points.state.shape[1]), points.state.dtype)
+            rows[block.id] = points.state
+            laws[law_kind(block.laws)] = rows
+        keeps = self.setup.blocks[0].points.moment is not None
+        moment = self.by_id(lambda block: block.points.moment) if keeps else None
+        places = self.by_id(lambda block: block.x[self.now])
+        counts = self.setup.blocks[0].points.bounces is not None
+        bounces = self.by_id(lambda block: block.points.bounces) if counts else None
+        f = self._deformation()
+        contact = self.setup.contact
+        conducts = self.setup.blocks[0].points.heat is not None
+        heat = self.by_id(lambda block: block.points.heat) if conducts else None
+        return State(
+            self.count, places, self.v, laws, moment, f, self.present, bounces, heat, contact
+        )
+
+    def _deformation(self) -> np.ndarray | None:
+        """F of all points, where a block has an array for it; others are left undeformed."""
+        blocks = self.setup.blocks
+        if all(block.points.deformation is None for block in blocks):
+            return None
+        kin = self.setup.kin
+        out = np.tile(np.array(identity(kin, 1.0)), (self.count, 1))
+        for block in blocks:
+            if block.points.deformation is not None:
+                out[block.id] = block.points.deformation
+        return out
+
+    def set_stress(self, ids: np.ndarray, given: dict[str, np.ndarray]) -> None:
+        """Set components of the Cauchy stress (by name, "11" ...) of the points `ids`."""
+        s = self.setup
+        names = s.kin.symmetric_names
+        chosen = np.zeros(self.count, np.bool_)
+        chosen[ids] = True
+        stress = np.zeros((self.count, len(names)), s.nodes.sums.dtype)
+        for k, name in enumerate(names):
+            if name in given:
+                stress[ids, k] = given[name]
+        flags = np.array([name in given for name in names])
+        for block in s.blocks:
+            if can(elastic_law(block.laws), with_stress):
+                rows = stress[block.id]
+                part = chosen[block.id]
+                like = s.nodes.sums[0, 0]
+                impose_stress(s.kin, like, block.points, block.laws, part, flags, rows)
+        self.version += 1
+
+    def remove(self, ids: np.ndarray) -> None:
+        """Take points out of the run; the ids of the others stay."""
+        self.present[ids] = False
+        blocks = tuple(chosen(block, self.present[block.id]) for block in self.setup.blocks)
+        self.setup = self.setup._replace(blocks=blocks)
+        self.setup.control.real[DRIFT] = np.inf
+        self.version += 1
+        # The rate of the last step stays: the same whether or not a run begins here.
+        self._measured = self.version
+
+    @property
+    def bounces(self) -> int:
+        """How often points were reflected at the edge of the domain."""
+        counts = [b.points.bounces for b in self.setup.blocks if b.points.bounces is not None]
+        return int(sum(float(count.sum()) for count in counts))
+
+    def clear_forces(self) -> None:
+        """Points bear no force of fixes, until these say so anew."""
+        for block in self.setup.blocks:
+            if block.points.force is not None:
+                block.points.force[:] = 0
+
+    # --- stepping -----------------------------------------------------------------------------
+
+    def begin(self, end_time: float) -> None:
+        """Start of a run: choose the first dt; the run ends at `end_time` at the latest."""
+        import numba
+
+        if self.threads > 1:
+            numba.set_num_threads(self.threads)
+        update = self.hub.update
+        control = self.setup.control
+        control.real[FIXED_DT] = update.fixed_dt or 0.0
+        control.real[COURANT] = stable_courant(self.hub)
+        control.real[DT_FACTOR] = update.dt_factor
+        control.real[END_TIME] = end_time
+        control.whole[OVER_LIMIT] = 0
+        # Twice: initial values may be formulas of dt, and dt follows the fastest point.
+        self._choose_dt()
+        self._prepare_hooks()
+        update.method.begin(self.hub, self.setup.contact)
+        self._choose_dt()
+        if not np.isfinite(self.dt):
+            raise ScriptError(
+                "nothing limits the time step: all that there is is rigid and at rest",
+                hint="set_dt(...), or a velocity from fix initial_velocity_particles",
+            )
+        # A body at rest that has no waves has no first limit to compare with.
+        if control.real[FIRST_LIMIT] == 0 and np.isfinite(self.limit) and not update.fixed_dt:
+            control.real[FIRST_LIMIT] = self.limit
+        control.whole[WATCH_LIMIT] = int(not self.above_limit())
+        control.whole[OVER_LIMIT] = 0
+
+    def _choose_dt(self) -> None:
+        if self._measured != self.version:
+            # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
+            measure(self.setup)
+            self._measured = self.version
+        choose_dt(self.setup.control)
+
+    def sort(self) -> None:
+        """Sort the points by tile."""
+        self.tiles.sort(self.setup, self.mode)
+
+    def sort_if_due(self) -> None:
+        """Sort the points when one may have left its tile's surroundings, or none is sorted yet."""
+        control = self.setup.control.real
+        if control[DRIFT] > control[DRIFT_LIMIT]:
+            self.sort()
+
+    @property
+    def limit(self) -> float:
+        """The stable step of the present state."""
+        return float(self.setup.control.real[LIMIT])
+
+    def above_limit(self) -> bool:
+        """Whether the chosen step is above the stable limit already."""
+        return self.setup.control.values[DT] > self.limit * (1 + 1e-12)
+
+    @property
+    def dt(self) -> float:
+        """The next step."""
+        return float(self.setup.control.values[DT])
+
+    @property
+    def time(self) -> float:
+        """Present time."""
+        return float(self.setup.control.values[TIME])
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken in the whole script."""
+        return int(self.setup.control.values[TIMESTEP])
+
+    def advance(self, count: int) -> int:
+        """Take up to `count` steps (to the end time at most); DONE, or why it stopped.
+
+        Points that are due to be sorted are sorted before the next step, so that the nodes keep
+        showing the last one.
+        """
+        target = self.step + count
+        control = self.setup.control
+        while True:
+            self.sort_if_due()
+            status = self._advance(target - self.step)
+            self._mapped = True
+            ended = self.step >= target or control.values[TIME] >= control.real[END_TIME]
+            if status != SORT:
+                return status
+            if ended:
+                return DONE
+
+    def _advance(self, count: int) -> int:
+        scheme = self.hub.update.scheme
+        if self._first is not None:
+            status = run_steps(scheme, Staged(), self.mode, self.setup, self._first, 1)
+            if status in (DONE, SORT):
+                self._begun |= set(self._first_fixes)
+                self._first = None
+                self.clear_forces()  # the steps to come may have no hook that does it
+                return SORT  # there is more to do, unless that was all
+            return status
+        if self._python.by_stage:
+            return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
+        visits = Staged() if self.staged else Fused()
+        return advance(scheme, visits, self.mode, self.setup, self.hooks, count)
+
+    def _prepare_hooks(self) -> None:
+        """Sort the fixes by how they act: once before the first step, in it, in every step."""
+        fixes = list(self.hub.fixes.values())
+        lasting = [fix for fix in fixes if not fix.first_step_only]
+        new = [fix for fix in fixes if fix.first_step_only and fix not in self._begun]
+        self._python = PythonHooks(self, lasting)
+        self.hooks = self._python.compiled
+        self.staged = bool(self._python.by_stage) or any(
+            name in POINT_STAGES for fix in lasting for name in fix.hooks()
+        )
+        at_once = [fix for fix in new if _sets_initial_state(fix)]
+        for fix in at_once:
+            # Nothing happens in a step before this hook: the state shows it from the start.
+            view = PointsView(self, fix.group, then=False)
+            fix.hooks()["initial_integrate"](view)
+            if view.moved:
+                self.setup.control.real[DRIFT] = np.inf
+            self.version += 1
+        self._begun |= set(at_once)
+        self._first_fixes = [fix for fix in new if fix not in at_once]
+        self._first = None
+        if self._first_fixes:
+            together = [fix for fix in fixes if fix in lasting or fix in self._first_fixes]
+            self._first = PythonHooks(self, together)
+
+    def show_on_nodes(self) -> None:
+        """See that the nodes show the present state when no step has been taken yet."""
+        if not self._mapped:
+            s = self.setup
+            self.sort_if_due()
+            dt = step_size(s)
+            map_to_nodes(s, self.mode, Everything())
+            sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
+            show_heat(s.heat, s, self.mode)
+            self._mapped = True
+
+    # --- state that can be returned to --------------------------------------------------------
+
+    def snapshot(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Every array that a step changes, with a copy."""
+        s = self.setup
+        arrays = [s.control.values, s.control.real, s.control.whole, s.spans[: 1 + s.spans[0, 0]]]
+        for block in s.blocks:
+            points = [field for field in block.points if field is not None]
+            tiling = block.tiling
+            used = tiling.colour[-1]
+            arrays += [block.x, *points, block.id, block.grid, tiling.colour]
+            arrays += [tiling.range[:used], tiling.grid[:used]]
+            if block.home is not None:
+                arrays.append(block.home)
+        arrays += self.hub.update.method.remembered(s.contact, s.spans[1 : 1 + s.spans[0, 0]])
+        return [(array, array.copy()) for array in arrays]
+
+    def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:
+        """Return to a snapshot."""
+        s = self.setup
+        # Nodes that were not in use then have to be empty, as they were.
+        spans = s.spans[1 : 1 + s.spans[0, 0]].copy()
+        for begin, end in spans:
+            s.nodes.sums[begin:end] = 0
+            if s.nodes.normal is not None:
+                s.nodes.normal[begin:end] = 0
+            if isinstance(s.heat, Conducting):
+                s.heat.nodes.sums[begin:end] = 0
+        for array, copy in snapshot:
+            array[...] = copy
+        for marks in self.hub.update.method.remembered(s.contact, spans):
+            marks[np.abs(marks) > self.step] = 0
+        self.version += 1
+
+    def wrong_points(self) -> Iterator[tuple[Any, int]]:
+        """Block and index of the points that the last sweep found wrong, one a tile at most."""
+        for block in self.setup.blocks:
+            tiling = block.tiling
+            for t in range(max(int(tiling.colour[-1]), 1)):
+                if tiling.report[t, 2] > 0:
+                    yield block, int(tiling.report[t, 2]) - 1

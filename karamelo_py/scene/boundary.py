@@ -1,0 +1,114 @@
+"""What becomes of points that reach the edge of the domain (command boundary)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.language import registry
+from karamelo_py.language.scene import Scene
+from karamelo_py.points.basis import carried
+from karamelo_py.script.errors import ScriptError
+
+
+def check(hub: Scene) -> None:
+    """Refuse what does not go together; called before every run."""
+    update = hub.update
+    if update.boundary == "error":
+        return
+    if not update.method.frame.moves:
+        name = registry.name_of("method", type(update.method))
+        raise ScriptError(
+            f"boundary({update.boundary}) has no meaning here: the grids of {name} belong to "
+            "the solids and go with them, so that no point can leave one",
+            place=update.boundary_place,
+            hint="leave boundary out, or method(ulmpm, ...)",
+        )
+    if update.boundary == "delete":
+        pairs = [fix for fix in hub.fixes.values() if fix.needs_all_points]
+        if pairs:
+            raise ScriptError(
+                f"fix {pairs[0].style} '{pairs[0].id}' counts on all points of its solids, and "
+                "boundary(delete) may take some away",
+                place=update.boundary_place,
+                hint="boundary(reflect), or method(ulmpm/contacts, ...) in the place of the fix",
+            )
+    elif carried(update.method.basis, update.method.kinematics(hub)) > 0:
+        raise ScriptError(
+            f"boundary(reflect) cannot mirror {type(update.method.basis).__name__} domains, "
+            "whose corners go with the grid",
+            place=update.boundary_place,
+            hint="boundary(delete), or domains that do not carry corners, such as R4 and R8",
+        )
+
+
+def leaving(simulation: Any) -> np.ndarray:
+    """Ids (0-based, ascending) of the points whose new places lie beyond the edge."""
+    found = []
+    s, then = simulation.setup, 1 - simulation.now
+    for block in s.blocks:
+        beyond = np.zeros(len(block.id), np.bool_)
+        finite = np.ones(len(block.id), np.bool_)
+        edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
+        for k in range(s.kin.dimension):
+            y = block.x[then][:, k]
+            lower, size = (edge[block.grid] for edge in edges[k])
+            slack = s.grids.slack[block.grid]
+            a = (y - lower) * s.grids.inv_h[block.grid]
+            beyond |= (a < -slack) | (a > size + slack)
+            finite &= np.isfinite(y)
+        found.append(block.id[beyond & finite])
+    return np.sort(np.concatenate(found))
+
+
+def delete_leaving(hub: Scene, simulation: Any, snapshot: list) -> bool:
+    """Take out of a step that went wrong the points that leave in it, if the scene says so.
+
+    The run is then where it was before that step. Which points leave depends on the state alone,
+    so that the results are the same however a run is cut and on whatever number of threads.
+    """
+    if hub.update.boundary != "delete":
+        return False
+    gone = leaving(simulation)
+    if not len(gone):
+        return False
+    step, first = simulation.step, simulation.present.all()
+    simulation.restore(snapshot)
+    if step > simulation.step:
+        simulation.advance(step - simulation.step)
+    simulation.remove(gone)
+    if first:
+        solid = list(hub.solids.values())[int(simulation.solid_of[gone[0]])]
+        hub.warn(
+            f"step {step + 1}, time {simulation.time:.6g}: point {gone[0] + 1} of solid "
+            f"'{solid.id}' leaves the domain and is deleted; more are only counted",
+            place=hub.update.boundary_place,
+        )
+    if not simulation.present.any():
+        raise ScriptError(
+            f"step {step + 1}, time {simulation.time:.6g}: all points have left the domain",
+            place=hub.update.boundary_place,
+            hint="a shorter run, or a larger domain",
+        )
+    return True
+
+
+def tell_of_bounces(hub: Scene, simulation: Any) -> None:
+    """Warn when the first points were reflected."""
+    if hub.update.boundary == "reflect" and not hub.update.told_of_bounces and simulation.bounces:
+        hub.update.told_of_bounces = True
+        hub.warn(
+            f"by step {simulation.step}, time {simulation.time:.6g}, points were reflected at the "
+            "edge of the domain; more are only counted",
+            place=hub.update.boundary_place,
+        )
+
+
+def counted(hub: Scene, simulation: Any) -> dict[str, int]:
+    """What the end of a run says of it."""
+    if hub.update.boundary == "delete":
+        return {"deleted points": int(np.count_nonzero(~simulation.present))}
+    if hub.update.boundary == "reflect":
+        return {"reflections": simulation.bounces}
+    return {}

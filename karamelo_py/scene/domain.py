@@ -1,0 +1,123 @@
+"""The domain: the box that holds everything, and the background grid laid over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.scene.lattice import CHUNK, RELATIVE_TOLERANCE, Lattice
+from karamelo_py.script.errors import ScriptError
+
+__all__ = ["CHUNK", "Domain", "require_domain", "require_grid"]
+
+
+class Domain:
+    """A box with a grid of square cells that starts at its lower corner.
+
+    The grid covers the whole box; when a side is not a multiple of `h` it reaches over the upper
+    corner by less than one cell.
+
+    Parameters
+    ----------
+    dimension
+        1, 2 or 3.
+    lo, hi
+        Corners, one number per dimension.
+    h
+        Cell size; None leaves the grid to the first solid (the older language).
+
+    Attributes
+    ----------
+    lo, hi : ndarray (3,)
+        Corners; 0 in unused directions.
+    shape : tuple of 3 int
+        Nodes per direction, 1 in unused directions.
+    cells : tuple of 3 int
+        Cells per direction, 1 in unused directions.
+    axisymmetric : bool
+        Whether x is a radius and y the axis.
+    """
+
+    axisymmetric = False
+
+    def __init__(self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float | None):
+        self.dimension = dimension
+        self.lo = np.zeros(3)
+        self.hi = np.zeros(3)
+        self.lo[:dimension] = lo
+        self.hi[:dimension] = hi
+        self.h: float | None = None
+        self.shape: tuple[int, int, int] = (1, 1, 1)
+        self.cells: tuple[int, int, int] = (1, 1, 1)
+        if h is not None:
+            self.set_cell_size(h)
+
+    def set_cell_size(self, h: float) -> None:
+        """Lay the grid.
+
+        Raises
+        ------
+        ScriptError
+            When there would be more nodes than can be counted.
+        """
+        lattice = Lattice(self.dimension, self.lo, self.hi, h)
+        self.h = lattice.h
+        self.cells, self.shape = lattice.cells, lattice.shape
+
+    @property
+    def tolerance(self) -> float:
+        """Distance from a face within which a point lies on it."""
+        size = self.h if self.h is not None else float((self.hi - self.lo).max()) * 1e-3
+        return RELATIVE_TOLERANCE * size
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        """Which of the positions `x` (n, >= dimension) lie in the closed box: (n,) bool."""
+        tolerance = self.tolerance
+        inside = np.ones(len(x), dtype=bool)
+        for axis in range(self.dimension):
+            inside &= x[:, axis] >= self.lo[axis] - tolerance
+            inside &= x[:, axis] <= self.hi[axis] + tolerance
+        return inside
+
+
+def require_domain(hub: Scene) -> Domain:
+    """The domain of the scene.
+
+    Raises
+    ------
+    ScriptError
+        When there is none yet.
+    """
+    if hub.domain is None:
+        announced = getattr(hub, "announced_dimension", None)
+        if announced:
+            raise ScriptError(
+                f"the domain has no size yet: dimension({announced}) only says how many "
+                "directions there are",
+                expected="create_domain(...) or the longer form of dimension(...) before this line",
+            )
+        raise ScriptError(
+            "there is no domain yet",
+            expected="dimension(...) before this line, such as "
+            "dimension(2, xmin, xmax, ymin, ymax, h)",
+        )
+    return hub.domain
+
+
+def require_grid(hub: Scene) -> Domain:
+    """The domain of the scene with its grid.
+
+    Raises
+    ------
+    ScriptError
+        When there is no domain, or no cell size yet.
+    """
+    domain = require_domain(hub)
+    if domain.h is None:
+        raise ScriptError(
+            "the grid has no cell size yet",
+            expected="h as the last argument of create_domain, or a solid before this line",
+        )
+    return domain

@@ -1,0 +1,196 @@
+"""Groups: sets of points or of nodes that fixes, computes and dumps act on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.domain import CHUNK, require_grid
+from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.region import Region, look_up
+from karamelo_py.scene.solid import Solid
+from karamelo_py.script.errors import Place, ScriptError
+
+ALL = "all"
+NOTHING_THERE = "what acts on this group does nothing there"
+
+
+class Group:
+    """What point groups and node groups share.
+
+    Attributes
+    ----------
+    all : bool
+        Whether this is the group of everything, which also takes in what is made later.
+    """
+
+    kind = ""
+    id: str = ""
+    place: Place | None = None
+
+    def __init__(self, hub: Scene, *, everything: bool = False):
+        self.hub = hub
+        self.all = everything
+        if everything:
+            self.id = ALL
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+    @property
+    def members(self) -> np.ndarray:
+        """Numbers (from 0) of the members, ascending: (n,) int64."""
+        if self.all:
+            return np.arange(self.total(), dtype=np.int64)
+        return self.chosen()
+
+    def total(self) -> int:
+        """Number of points or nodes that there are."""
+        raise NotImplementedError
+
+    def chosen(self) -> np.ndarray:
+        """Members of a group that is not the group of everything."""
+        raise NotImplementedError
+
+    def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
+        """Numbers, ascending, of what lies in `region` and belongs to `solids`: (n,) int64.
+
+        Without `solids`, to any. Of a region that is not known yet nothing is found.
+        """
+        raise NotImplementedError
+
+    def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
+        """Add what lies in `region`, see `find`; returns how many were found."""
+        raise NotImplementedError
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Group:
+        """The group that `argument` names; the word ``all`` is the group of everything."""
+        if ALL in (argument.text, argument.word()):
+            return cls(hub, everything=True)
+        group = look_up(hub.groups, argument)
+        if not isinstance(group, cls):
+            raise ScriptError(
+                f"group '{group.id}' is a group of {group.kind}",
+                place=argument.place,
+                expected=f"a group of {cls.kind}: group(ID, {cls.kind}, region, ...)",
+            )
+        return group
+
+
+class ParticleGroup(Group):
+    """A set of points, by their reference positions. Members are decided when they are added."""
+
+    kind = "particles"
+    _members = np.empty(0, dtype=np.int64)
+
+    @property
+    def ids(self) -> np.ndarray:
+        """Point numbers (id - 1), ascending: (n,) int64."""
+        return self.members
+
+    def total(self) -> int:
+        """Number of points of all solids."""
+        return sum(solid.count for solid in self.hub.solids.values())
+
+    def chosen(self) -> np.ndarray:
+        """See `Group.chosen`."""
+        return self._members
+
+    def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
+        """See `Group.add`."""
+        found = self.find(region, solids)
+        self._members = np.union1d(self._members, found)
+        return len(found)
+
+    def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
+        """Points of `solids` whose reference position lies in `region`."""
+        found = [np.empty(0, dtype=np.int64)]
+        if region.unknown:
+            return found[0]
+        if solids is None:
+            solids = tuple(self.hub.solids.values())
+        for solid in sorted(set(solids), key=lambda solid: solid.first_id):
+            for start in range(0, solid.count, CHUNK):
+                inside = region.inside(solid.x0[start : start + CHUNK])
+                found.append(np.flatnonzero(inside) + (solid.first_id + start))
+        return np.concatenate(found)
+
+
+class NodeGroup(Group):
+    """A set of nodes, by their positions. Methods decide whether solids share them.
+
+    The group is what was said of it, not a list of numbers: solids and methods that come later may
+    bring grids of their own, and what lies in the region there belongs to it, too.
+
+    Attributes
+    ----------
+    awaits_solids : bool
+        Whether solids that are made later may bring the first members.
+    """
+
+    kind = "nodes"
+    awaits_solids = False
+
+    def __init__(self, hub: Scene, *, everything: bool = False):
+        super().__init__(hub, everything=everything)
+        self._parts: tuple[tuple[Region, Sequence[Solid] | None], ...] = ()
+        self._found: tuple[list[Lattice], np.ndarray] | None = None
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Node numbers, ascending: (n,) int64."""
+        return self.members
+
+    def total(self) -> int:
+        """Number of nodes of all grids."""
+        require_grid(self.hub)
+        return sum(lattice.node_count for lattice in self.hub.lattices)
+
+    def chosen(self) -> np.ndarray:
+        """See `Group.chosen`; looked for again where there are other grids than before."""
+        lattices = self.hub.lattices
+        if self._found is None or self._found[0] is not lattices:
+            members = np.empty(0, dtype=np.int64)
+            for part in self._parts:
+                members = np.union1d(members, self.find(*part))
+            self._found = lattices, members
+        return self._found[1]
+
+    def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
+        """See `Group.add`."""
+        self._parts = (*self._parts, (region, solids))
+        self._found = None
+        return len(self.find(region, solids))
+
+    def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
+        """Nodes in `region`; where solids have nodes of their own, those of `solids`."""
+        if region.unknown:
+            return np.empty(0, dtype=np.int64)
+        require_grid(self.hub)
+        method, lattices = self.hub.update.method, self.hub.lattices
+        if solids is not None and len(lattices) > 1:
+            wanted = {method.lattice_of(self.hub, solid) for solid in solids}
+            lattices = [lattices[k] for k in sorted(wanted)]
+        found = [np.empty(0, dtype=np.int64)]
+        for lattice in lattices:
+            for number, x in lattice.between(region.box_lo, region.box_hi):
+                found.append(number[region.inside(x)])
+        return np.concatenate(found)
+
+
+class AnyGroup:
+    """For signatures: a group of points or of nodes. The word ``all`` means all points here."""
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> ParticleGroup | NodeGroup:
+        """The group that `argument` names."""
+        if ALL in (argument.text, argument.word()):
+            return ParticleGroup(hub, everything=True)
+        return look_up(hub.groups, argument)
+
+
+KINDS: dict[str, type[Group]] = {kind.kind: kind for kind in (ParticleGroup, NodeGroup)}

@@ -1,0 +1,211 @@
+"""The hub (Karamelo's Pointers): what every command and style may see."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+from karamelo_py.language import registry
+from karamelo_py.language.faults import told
+from karamelo_py.output.console import Console
+from karamelo_py.output.fields import Fields
+from karamelo_py.output.output import Output
+from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.update import Update
+from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
+from karamelo_py.script.values import Values
+
+
+class Catalogue(dict):
+    """Named parts of a scene, in creation order; items keep their ``id`` and ``place``."""
+
+    def __init__(self, kind: str, hub: Hub):
+        super().__init__()
+        self.kind = kind
+        self.hub = hub
+
+    def add(self, ID: str, item: Any, *, replace: bool = False) -> Any:
+        """File `item` under `ID`; a second use of an ID is an error unless `replace`."""
+        if not replace:
+            self.refuse(ID)
+        item.id = ID
+        item.place = self.hub.place
+        self[ID] = item
+        return item
+
+    def refuse(self, ID: str) -> None:
+        """An ID that is in use is an error."""
+        if ID in self:
+            before = getattr(self[ID], "place", None)
+            where = f" (line {before.line})" if before else ""
+            raise ScriptError(f"{self.kind} ID '{ID}' is already used{where}", argument="ID")
+
+    def __missing__(self, ID: str) -> Any:
+        always = ["all"] if self.kind == "group" else []
+        known = ", ".join([*always, *self])
+        close = nearest(ID, [*always, *self])
+        other = next((c.kind for c in self.hub.catalogues if ID in c and c.kind != self.kind), None)
+        raise ScriptError(
+            f"unknown {self.kind} '{ID}'" + (f"; '{ID}' is a {other}" if other else ""),
+            expected=f"one of {known}" if known else f"no {self.kind} is defined yet",
+            hint=_group_of(other, ID)
+            if self.kind == "group" and other in ("region", "solid")
+            else f"did you mean '{close}'?"
+            if close
+            else None,
+        )
+
+    def remove(self, ID: str) -> None:
+        """Forget `ID`; unknown is an error."""
+        self[ID]
+        del self[ID]
+
+
+def _group_of(kind: str, ID: str) -> str:
+    """How to make a group of a region or a solid."""
+    who = f"{ID}, all" if kind == "region" else f"regionID, solid, {ID}"
+    return f"group({ID}, particles, region, {who}) makes a group of a {kind}"
+
+
+class Settings:
+    """What the command line or the script chose about how to compute."""
+
+    def __init__(self) -> None:
+        self.threads: int | None = None
+        self.precision = "double"
+        self.engine = "processor"
+        self.debug = False
+
+
+class Hub:
+    """The scene, how it goes forward, and what it writes.
+
+    Attributes
+    ----------
+    domain
+        The domain, or None before ``dimension``.
+    regions, load_paths, elements, solids, groups, fixes, computes, dumps
+        Catalogues of what the script has named.
+    materials, eos, strengths, damages, temperatures
+        The same: materials, and the parts that some are made of.
+    values
+        Numbers that fixes and computes publish, and time, timestep, dt.
+    place
+        Place of the statement in progress.
+    rehearsing
+        True while the rest of a script is tried before the first step: nothing runs or is written.
+    checking
+        True under ``karamelo-py check``: the first run only reports.
+    """
+
+    def __init__(self, console: Console | None = None):
+        self.console = console or Console()
+        self.settings = Settings()
+        self.folder = Path.cwd()
+        self.place: Place | None = None
+        self.rehearsing = False
+        self.rehearsed = False
+        self.checking = False
+        self.interpreter: Any = None
+        self.domain: Any = None
+        self.announced_dimension: int | None = None
+        self.regions = Catalogue("region", self)
+        self.eos = Catalogue("eos", self)
+        self.strengths = Catalogue("strength", self)
+        self.damages = Catalogue("damage", self)
+        self.temperatures = Catalogue("temperature", self)
+        self.materials = Catalogue("material", self)
+        self.load_paths = Catalogue("load path", self)
+        self.elements = Catalogue("element", self)
+        self.solids = Catalogue("solid", self)
+        self.groups = Catalogue("group", self)
+        self.fixes = Catalogue("fix", self)
+        self.computes = Catalogue("compute", self)
+        self.dumps = Catalogue("dump", self)
+        self.values = Values()
+        self.update = Update(self.values)
+        self.output = Output(self)
+        self.fields = Fields(self)
+        self._simulation: Any = None
+        self._lattices: tuple[tuple, list[Lattice]] | None = None
+
+    @property
+    def catalogues(self) -> list[Catalogue]:
+        """All that has names."""
+        return [item for item in vars(self).values() if isinstance(item, Catalogue)]
+
+    @property
+    def simulation(self) -> Any:
+        """The arrays of the scene as it is now, made when first asked for."""
+        engine = registry.find("engine", self.settings.engine)
+        if self._simulation is None or not self._simulation.fits(self):
+            self._simulation = engine(self, self._simulation)
+        return self._simulation
+
+    @property
+    def lattices(self) -> list[Lattice]:
+        """The grids of the scene: of the method, or that of the domain before there is one.
+
+        The same list as long as they stay the same.
+        """
+        domain, method = self.domain, self.update.method
+        key = (domain, domain.h, method, *self.solids.values())
+        if self._lattices is None or self._lattices[0] != key:
+            if method is None:
+                lattices = [Lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
+            else:
+                lattices = method.lattices(self)
+            self._lattices = key, lattices
+        return self._lattices[1]
+
+    def forget_simulation(self) -> None:
+        """The points of a solid were replaced: arrays and grids are made anew when asked for."""
+        self._simulation = None
+        self._lattices = None
+
+    def refresh_values(self) -> None:
+        """Let computes and fixes measure the present state."""
+        for catalogue in (self.computes, self.fixes):
+            for item in catalogue.values():
+                with told(f"{catalogue.kind} {item.style}", "refresh", type(item), item.place):
+                    item.refresh()
+
+    def warn(
+        self,
+        message: str,
+        place: Place | None = None,
+        hint: str | None = None,
+        expected: str | None = None,
+    ) -> None:
+        """Tell the user of something that may not be meant; not during a rehearsal."""
+        if not self.rehearsing:
+            text = render_message("warning", message, place or self.place, expected, hint)
+            self.console.warn(text)
+
+    def rehearse(self) -> None:
+        """Try the rest of the script, once, before the first work that takes time."""
+        if not self.rehearsed:
+            self.rehearsed = True
+            self.interpreter.rehearse(self.rehearsal())
+
+    def rehearsal(self) -> Hub:
+        """A copy on which the rest of the script can be tried without consequences."""
+        other = copy.copy(self)
+        other.rehearsing = True
+        for name, mine in vars(self).items():
+            if isinstance(mine, Catalogue):
+                catalogue = Catalogue(mine.kind, other)
+                catalogue.update(mine)
+                setattr(other, name, catalogue)
+        other.settings = copy.copy(self.settings)
+        other.values = copy.deepcopy(self.values)
+        other.update = copy.copy(self.update)
+        other.update.values = other.values
+        other.output = Output(other)
+        other.output.files = dict(self.output.files)
+        for curve in self.output.plots:
+            other.output.plots.add(curve.id, curve)
+        other.output.plots.file = self.output.plots.file
+        other.fields = Fields(other)
+        return other

@@ -1,0 +1,150 @@
+"""Fixes and computes: what acts on a run and what measures it (LAMMPS's and Karamelo's Modify).
+
+A fix overrides the hooks it needs, by the names of Karamelo:
+
+=============================  =================================================================
+``initial_integrate``          before anything else in the step; gets :class:`PointsView`
+``post_particles_to_grid``     mass, momentum and force are on the nodes; :class:`NodesView`
+``post_update_grid_state``     v* is known; :class:`NodesView`
+``post_grid_to_point``         the points have their new velocity and place; :class:`PointsView`
+``post_advance_particles``     the same moment, after all ``post_grid_to_point``
+``post_velocities_to_grid``    the velocity that will deform the points; :class:`NodesView`
+``post_heat_to_grid``          the temperature of the nodes is known; :class:`NodesView` of heat
+``supply_heat``                points may get heat; :class:`PointsView` with ``heat_supply``
+``post_update_grid_heat``      the temperature after the step is known; :class:`NodesView` of heat
+``final_integrate``            the end of the step; :class:`PointsView`
+=============================  =================================================================
+
+The last three are those of thermo-mechanical methods. In a view of heat, ``velocity`` is the
+temperature, (n, 1), ``mass`` the heat capacity and ``force`` the heat flow.
+
+A hook is either a method, called with a view of the group (Python comes back at that stage of each
+step), or the result of :func:`node_hook` or :func:`point_hook`, which is compiled into the loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.hooks import STAGES, CompiledHook, heat_hook, node_hook, point_hook
+from karamelo_py.language.faults import told
+from karamelo_py.language.scene import Scene
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.views import NodesView, PointsView
+from karamelo_py.script.errors import Place
+from karamelo_py.script.values import SUFFIXES
+
+__all__ = ["Compute", "Fix", "NodesView", "PointsView", "heat_hook", "node_hook", "point_hook"]
+
+
+class Fix:
+    """Base of all fixes: acts on its `group` during a run.
+
+    Attributes
+    ----------
+    group
+        The node or particle group it acts on.
+    formulas
+        One formula (or None) for each component, for compiled hooks.
+    published
+        Suffixes of the values it sets: "x" for ``ID_x`` and the like, "" for ``ID``; "x", "y", "z",
+        "s" and "" when a style does not say.
+    first_step_only
+        Whether it acts in the first step after its definition and is idle thereafter.
+    for_method
+        Whether it has no hooks because the method reads it.
+    holds_nodes
+        Whether it prescribes velocities of the nodes of its group in ``post_update_grid_state``,
+        in the directions in which it has a formula: contact does not move them.
+    puts_force_on_points
+        Whether it sets forces on points in ``initial_integrate``, so that they have a field for it.
+    needs_all_points
+        Whether no point may be deleted (boundary delete) while it acts.
+    friction
+        Coefficient of friction between its two `solids`, for methods with contact on the grid; None
+        for fixes that say nothing about that.
+    solids
+        The solids it acts between, of fixes that have no group.
+    id
+        Its ID in the script.
+    """
+
+    group: Any = None
+    formulas: tuple = ()
+    published: tuple[str, ...] = SUFFIXES
+    first_step_only = False
+    for_method = False
+    holds_nodes = False
+    puts_force_on_points = False
+    needs_all_points = False
+    friction: float | None = None
+    solids: tuple = ()
+    id: str = ""
+    style: str = ""
+    place: Place | None = None
+
+    def __init__(self, hub: Scene, group: Any = None):
+        self.hub = hub
+        if group is not None:
+            self.group = group
+
+    def publish(self, name: str, value: float) -> None:
+        """Publish `value` as ID_`name`, or as the plain ID when `name` is empty."""
+        if name not in self.published:
+            raise ValueError(f"'{name}' is not in {type(self).__name__}.published")
+        self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
+
+    def publish_components(self, vector: np.ndarray) -> None:
+        """Publish up to three components as ID_x, ID_y, ID_z, as far as `published` has them."""
+        for name, value in zip("xyz", vector, strict=False):
+            if name in self.published:
+                self.publish(name, value)
+
+    def refresh(self) -> None:
+        """Bring published values up to date; called before the log or a dump is written."""
+
+    def hooks(self) -> dict[str, Any]:
+        """The hooks this fix overrides: name to method or compiled hook."""
+        found = {name: getattr(self, name) for name in STAGES if hasattr(self, name)}
+        return {
+            name: hook if isinstance(hook, CompiledHook) else self._told(name, hook)
+            for name, hook in found.items()
+        }
+
+    def _told(self, name: str, hook: Callable) -> Callable:
+        """`hook`, whose exceptions say where they come from."""
+
+        @wraps(hook)
+        def call(view: Any) -> None:
+            with told(f"fix {self.style}", name, type(self), self.place):
+                hook(view)
+
+        return call
+
+
+def puts_force_on_points(hub: Scene) -> bool:
+    """Whether points of the scene have a field for forces of fixes."""
+    return any(fix.puts_force_on_points for fix in hub.fixes.values())
+
+
+class Compute:
+    """Base of all computes: measures its `group` of points when the log is written."""
+
+    id: str = ""
+    style: str = ""
+    place: Place | None = None
+    published: tuple[str, ...] = SUFFIXES
+
+    def __init__(self, hub: Scene, group: ParticleGroup):
+        self.hub = hub
+        self.group = group
+
+    publish = Fix.publish
+    publish_components = Fix.publish_components
+
+    def refresh(self) -> None:
+        """Measure and publish; override this."""

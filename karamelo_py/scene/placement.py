@@ -1,0 +1,215 @@
+"""Where the points of a filled region are put: cell by cell, as many in each as asked for."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.scene.domain import Domain
+from karamelo_py.scene.lattice import Lattice, boxes
+from karamelo_py.scene.region import Region
+from karamelo_py.script.errors import ScriptError
+
+MAX_POINTS = 2**31 - 1
+# Beyond this many candidates the points outside the domain are no longer counted, only mentioned.
+_MAX_COUNTED = 20_000_000
+
+
+class Placement(NamedTuple):
+    """Points and their initial domains. What is the same for all may be given once.
+
+    Attributes
+    ----------
+    x0 : ndarray (n, d)
+        Positions.
+    volume : float or ndarray (n,)
+        Volumes; per unit thickness in 2D, per unit area in 1D, without the radius.
+    half_size : ndarray (d,) or (n, d)
+        Half edge lengths of the initial domains.
+    lo, hi : ndarray (d,)
+        The box of the solid.
+    outside : float
+        How many more points would lie outside the domain, inf for an unknown number.
+    shape : str
+        ``box``, or the cell type that meshio uses.
+    corners : ndarray (n, c, d) or None
+        Corners of the initial domains that are no boxes.
+    """
+
+    x0: np.ndarray
+    volume: float | np.ndarray
+    half_size: np.ndarray
+    lo: np.ndarray
+    hi: np.ndarray
+    outside: float = 0
+    shape: str = "box"
+    corners: np.ndarray | None = None
+
+
+class CellPattern(NamedTuple):
+    """The points of one cell of size 1.
+
+    Attributes
+    ----------
+    places : ndarray (m, d)
+        Measured from the centre of the cell.
+    sizes : ndarray (m, d) or (d,)
+        Edge lengths of the domains of the points, whose product is the volume.
+    """
+
+    places: np.ndarray
+    sizes: np.ndarray
+
+
+def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattice:
+    """The cells in which `region` is filled.
+
+    Those of the grid of `domain`, or cells that begin at the lower corner of the box of the
+    region (clipped to the domain) when the solid has a grid of its `own`.
+    """
+    d = domain.dimension
+    if not own:
+        return Lattice(d, domain.lo, domain.hi, h)
+    if region.unknown:
+        return Lattice(d, domain.lo, domain.lo, h)
+    return Lattice(d, region.lo, region.hi, h)
+
+
+def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Places of `ppc` points along a cell of size 1, from its centre, and their lengths: (ppc,).
+
+    Parameters
+    ----------
+    ppc
+        Number of points.
+    rule
+        ``regular``: equally spaced. ``gauss``: the points and weights of Gauss and Legendre. None:
+        as Karamelo does, equally spaced, but for 3, which stand at the Gauss points in the digits
+        that Karamelo writes, with equal lengths.
+    """
+    if rule == "gauss":
+        places, weights = np.polynomial.legendre.leggauss(ppc)
+        return places / 2, weights / weights.sum()
+    lengths = np.full(ppc, 1 / ppc)
+    if rule is None and ppc == 3:
+        return np.array([-0.3873, 0.0, 0.3873]), lengths
+    return (np.arange(ppc) + 0.5) / ppc - 0.5, lengths
+
+
+def cell_pattern(ppc: int, dimension: int, rule: str | None = None) -> CellPattern:
+    """The `ppc`^dimension points of a cell, see `offsets`.
+
+    In Karamelo's order: x before y; in 3D the lowest z first.
+    """
+    places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
+    return CellPattern(places, lengths if rule == "gauss" else lengths[0])
+
+
+def _in_order(along: np.ndarray, dimension: int) -> np.ndarray:
+    if dimension == 3:
+        return np.array([(x, y, z) for z, x, y in itertools.product(along, repeat=3)])
+    return np.array(list(itertools.product(along, repeat=dimension)))
+
+
+def fill(
+    region: Region, domain: Domain, lattice: Lattice, ppc: int, rule: str | None = None
+) -> Placement:
+    """The points of `lattice` that fill `region` within the domain.
+
+    Cells are counted from the lower corner of the lattice, x outermost, then y, then z. Only cells
+    that the box around the region reaches are looked at, a bounded number at a time.
+
+    Raises
+    ------
+    ScriptError
+        When there would be more points than can be numbered.
+    """
+    dimension, h = domain.dimension, lattice.h
+    used = slice(0, dimension)
+    placed = Placement(
+        x0=np.empty((0, dimension)),
+        volume=(h / ppc) ** dimension,
+        half_size=np.full(dimension, h / (2 * ppc)),
+        lo=region.lo[used],
+        hi=region.hi[used],
+    )
+    lo, hi = region.box_lo[used], region.box_hi[used]
+    corner = lattice.lo[used]
+    last_cell = np.array(lattice.cells[used]) - 1
+    if region.unknown or (lo > hi).any():
+        return placed
+    # One cell more on either side: rounding must not lose a point that lies on a face.
+    first = np.floor((lo - corner) / h) - 1
+    last = np.floor((hi - corner) / h) + 1
+    # An open side ends at the domain; a closed one may reach beyond it, and then we say so.
+    first = np.where(np.isinf(lo), 0, first)
+    last = np.where(np.isinf(hi), last_cell, last)
+    inner_first = np.clip(first, 0, last_cell + 1)
+    inner_last = np.clip(last, -1, last_cell)
+    inner = math.prod(np.maximum(inner_last - inner_first + 1, 0).tolist()) * ppc**dimension
+    if inner > MAX_POINTS * 4:
+        raise ScriptError(
+            f"about {inner:.3g} points would be needed", expected=f"at most {MAX_POINTS}"
+        )
+    reaches_out = (lo < domain.lo[used] - domain.tolerance) & np.isfinite(lo)
+    reaches_out |= (hi > domain.hi[used] + domain.tolerance) & np.isfinite(hi)
+    whole = math.prod(np.maximum(last - first + 1, 0).tolist()) * float(ppc) ** dimension
+    counted = reaches_out.any() and whole <= max(_MAX_COUNTED, 4 * inner)
+    if not counted:
+        first, last = inner_first, inner_last
+
+    pattern = cell_pattern(ppc, dimension, rule)
+    even = pattern.sizes.ndim == 1
+    places = pattern.places * h
+    chunks: list[np.ndarray] = []
+    numbers: list[np.ndarray] = []  # which point of the pattern each one is
+    outside = 0.0
+    for index in boxes([int(i) for i in first], [int(i) for i in last], len(places)):
+        centre = corner + (index + 0.5) * h
+        x = (centre[:, None, :] + places).reshape(-1, dimension)
+        kept = region.inside(x)
+        in_domain = domain.contains(x)
+        if counted:
+            outside += _beyond_closed_sides(x[kept & ~in_domain], lo, hi, domain)
+        kept &= in_domain
+        if kept.any():
+            chunks.append(x[kept])
+            if not even:
+                numbers.append(np.flatnonzero(kept) % len(places))
+    if reaches_out.any() and not counted:
+        outside = math.inf
+    placed = placed._replace(x0=_joined(chunks, dimension), outside=outside)
+    if even:
+        return placed
+    sizes = pattern.sizes[np.concatenate(numbers)] * h if numbers else np.empty((0, dimension))
+    return placed._replace(volume=sizes.prod(axis=1), half_size=sizes / 2)
+
+
+def _beyond_closed_sides(x: np.ndarray, lo: np.ndarray, hi: np.ndarray, domain: Domain) -> int:
+    """How many of `x` lie outside the domain across sides where the region is closed."""
+    beyond = np.zeros(len(x), dtype=bool)
+    within_open = np.ones(len(x), dtype=bool)
+    for axis in range(domain.dimension):
+        below = x[:, axis] < domain.lo[axis] - domain.tolerance
+        above = x[:, axis] > domain.hi[axis] + domain.tolerance
+        for out, end in ((below, lo[axis]), (above, hi[axis])):
+            if np.isfinite(end):
+                beyond |= out
+            else:
+                within_open &= ~out
+    return int(np.count_nonzero(beyond & within_open))
+
+
+def _joined(chunks: list[np.ndarray], dimension: int) -> np.ndarray:
+    """The chunks in one array; each is freed once copied, so that memory holds the points once."""
+    x0 = np.empty((sum(len(chunk) for chunk in chunks), dimension))
+    start = 0
+    chunks.reverse()
+    while chunks:
+        chunk = chunks.pop()
+        x0[start : start + len(chunk)] = chunk
+        start += len(chunk)
+    return x0

@@ -1,0 +1,153 @@
+"""What every region has: an inside, a bounding box, and perhaps an inverted sense."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.script.errors import Place, ScriptError
+
+EXTERIOR = "exterior"
+
+
+class Region:
+    """Base of the region styles: override `contains`.
+
+    Parameters
+    ----------
+    hub
+        The scene. Its domain must exist.
+    lo, hi
+        Corners of a box around the shape, one number per dimension; infinite where it is open.
+    exterior
+        Whether the region is what lies outside the shape.
+    parts
+        The regions it is made of, if any.
+
+    Attributes
+    ----------
+    unknown : bool
+        Whether its place depends on results that a rehearsal does not have (NaN).
+    box_lo, box_hi : ndarray (3,)
+        Box around the region, infinite where it is open; 0 in unused directions.
+    """
+
+    id: str = ""
+    place: Place | None = None
+
+    def __init__(
+        self,
+        hub: Scene,
+        lo: Sequence[float],
+        hi: Sequence[float],
+        *,
+        exterior: bool = False,
+        parts: Sequence[Region] = (),
+    ):
+        self.hub = hub
+        self.domain = require_domain(hub)
+        self.exterior = exterior
+        dimension = self.domain.dimension
+        self.parts = tuple(parts)
+        self.unknown = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
+        self.box_lo = np.zeros(3)
+        self.box_hi = np.zeros(3)
+        self.box_lo[:dimension] = -np.inf if exterior else lo
+        self.box_hi[:dimension] = np.inf if exterior else hi
+
+    @property
+    def dimension(self) -> int:
+        """Dimension of the domain."""
+        return self.domain.dimension
+
+    @property
+    def tolerance(self) -> float:
+        """How far beyond a face a point may lie, by rounding, and still be in."""
+        return self.domain.tolerance
+
+    @property
+    def lo(self) -> np.ndarray:
+        """Lower corner (3,) of the part that lies in the domain."""
+        return np.clip(self.box_lo, self.domain.lo, self.domain.hi)
+
+    @property
+    def hi(self) -> np.ndarray:
+        """Upper corner (3,) of the part that lies in the domain."""
+        return np.clip(self.box_hi, self.domain.lo, self.domain.hi)
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        """Which positions `x` (n, >= dimension) lie in the shape, faces included: (n,) bool.
+
+        `exterior` plays no part here.
+        """
+        raise NotImplementedError
+
+    def inside(self, x: np.ndarray) -> np.ndarray:
+        """Which positions `x` (n, >= dimension) belong to the region: (n,) bool."""
+        inside = self.contains(x)
+        return ~inside if self.exterior else inside
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Region:
+        """The region that `argument` names."""
+        return look_up(hub.regions, argument)
+
+
+def look_up(catalogue: Any, argument: Argument):
+    """The part of the scene that `argument` names.
+
+    Raises
+    ------
+    ScriptError
+        When it is not a name, or an unknown one.
+    """
+    word = argument.word()
+    if word is None:
+        article = "an" if catalogue.kind[0] in "aeiou" else "a"
+        raise ScriptError(
+            f"'{argument.text}' is not the ID of {article} {catalogue.kind}", place=argument.place
+        )
+    try:
+        return catalogue[word]
+    except ScriptError as error:
+        if error.place is None:
+            error.place = argument.place
+        raise
+
+
+def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], bool]:
+    """The arguments without a closing word ``exterior``, and whether it was there."""
+    if arguments and arguments[-1].word() == EXTERIOR:
+        return arguments[:-1], True
+    return arguments, False
+
+
+def check_order(lo: float, hi: float, names: tuple[str, str], place: Place | None) -> None:
+    """Refuse a lower end above the upper one (equal ends are a plane)."""
+    if lo > hi:
+        raise ScriptError(
+            f"{names[0]} = {lo:g} is above {names[1]} = {hi:g}",
+            place=place,
+            expected=f"{names[0]} <= {names[1]}",
+        )
+
+
+def check_radius(radius: float, place: Place | None) -> None:
+    """Refuse a radius that is not positive."""
+    if radius <= 0:
+        raise ScriptError(f"R = {radius:g} must be above 0", place=place)
+
+
+def within(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):
+    """Which positions are at most `radius` from `centre`, measured along `axes` only: (n,) bool."""
+    square = np.zeros(len(x))
+    for axis, middle in zip(axes, centre, strict=True):
+        distance = x[:, axis] - middle
+        distance *= distance
+        square += distance
+    return square <= radius * radius

@@ -1,0 +1,236 @@
+"""Solids: bodies of material points. Where their points are put is said by the styles of solid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from karamelo_py.kernels.laws import can, law_kind
+from karamelo_py.language.forms import finite
+from karamelo_py.language.scene import Scene
+from karamelo_py.language.signature import Argument
+from karamelo_py.points.laws import specific_volume
+from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.scene.domain import Domain, require_domain
+from karamelo_py.scene.material import Material
+from karamelo_py.scene.placement import MAX_POINTS, Placement
+from karamelo_py.scene.region import look_up
+from karamelo_py.script.errors import Place, ScriptError
+
+_SAMPLE = 5000
+
+
+class Solid:
+    """Base of the styles of solid: a body of points. A style calls `put` with its points.
+
+    Parameters
+    ----------
+    hub
+        The scene. Its domain must exist.
+    material
+        What the points are made of.
+    h
+        Cell size. With a grid shared by all solids it must be that of the domain; a method with
+        the attribute ``own_grids`` lays a grid of its own for each solid.
+    T0
+        Initial temperature; None for that of the material.
+    glued_to
+        The solid with which this one shares a velocity field, in methods that have several.
+
+    Attributes
+    ----------
+    index : int
+        0 for the first solid made, and so on.
+    first_id : int
+        Number (from 0) of its first point; point ids are these numbers plus 1.
+    x0 : ndarray (n, d)
+        Reference positions.
+    volume0 : ndarray (n,)
+        Initial volumes: per unit thickness in 2D, per unit area in 1D, per radian where the domain
+        is axisymmetric. Read only, as is all that follows.
+    mass : ndarray (n,)
+        Masses, per the same unit.
+    half_size : ndarray (n, d)
+        Half edge lengths of the initial domain of each point along the axes.
+    corners : ndarray (n, c, d) or None
+        Corners of the initial domains in the order of the nodes of an element, for solids from a
+        mesh; None where the domains are boxes.
+    shape : str
+        ``box``, or as meshio says: ``line``, ``triangle``, ``quad``, ``tetra``, ``hexahedron``.
+    lo, hi : ndarray (d,)
+        Box of the solid.
+    """
+
+    id: str = ""
+    place: Place | None = None
+    # The argument that says where the points are, for messages.
+    source = "region"
+
+    def __init__(
+        self,
+        hub: Scene,
+        material: Material,
+        h: float,
+        T0: float | None,
+        glued_to: Solid | None = None,
+    ):
+        self.domain = require_domain(hub)
+        for name, value in (("h", h), ("T0", T0)):
+            if value is not None:
+                finite(hub, value, name)
+        self.h = _cell_size(hub, self.domain, h)
+        self.material = material
+        self.T0 = T0
+        self.glued_to = glued_to
+        if glued_to is not None and not hub.update.method.fields_per_solid:
+            hub.warn(
+                "GlueToSolid has no effect: with this method all solids share one velocity field",
+                hint="leave it out",
+            )
+        self._compare_temperatures(hub)
+        self.index = len(hub.solids)
+        self.first_id = sum(other.count for other in hub.solids.values())
+
+    def _compare_temperatures(self, hub: Scene) -> None:
+        """Tell of a temperature that the material does not have, or that nobody gives."""
+        # Scripts of Karamelo give T0 in mechanical runs, too.
+        if hub.update.thermal and self.T0 and not can(self.material.law, initial_heat):
+            hub.warn(
+                f"T0 = {self.T0:g} has no effect: the material has no temperature",
+                hint="material(ID, linear, rho, E, nu, cp, kappa), or temperature(...) with "
+                "eos-strength",
+            )
+        kinds = law_kind(self.material.law)
+        if self.T0 is None and any("initial_temperature" in kind._fields for kind in kinds):
+            hub.warn(
+                "the solid starts at the temperature 0, since neither it nor its material says one",
+                hint="give T0 behind the cell size",
+            )
+
+    def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
+        """Give the solid its points, in place of those that it has.
+
+        Raises
+        ------
+        ScriptError
+            For none, for too many, or for points left of the axis of symmetry.
+        """
+        x0, count = placement.x0, len(placement.x0)
+        if not count and not may_be_empty:
+            raise ScriptError(
+                "the solid has no points: "
+                + ("all of them lie outside the domain" if placement.outside else self.why_empty()),
+                argument=self.source,
+                expected=self.wanted(),
+            )
+        if self.first_id + count > MAX_POINTS:
+            raise ScriptError(f"the scene has more than {MAX_POINTS} points", argument="h")
+        volume = np.asarray(placement.volume, float)
+        if self.domain.axisymmetric:
+            self._check_radii(x0)
+            volume = volume * x0[:, 0]
+        # Equal volumes are stored once, however many points there are.
+        self.x0 = x0
+        self.volume0 = np.broadcast_to(volume, (count,))
+        self.mass = np.broadcast_to(volume / float(specific_volume(self.material.law)), (count,))
+        self.half_size = np.broadcast_to(placement.half_size, x0.shape)
+        self.shape, self.corners = placement.shape, placement.corners
+        self.lo, self.hi = placement.lo, placement.hi
+        if placement.outside:
+            hub.warn(
+                f"{_counted(placement.outside)} of {self.described()} outside the domain "
+                "left out of the solid",
+                hint=f"make the domain larger or the {self.described().split()[0]} smaller",
+            )
+
+    def described(self) -> str:
+        """Where the points come from, in words, such as ``region 'disk'``."""
+        raise NotImplementedError
+
+    def why_empty(self) -> str:
+        """Why there are no points, though none lies outside the domain."""
+        raise NotImplementedError
+
+    def wanted(self) -> str:
+        """What would give points."""
+        raise NotImplementedError
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.x0)
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Solid:
+        """The solid that `argument` names."""
+        return look_up(hub.solids, argument)
+
+    def _check_radii(self, x0: np.ndarray) -> None:
+        # A point on the axis itself would have no mass.
+        if len(x0) and x0[:, 0].min() <= 0:
+            raise ScriptError(
+                f"points at x = {x0[:, 0].min():g}: in an axisymmetric domain x is the radius, "
+                "and points lie at x > 0",
+                argument=self.source,
+                expected=f"a {self.described().split()[0]} at x >= 0",
+            )
+
+
+def own_grids(hub: Scene) -> bool:
+    """Whether the method lays a grid of its own for each solid."""
+    method = hub.update.method
+    return method is not None and method.own_grids
+
+
+def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
+    """The cell size of a solid that asks for `h`; the first one sets that of a domain without."""
+    if domain.h is None:
+        domain.set_cell_size(h)
+    if own_grids(hub):
+        return float(h)
+    if abs(h - domain.h) > 1e-9 * domain.h:
+        raise ScriptError(
+            f"cell size {h:g} differs from that of the domain's grid, {domain.h:g}, "
+            "which all solids share",
+            argument="h",
+            expected=f"{domain.h:g}, as in dimension(...)",
+        )
+    return domain.h
+
+
+def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
+    """Warn when points of `new`, to be called `ID`, lie where those of another solid are."""
+    for other in hub.solids.values():
+        if other is not new and coinciding(new, other):
+            hub.warn(
+                f"points of solid '{ID}' lie where points of solid '{other.id}' are: "
+                "there is twice the mass",
+                hint="another region for one of them, or region(ID, difference, ...)",
+            )
+
+
+def coinciding(a: Solid, b: Solid) -> bool:
+    """Whether points of `a` lie where points of `b` are; of many points, a sample is looked at."""
+    if not len(a.x0) or not len(b.x0):
+        return False
+    lo = np.maximum(a.x0.min(axis=0), b.x0.min(axis=0))
+    hi = np.minimum(a.x0.max(axis=0), b.x0.max(axis=0))
+    if (lo > hi).any():
+        return False
+    inside = [x[((x >= lo) & (x <= hi)).all(axis=1)] for x in (a.x0, b.x0)]
+    sample = inside[0][:: max(1, len(inside[0]) // _SAMPLE)]
+    return bool(np.isin(_keys(sample, a.h), _keys(inside[1], a.h)).any())
+
+
+def _keys(x: np.ndarray, h: float) -> np.ndarray:
+    """A number (n,) for each position, equal for positions that differ by rounding only."""
+    places = np.rint(x * (1e4 / h)).astype(np.int64)
+    # Primes keep places apart; the product may overflow, which only mixes the bits.
+    return places @ np.array([1, 1_000_003, 998_244_353_001], np.int64)[: x.shape[1]]
+
+
+def _counted(outside: float) -> str:
+    if math.isinf(outside):
+        return "points"
+    return "1 point" if outside == 1 else f"{outside:.0f} points"

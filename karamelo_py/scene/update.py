@@ -1,0 +1,88 @@
+"""How the scene goes forward: method, scheme, transfer, step size, clock (Karamelo's Update)."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from karamelo_py.language import registry
+from karamelo_py.schemes.musl import MUSL
+from karamelo_py.script.errors import Place
+from karamelo_py.script.values import Values
+
+DEFAULT_DT_FACTOR = 0.9
+
+
+class Update:
+    """What method, scheme, set_dt and dt_factor chose, and the clock.
+
+    Attributes
+    ----------
+    method
+        The method style, or None as long as there is none.
+    transfer
+        The transfer's NamedTuple (PIC, FLIP, APIC ...).
+    thermal
+        Whether heat flows between points.
+    anti_locking
+        Whether changes of volume are averaged against volumetric locking.
+    scheme
+        The scheme's tag.
+    fixed_dt
+        The constant step of set_dt, or None: the step follows the fastest point.
+    dt_factor
+        Share of the stable step that is taken.
+    boundary
+        What happens to points that reach the edge of the domain: error, delete or reflect.
+    boundary_place
+        Where the script says so.
+    told_of_bounces
+        Whether the user knows that points were reflected.
+    """
+
+    def __init__(self, values: Values):
+        self.values = values
+        self.method: Any = None
+        self.transfer: NamedTuple | None = None
+        self.scheme: NamedTuple = MUSL()
+        self.thermal = False
+        self.anti_locking = False
+        self.fixed_dt: float | None = None
+        self.dt_factor = DEFAULT_DT_FACTOR
+        self.boundary = "error"
+        self.boundary_place: Place | None = None
+        self.told_of_bounces = False
+
+    @property
+    def words(self) -> str:
+        """Method, transfer, basis and scheme, as a script calls them."""
+        numbers = ", ".join(f"{name} {value:g}" for name, value in self.transfer._asdict().items())
+        transfer = registry.name_of("transfer", type(self.transfer))
+        return " ".join(
+            [
+                registry.name_of("method", type(self.method)),
+                transfer + (f" ({numbers})" if numbers else ""),
+                self.method.basis_name,
+                registry.name_of("scheme", type(self.scheme)),
+                *(["thermo-mechanical"] if self.thermal else []),
+            ]
+        )
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken."""
+        return int(self.values.get("timestep"))
+
+    @property
+    def time(self) -> float:
+        """Present time."""
+        return self.values.get("time")
+
+    @property
+    def dt(self) -> float:
+        """The next step."""
+        return self.values.get("dt")
+
+    def transfer_tag(self, real: type) -> NamedTuple:
+        """The transfer with its numbers in the precision of the run."""
+        numbers = (real(x) if isinstance(x, float) else x for x in self.transfer)
+        return type(self.transfer)(*numbers)

@@ -1,0 +1,35 @@
+"""compute max_plastic_strain."""
+
+from __future__ import annotations
+
+from karamelo_py.scene.modify import Compute
+
+
+class MaxPlasticStrain(Compute):
+    """Measure the largest equivalent plastic strain and temperature of a group of points.
+
+    Published as ID_Epmax and ID_Tmax; 0 where nothing can yield, or has a temperature.
+
+    Parameters
+    ----------
+    group
+        Group of points, or ``all``.
+
+    Example
+    -------
+    compute(worst, max_plastic_strain, all)
+    log_modify(custom, time, worst_Epmax)
+
+    See Also
+    --------
+    strength plastic
+    """
+
+    published = ("Epmax", "Tmax")
+
+    def refresh(self) -> None:
+        """Measure and publish."""
+        members = self.hub.fields.members(self.group)
+        for published, field in (("Epmax", "ep"), ("Tmax", "T")):
+            values = self.hub.fields.particle(field)[members]
+            self.publish(published, float(values.max(initial=0)))

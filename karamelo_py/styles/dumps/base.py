@@ -1,0 +1,84 @@
+"""What every dump has: a rhythm, a file name with the step in it, checked columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from karamelo_py.language.signature import OutputFile, Positive
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import puts_force_on_points
+from karamelo_py.script.errors import ScriptError, nearest
+
+POINT_FORCE = ("bx", "by", "bz")  # there when a fix puts forces on points
+
+
+class Dump:
+    """Base of the dump styles: override `write`, which is called when the dump is due.
+
+    Parameters
+    ----------
+    every
+        Steps between two snapshots; the first and the last state of a run are always written.
+    file
+        File name; the first ``*`` becomes the step number.
+    columns
+        What to write, as the style understands it.
+    """
+
+    def __init__(
+        self,
+        hub: Hub,
+        every: Annotated[int, Positive],
+        file: OutputFile,
+        *columns: str,
+    ):
+        self.hub = hub
+        self.every = every
+        self.file = Path(file)
+        hub.output.check_file(self.file)
+        self.columns = columns
+        self.last_step: int | None = None
+
+    @property
+    def one_file_per_step(self) -> bool:
+        """Whether the name has a ``*``."""
+        return "*" in str(self.file)
+
+    def path(self) -> Path:
+        """The file of the present state."""
+        return self.hub.folder / str(self.file).replace("*", str(self.hub.update.step), 1)
+
+    def write(self) -> None:
+        """Write the present state."""
+        raise NotImplementedError
+
+    def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
+        """Warn of columns that are 0 because no point or node (`what`) keeps them."""
+        empty = [name for name in dict.fromkeys(columns) if name in absent]
+        if what == "points" and puts_force_on_points(self.hub):
+            empty = [name for name in empty if name not in POINT_FORCE]
+        if empty:
+            self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} have no such field")
+
+    @staticmethod
+    def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
+        """Refuse names that are not `known`.
+
+        `first` is the place of the first column among the arguments of the style.
+
+        Raises
+        ------
+        ScriptError
+            Naming the nearest known column.
+        """
+        for index, name in enumerate(columns):
+            if name not in known:
+                close = nearest(name, known)
+                raise ScriptError(
+                    f"unknown column '{name}'",
+                    argument=first + index,
+                    expected="one of " + " ".join(dict.fromkeys(known)),
+                    hint=f"did you mean '{close}'?" if close else None,
+                )

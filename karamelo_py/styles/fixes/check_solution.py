@@ -1,0 +1,67 @@
+"""fix check_solution: the distance between the displacement and a given solution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.formulas import evaluated, per_direction
+
+
+class CheckSolution(Fix):
+    """Compare the displacement of points with an exact solution, whenever the log is written.
+
+    Parameters
+    ----------
+    group
+        Group of points, or ``all``.
+    displacement
+        ux, uy, uz, as many as the domain has dimensions: formulas of x0, y0, z0 and time.
+
+    Example
+    -------
+    fix(error, check_solution, all, 0.01*sin(PI*x0)*sin(10*time), 0)
+
+    Notes
+    -----
+    Publishes ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), the error now;
+    ID_x = sum dt sum V0 |u - u_exact|^2 and ID_y = sum dt sum V0 |u_exact|^2 over the outputs so
+    far; and ID_z = sqrt(ID_x / ID_y), the relative error of the whole history.
+    """
+
+    syntax = "group, ux[, uy[, uz]]"
+    published = ("x", "y", "z", "s")
+
+    def __init__(self, hub: Hub, group: ParticleGroup, *displacement: Expression | None):
+        super().__init__(hub, group)
+        self.formulas = per_direction(hub, "u", displacement)
+        self._step: int | None = None
+
+    def refresh(self) -> None:
+        """Measure and publish."""
+        fields = self.hub.fields
+        ids = fields.members(self.group)
+        x, x0 = fields.position[ids], fields.reference_position[ids]
+        volume = fields.reference_volume[ids]
+        error = np.zeros(len(ids))
+        size = np.zeros(len(ids))
+        for k, formula in enumerate(self.formulas):
+            if formula is not None:
+                exact = evaluated(formula, self.hub, x, x0)
+                error += (x[:, k] - x0[:, k] - exact) ** 2
+                size += exact**2
+        if not len(ids):
+            return
+        now = float(volume @ error)
+        self.publish("s", np.sqrt(now / volume.sum()))
+        if self._step == self.hub.update.step:
+            return
+        self._step = self.hub.update.step
+        values, dt = self.hub.values, self.hub.update.dt
+        self.publish("x", values.get(f"{self.id}_x") + dt * now)
+        self.publish("y", values.get(f"{self.id}_y") + dt * float(volume @ size))
+        total = values.get(f"{self.id}_y")
+        self.publish("z", np.sqrt(values.get(f"{self.id}_x") / total) if total > 0 else 0.0)

@@ -1,0 +1,40 @@
+"""What fixes that act by a formula for each component have in common."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+
+AXES = "xyz"
+
+
+def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
+    """Check that there is one formula (or NULL) for each direction of the domain.
+
+    Further components are allowed when they are NULL or zero, as published inputs write them.
+    """
+    from karamelo_py.scene.domain import require_domain
+
+    d = require_domain(hub).dimension
+    wanted = ", ".join(name + axis for axis in AXES[:d])
+    if len(formulas) < d:
+        raise ScriptError(
+            f"{len(formulas)} component{'s' if len(formulas) != 1 else ''} in {d} dimensions",
+            expected=f"{wanted} (NULL leaves a component alone)",
+        )
+    for extra in formulas[d:]:
+        if extra is not None and not (extra.is_constant and extra.constant == 0):
+            raise ScriptError(
+                f"more components than the {d} dimension{'s' if d > 1 else ''} of the domain",
+                expected=f"{wanted} (a further one may only be NULL or 0)",
+            )
+    return formulas[:d]
+
+
+def evaluated(formula: Any, hub: Hub, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
+    """Values (n,) of a formula at the positions `x` and reference positions `x0`, (n, d) each."""
+    return formula.evaluate_points(hub.values, x, x0)

@@ -1,0 +1,91 @@
+"""What the methods with convected domains share: their variants, and what they refuse."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from karamelo_py.points.basis import carried
+from karamelo_py.points.basis.cpdi.hexahedron import H8
+from karamelo_py.points.basis.cpdi.parallel import R4, R8
+from karamelo_py.points.basis.cpdi.quadrilateral import Q4
+from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
+from karamelo_py.points.transfers.asflip import ASFLIP
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import Solid
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.methods.base import Method
+
+VARIANTS = {"R4": R4, "Q4": Q4, "T3": T3, "R8": R8, "H8": H8, "Tet4": Tet4}
+
+
+class Convected(Method):
+    """A method whose points have domains that deform with them (CPDI).
+
+    Attributes
+    ----------
+    variants
+        The families of domains by name.
+    """
+
+    variants: ClassVar[dict[str, type]] = VARIANTS
+
+    def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
+        """What the basis keeps of the domains of a solid's points, (n, s)."""
+        self._check_domain(kin.dimension)
+        self._check_solid(solid)
+        return super().shapes(kin, solid)
+
+    def check(self, hub: Hub) -> None:
+        """Refuse what does not go together; called before every run."""
+        super().check(hub)
+        self._check_domain(hub.domain.dimension)
+        for solid in hub.solids.values():
+            self._check_solid(solid)
+        moves_corners = self.frame.moves and carried(self.basis, self.kinematics(hub)) > 0
+        if moves_corners and isinstance(hub.update.transfer, ASFLIP):
+            raise ScriptError(
+                "ASFLIP moves points faster than the grid, and the corners of "
+                f"{type(self.basis).__name__} domains, which go with the grid, would stay behind",
+                hint="AFLIP or another transfer, or domains of the shape "
+                + ("R4" if hub.domain.dimension == 2 else "R8"),
+            )
+
+    def _check_domain(self, d: int) -> None:
+        basis = type(self.basis)
+        if d == basis.dimension:
+            return
+        fit = [name for name, other in VARIANTS.items() if other.dimension == d]
+        raise ScriptError(
+            f"domains of the shape {basis.__name__} are for {basis.dimension} dimensions, and "
+            f"this scene has {d}",
+            hint=f"one of {', '.join(fit)} in its place" if fit
+            else "method ulmpm with the basis cpgimp: in one dimension that is the same thing",
+        )  # fmt: skip
+
+    def _check_solid(self, solid: Solid) -> None:
+        """The element of a mesh, or the box around a point, must be what the basis works on."""
+        basis = type(self.basis)
+        wanted = basis.__name__
+        has = solid.shape
+        boxes = [n for n, v in VARIANTS.items() if v.element in (None, "quad", "hexahedron")]
+        if has == "box":
+            if wanted in boxes:
+                return
+            hint = "a mesh of triangles or tetrahedra, or one of the shapes " + ", ".join(
+                name for name in boxes if VARIANTS[name].dimension == basis.dimension
+            )
+            has = "boxes"
+        else:
+            if has == basis.element:
+                return
+            fit = [name for name, other in VARIANTS.items() if other.element == has]
+            hint = f"{fit[0]} in the place of {wanted}" if fit else "a mesh of linear elements"
+            has = f"elements of the kind {has}"
+        raise ScriptError(
+            f"points of solid '{solid.id}' have {has} around them, and {wanted} domains "
+            f"cannot be made of those",
+            place=solid.place,
+            hint=hint,
+        )

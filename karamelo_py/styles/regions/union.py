@@ -1,0 +1,46 @@
+"""Region style union."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.region import Region
+
+
+class Union(Region):
+    """All that lies in at least one of two or more regions.
+
+    Parameters
+    ----------
+    first, second, more
+        IDs of regions. Those made with ``exterior`` count as what is outside their shape.
+
+    Example
+    -------
+    region(a, block, 0, 1, 0, 0.2)
+    region(b, block, 0, 0.2, 0, 1)
+    region(angle, union, a, b)
+
+    See Also
+    --------
+    intersection, difference
+    """
+
+    def __init__(self, hub: Hub, first: Region, second: Region, *more: Region):
+        parts = (first, second, *more)
+        used = slice(0, require_domain(hub).dimension)
+        super().__init__(
+            hub,
+            np.min([part.box_lo[used] for part in parts], axis=0),
+            np.max([part.box_hi[used] for part in parts], axis=0),
+            parts=parts,
+        )
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        """Which positions lie in one of the parts, see `Region.contains`."""
+        inside = self.parts[0].inside(x)
+        for part in self.parts[1:]:
+            inside |= part.inside(x)
+        return inside
