@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import SUPPLY
+from karamelo_py.compiler import fields
+from karamelo_py.kernels.arrays import MASS, of_force
 from karamelo_py.kernels.export import (
     ENERGY,
     EXPORTED,
@@ -29,6 +30,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.points.laws import dissipated_energy, energy_density, plastic_strain
 from karamelo_py.points.laws.damages import damage_begun
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.points.transfers import Moment
 
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
@@ -134,24 +136,28 @@ class Fields:
     def velocity_moment(self) -> np.ndarray | None:
         """(N, d d) moment of velocity, sum N v (X - x), of transfers that keep it, or None."""
         simulation = self._simulation
-        if simulation.setup.blocks[0].points.moment is None:
+        if simulation.declared(Moment) is None:
             return None
-        return simulation.by_id(self._velocity_moment)
+        return simulation.by_id(self._velocity_moment).T
 
-    def _velocity_moment(self, block: Any) -> np.ndarray:
+    def _velocity_moment(self, points: Any) -> np.ndarray:
         s = self._simulation.setup
-        kept = block.points.moment
+        kept = fields.field(points.fields, Moment)
         if not getattr(s.transfer, "keeps_gradient", False):
             return kept
-        where = block.x[self._simulation.now] if block.home is None else block.home
+        where = points.x[self._simulation.now] if points.home is None else points.home
         moment = np.zeros_like(kept)
-        export_velocity_moment(s.basis, s.kin, s.grids, block.grid, where, kept, moment)
+        export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
         return moment
 
     @property
-    def has_point_forces(self) -> bool:
-        """Whether a fix puts forces on points."""
-        return self._simulation.setup.blocks[0].points.force is not None
+    def declared(self) -> dict[str, tuple[type, int]]:
+        """Column -> the declared field of the points that shows it, and the component."""
+        return {
+            column: (kind, k)
+            for kind in self._simulation.point_fields
+            for k, column in enumerate(fields.columns_of(kind))
+        }
 
     def members(self, group: Any) -> np.ndarray:
         """Ids (0-based) of a particle group."""
@@ -189,6 +195,8 @@ class Fields:
         present = {name for name, (_, has) in OF_SOME.items() if any(can(law, has) for law in laws)}
         if self.hub.update.thermal:
             present.add("gamma")
+        kinds = fields.declared(self.hub.fixes.values(), "point_fields")
+        present.update(column for kind in kinds for column in fields.columns_of(kind))
         return [name for name in ABSENT_AT_POINTS if name not in present]
 
     def absent_at_nodes(self) -> list[str]:
@@ -230,10 +238,9 @@ class Fields:
         if name[:1] in "se" and name[1:] in COMPONENTS:
             first = 0 if name[0] == "s" else STRAIN
             return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
-        if name in ("bx", "by", "bz") and self.has_point_forces:
-            return _column(simulation.by_id(lambda b: b.points.force), AXES.index(name[1]))
-        if name == "gamma" and self.hub.update.thermal:
-            return _column(simulation.by_id(lambda b: b.points.heat), SUPPLY)
+        if name in self.declared:
+            kind, k = self.declared[name]
+            return _column(simulation.declared(kind), k)
         return np.zeros(simulation.count)
 
     def node(self, name: str) -> np.ndarray:
@@ -241,7 +248,7 @@ class Fields:
         self._simulation.show_on_nodes()
         nodes = self._simulation.setup.nodes
         d = self.hub.domain.dimension
-        mass = nodes.sums[:, 0].astype(float)
+        mass = nodes.sums[:, MASS].astype(float)
         if name == "id":
             return np.arange(self.node_count)
         if name == "type":
@@ -254,7 +261,7 @@ class Fields:
             return mass
         if name == "T" and self.hub.update.thermal:
             heat = self._simulation.setup.heat.nodes
-            return np.where(heat.sums[:, 0] > 0, heat.velocity[:, 0], 0.0)
+            return np.where(heat.sums[:, MASS] > 0, heat.velocity[:, 0], 0.0)
         if name in ABSENT_AT_NODES:
             return np.zeros(self.node_count)
         axis = AXES.index(name[1])
@@ -263,7 +270,7 @@ class Fields:
         field = {
             "v": nodes.velocity[:, axis],
             "u": nodes.update[:, axis],
-            "f": nodes.sums[:, 1 + d + axis],
+            "f": nodes.sums[:, of_force(self._simulation.setup.kin) + axis],
         }["u" if name.endswith("_update") else name[0]]
         return np.where(mass > 0, field, 0.0)
 
@@ -283,9 +290,9 @@ def _of_points(
     out = np.zeros((simulation.count, *columns))
     for block in s.blocks:
         if has(block.laws):
-            rows = np.zeros((len(block.id), *columns))
-            fill(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
-            out[block.id] = rows
+            rows = np.zeros((len(block.points.id), *columns))
+            fill(s.kin, s.nodes.sums[0, MASS], block.points, block.laws, rows)
+            out[block.points.id] = rows
     return out
 
 

@@ -7,9 +7,10 @@ needs the deformation gradient F of the points.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.fields import tensor
 from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
 from karamelo_py.points.kinematics import (
     Axisymmetric,
@@ -27,6 +28,7 @@ from karamelo_py.points.kinematics import (
     planar,
     zero_tensor,
 )
+from karamelo_py.points.laws import deformation
 
 
 class Updated(NamedTuple):
@@ -35,10 +37,29 @@ class Updated(NamedTuple):
     moves = True
 
 
+class DeformationGradient(NamedTuple):
+    """F, of laws whose state does not hold it."""
+
+    array: Any
+
+    shape = tensor
+
+    @staticmethod
+    def start(kin: Any) -> tuple[float, ...]:
+        """The unit tensor."""
+        return identity(kin, 1.0)
+
+    @staticmethod
+    def needed(law: type) -> bool:
+        """Whether a law has no F of its own."""
+        return not deformation.defined(law)
+
+
 class Total(NamedTuple):
     """Weights belong to the reference positions and never change (total Lagrangian)."""
 
     moves = False
+    point_fields = (DeformationGradient,)
 
 
 @point_function()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import affine, updated_velocity
+from karamelo_py.points.transfers import Moment, affine, updated_velocity
 from karamelo_py.points.transfers.flip import blend
 
 
@@ -26,7 +26,7 @@ class AFLIP(NamedTuple):
 
     alpha: float = 1.0
 
-    keeps_moment = True
+    point_fields = (Moment,)
     inverts_spread = True
 
 

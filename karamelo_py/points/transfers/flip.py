@@ -27,7 +27,6 @@ class FLIP(NamedTuple):
 
     alpha: float = 1.0
 
-    keeps_moment = False
     inverts_spread = False
 
 

@@ -8,6 +8,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.points.basis import affine_weight
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.transfers import (
+    Moment,
     gradient_weight,
     kept_gradient,
     straining,
@@ -29,7 +30,7 @@ class MLS(NamedTuple):
     method(ulmpm, MLS, quadratic-spline)
     """
 
-    keeps_moment = True
+    point_fields = (Moment,)
     inverts_spread = True
 
 

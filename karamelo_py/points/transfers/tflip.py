@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import taylor, updated_velocity
+from karamelo_py.points.transfers import Moment, taylor, updated_velocity
 from karamelo_py.points.transfers.flip import blend
 
 
@@ -25,7 +25,7 @@ class TFLIP(NamedTuple):
 
     alpha: float = 1.0
 
-    keeps_moment = True
+    point_fields = (Moment,)
     inverts_spread = False
 
 

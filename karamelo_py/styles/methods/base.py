@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.step import FBar, PointByPoint
+from karamelo_py.kernels.g2p import FBar, PointByPoint
 from karamelo_py.language import registry
 from karamelo_py.points.basis import blank
 from karamelo_py.points.frames import Updated
