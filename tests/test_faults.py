@@ -83,6 +83,7 @@ class View(PointsView):
     """Three points in 2D."""
 
     def __init__(self):
+        self._handed_out = {}
         self.ids = np.arange(3)
         self._v = np.zeros((3, 2))
 
@@ -97,6 +98,7 @@ def test_views_refuse_what_does_not_fit():
     view = View()
     view.velocity = 1.0
     view.velocity += np.ones((3, 2))
+    view.write_back()
     assert (view._v == 2).all()
     with pytest.raises(AttributeError, match="did you mean velocity"):
         view.velocty = 1.0

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from numba import prange, types
 from numba.extending import overload
 
-from karamelo_py.compiler.compile import define, index, kernel, point_function, real
+from karamelo_py.compiler.compile import by_type, define, index, kernel, point_function, real
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Places
@@ -188,16 +188,19 @@ def in_threads(function: Any, parameters: str) -> Any:
             **names,
         )
 
-    overload(loop, {"parallel": True, "nogil": True, "error_model": "numpy"})(
-        lambda mode, begin, end, *arguments: (
-            written_out(mode, begin, end, *arguments) if mode.instance_class is Threaded else None
-        )
-    )
-    overload(loop, {"forceinline": True, "no_cfunc_wrapper": True}, strict=False)(
-        lambda mode, begin, end, *arguments: (
-            None if mode.instance_class is Threaded else written_out(mode, begin, end, *arguments)
-        )
-    )
+    def threaded(mode, begin, end, *arguments):
+        if mode.instance_class is Threaded:
+            return written_out(mode, begin, end, *arguments)
+        return None
+
+    def serial(mode, begin, end, *arguments):
+        if mode.instance_class is Threaded:
+            return None
+        return written_out(mode, begin, end, *arguments)
+
+    options = {"parallel": True, "nogil": True, "error_model": "numpy"}
+    overload(loop, options, strict=False)(threaded)
+    by_type(loop)(serial)
     return loop
 
 
