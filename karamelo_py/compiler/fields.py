@@ -33,6 +33,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
+from numba.core.imputils import impl_ret_borrowed
+from numba.extending import lower_builtin, type_callable
 
 from karamelo_py.compiler.compile import by_type, define
 
@@ -95,12 +97,32 @@ def field(fields: tuple, kind: type) -> Any:
     return next((one.array for one in fields if type(one) is kind), None)
 
 
-@by_type(field)
-def _field(fields, kind):
+def _place_of(kind: Any, fields: Any) -> int | None:
+    """Where in a tuple of fields that of a class stands."""
     for k, one in enumerate(fields):
         if one.instance_class is kind.instance_class:
-            return define("fields, kind", f"return fields[{k}].array")
-    return lambda fields, kind: None
+            return k
+    return None
+
+
+# Not by_type: functions that return arrays are not for kernels without reference counting.
+@type_callable(field)
+def _type_field(context):
+    def typed(fields, kind):
+        k = _place_of(kind, fields)
+        return types.none if k is None else tuple(fields)[k][0]
+
+    return typed
+
+
+@lower_builtin(field, types.BaseTuple, types.Any)
+def _lower_field(context, builder, signature, arguments):
+    fields, kind = signature.args
+    k = _place_of(kind, fields)
+    if k is None:
+        return context.get_dummy_value()
+    array = builder.extract_value(builder.extract_value(arguments[0], k), 0)
+    return impl_ret_borrowed(context, builder, signature.return_type, array)
 
 
 # --- rows of arrays that may be absent --------------------------------------------------------
