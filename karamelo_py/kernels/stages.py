@@ -65,8 +65,8 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws import (
     advance,
+    constrained_velocity,
     deformation,
-    driven,
     initial_state,
     jacobian,
     kirchhoff_stress,
@@ -452,9 +452,9 @@ def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
     law = record(w.laws, index(w.points.material[p]))
     old = vector_at(w.kin, w.points.v, p)
-    v = driven(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
+    v = constrained_velocity(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
     x = vector_at(w.kin, w.places.x, p)
-    step = scale(dt, driven(law, v, displacing_velocity(w.transfer, v, total[0])))
+    step = scale(dt, constrained_velocity(law, v, displacing_velocity(w.transfer, v, total[0])))
     y = add_scaled(x, real(1, dt), step)
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, total[2])
     add_to_optional(w.points.bounces, p, real(1, dt), hits)

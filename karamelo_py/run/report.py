@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.laws import law_kind
 from karamelo_py.kernels.step import Fused, Staged
+from karamelo_py.points.laws import law_kind
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material

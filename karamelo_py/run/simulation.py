@@ -30,7 +30,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.export import impose_stress
 from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, show_heat
 from karamelo_py.kernels.hooks import ON_VELOCITY, POINT_STAGES, STAGES, CompiledHook
-from karamelo_py.kernels.laws import can, elastic_law, law_kind
+from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.stages import Everything, SumsToVelocity
 from karamelo_py.kernels.step import (
     DONE,
@@ -48,7 +48,7 @@ from karamelo_py.kernels.step import (
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
 from karamelo_py.points.kinematics import identity
-from karamelo_py.points.laws import with_stress
+from karamelo_py.points.laws import can, law_kind, with_stress
 from karamelo_py.run.hooks import lower_hooks
 from karamelo_py.run.lowering import (
     State,

@@ -1,14 +1,87 @@
-"""Constitutive laws of one point. One file each.
+"""Constitutive laws of one point. One file each: what a script says, and the point functions.
 
 A law is a NamedTuple of parameters (its class is the tag). It owns a state, a flat tuple with as
 many numbers as it needs; kernels only load it, pass it on and store it. All tensors have the
 components of the kinematics `kin`; `j` = det F is the volume over the reference volume. A law may
 be composed of parts, NamedTuples among its parameters (`eos_strength`).
+
+The class is the style, too: its docstring is the manual, and its fields with their annotations are
+the arguments. Where a script gives other numbers than the law computes with, a classmethod `given`
+has the arguments and returns the law; `checked`, a method, refuses what no annotation can, and
+returns the law or a simpler one that means the same.
+
+What dumps and plots can show of a law is declared beside it (`column`).
 """
 
+from __future__ import annotations
+
+import sys
+from collections import namedtuple
+from collections.abc import Callable
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
+
+
+class Absent(NamedTuple):
+    """Tag of a part that a law does not have."""
+
+
+def law_kind(law: NamedTuple) -> tuple[type, ...]:
+    """The classes of a law and of its parts: laws of one kind share kernels and arrays.
+
+    A table of laws (`karamelo_py.kernels.laws.law_table`) is of the kind of its laws.
+    """
+    parts = [law_kind(part) for part in law if isinstance(part, tuple)]
+    return type(law), *(kind for part in parts for kind in part)
+
+
+def can(law: NamedTuple, function: Callable) -> bool:
+    """Whether a point function is defined for a law, or for one of its parts."""
+    return any(function.defined(kind) for kind in law_kind(law))
+
+
+_columns: dict[type, dict[str, NamedTuple]] = {}
+
+
+def column(part: type, name: str, number: Callable | NamedTuple) -> None:
+    """Declare that laws with `part`, or that are of this class, can show a number.
+
+    Parameters
+    ----------
+    part
+        The class of the law, or of one of its parts.
+    name
+        What dumps, plots and tables call it.
+    number
+        A point function ``number(law, kin, state)`` of the whole law, or a tag of `shown`.
+    """
+    what = number if isinstance(number, tuple) else tag(number)
+    _columns.setdefault(part, {})[name] = what
+
+
+def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
+    """The numbers that a law can show: name, and the tag that `shown` computes it for."""
+    return {name: what for kind in law_kind(law) for name, what in _columns.get(kind, {}).items()}
+
+
+@point_function()
+def shown(what, law, kin, state):
+    """The number that a tag stands for, of a point in `state`."""
+
+
+def tag(function: Callable) -> NamedTuple:
+    """What stands for a point function of (law, kin, state) where kernels choose by type.
+
+    Its class can be imported from the module of the function, so that kernels can be cached.
+    """
+    module = sys.modules[function.__module__]
+    name = f"{function.__name__}_tag"
+    if not hasattr(module, name):
+        made = namedtuple(name, (), module=function.__module__)
+        shown.on(made)(lambda what, law, kin, state: function(law, kin, state))
+        setattr(module, name, made)
+    return getattr(module, name)()
 
 
 class Whole(NamedTuple):
@@ -80,11 +153,11 @@ def energy_density(law, kin, state):
 
 
 @point_function()
-def driven(law, own, given):
+def constrained_velocity(law, own, given):
     """Velocity of a point after a step: what the grid gives, or of rigid bodies their own."""
 
 
-@driven.otherwise
+@constrained_velocity.otherwise
 def _(law, own, given):
     return given
 
@@ -162,3 +235,8 @@ def with_stress(law, kin, state, stress):
 @point_function()
 def specific_volume(law):
     """Reference volume per mass."""
+
+
+@specific_volume.otherwise
+def _(law):
+    return law.specific_volume
