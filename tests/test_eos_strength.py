@@ -12,7 +12,7 @@ from tensors import ALL_KINEMATICS, flat, symmetric_flat, symmetric_matrix, symm
 
 from karamelo_py.app.cli import main
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.laws import law_in, law_kind, law_table
+from karamelo_py.kernels.laws import law_in, law_table
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space, trace, von_mises
 from karamelo_py.points.laws import (
     advance,
@@ -22,6 +22,7 @@ from karamelo_py.points.laws import (
     initial_state,
     jacobian,
     kirchhoff_stress,
+    law_kind,
     plastic_strain,
     specific_volume,
     wave_speed_squared,
@@ -29,8 +30,8 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.points.laws.eos.linear import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.strength.elastic import Elastic
-from karamelo_py.points.laws.strength.plastic import Plastic
+from karamelo_py.points.laws.strengths.linear import Elastic
+from karamelo_py.points.laws.strengths.plastic import Plastic
 from karamelo_py.script.values import Values
 
 RHO, K, G, Y = 2.0, 160.0, 80.0, 0.4

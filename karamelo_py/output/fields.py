@@ -19,7 +19,7 @@ from karamelo_py.kernels.export import (
     export_velocity_moment,
 )
 from karamelo_py.language.scene import Scene
-from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density, tag
+from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density
 
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
@@ -280,8 +280,8 @@ def _exported_state(simulation: Any) -> np.ndarray:
 
 def _energies(simulation: Any, density: Callable) -> np.ndarray:
     """Energy of each point, from its density."""
-    what = tag(density)
-    return _of_points(simulation, lambda laws: can(laws, density) and partial(export, what, True))
+    fill = partial(export, density.tag, True)
+    return _of_points(simulation, lambda laws: fill if can(laws, density) else None)
 
 
 def _shown(simulation: Any, name: str) -> np.ndarray:

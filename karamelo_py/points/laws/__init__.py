@@ -44,7 +44,7 @@ def can(law: NamedTuple, function: Callable) -> bool:
 _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
-def column(part: type, name: str, number: Callable | NamedTuple) -> None:
+def column(part: type, name: str, what: Callable | NamedTuple) -> None:
     """Declare that laws with `part`, or that are of this class, can show a number.
 
     Parameters
@@ -53,16 +53,16 @@ def column(part: type, name: str, number: Callable | NamedTuple) -> None:
         The class of the law, or of one of its parts.
     name
         What dumps, plots and tables call it.
-    number
-        A point function ``number(law, kin, state)`` of the whole law, or a tag of `shown`.
+    what
+        A point function of the whole law (`number`), or a tag of `shown`.
     """
-    what = number if isinstance(number, tuple) else tag(number)
-    _columns.setdefault(part, {})[name] = what
+    _columns.setdefault(part, {})[name] = what if isinstance(what, tuple) else what.tag
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
-    """The numbers that a law can show: name, and the tag that `shown` computes it for."""
-    return {name: what for kind in law_kind(law) for name, what in _columns.get(kind, {}).items()}
+    """The numbers that a law can show, those of its parts first: name, and tag for `shown`."""
+    kinds = reversed(law_kind(law))
+    return {name: what for kind in kinds for name, what in _columns.get(kind, {}).items()}
 
 
 @point_function()
@@ -70,18 +70,18 @@ def shown(what, law, kin, state):
     """The number that a tag stands for, of a point in `state`."""
 
 
-def tag(function: Callable) -> NamedTuple:
-    """What stands for a point function of (law, kin, state) where kernels choose by type.
+def number(function: Callable) -> Callable:
+    """Mark a point function of (law, kin, state) whose value can be shown.
 
-    Its class can be imported from the module of the function, so that kernels can be cached.
+    It gets a tag that stands for it where kernels choose by type. The tag's class is put beside
+    the function, so that it can be imported, and kernels with it be cached.
     """
-    module = sys.modules[function.__module__]
     name = f"{function.__name__}_tag"
-    if not hasattr(module, name):
-        made = namedtuple(name, (), module=function.__module__)
-        shown.on(made)(lambda what, law, kin, state: function(law, kin, state))
-        setattr(module, name, made)
-    return getattr(module, name)()
+    made = namedtuple(name, (), module=function.__module__)
+    shown.on(made)(lambda what, law, kin, state: function(law, kin, state))
+    setattr(sys.modules[function.__module__], name, made)
+    function.tag = made()
+    return function
 
 
 class Whole(NamedTuple):
@@ -147,6 +147,7 @@ def wave_speed_squared(law, kin, state):
     """Square of the speed of the fastest small disturbance, for the stable step."""
 
 
+@number
 @point_function()
 def energy_density(law, kin, state):
     """Stored energy per reference volume."""
@@ -162,21 +163,25 @@ def _(law, own, given):
     return given
 
 
+@number
 @point_function()
 def dissipated_energy(law, kin, state):
     """Energy that is gone, per reference volume; left out by laws that dissipate nothing."""
 
 
+@number
 @point_function()
 def damage(law, kin, state):
     """0 intact to 1 broken; left out by laws without."""
 
 
+@number
 @point_function()
 def damage_initiation(law, kin, state):
     """Grows from 0, damage begins at 1; left out by laws without."""
 
 
+@number
 @point_function()
 def temperature(law, kin, state):
     """Temperature; 0 of laws without."""
@@ -222,6 +227,7 @@ def elastic_strain(law, kin, state):
     """Elastic strain, for output."""
 
 
+@number
 @point_function()
 def plastic_strain(law, kin, state):
     """Equivalent plastic strain, for output; left out by laws without."""
