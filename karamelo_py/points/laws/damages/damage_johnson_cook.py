@@ -6,15 +6,16 @@ from math import exp, log
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
-from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws import column, damage, damage_initiation
+from karamelo_py.points.laws.checks import check_temperatures, reference_rate
 from karamelo_py.points.laws.damages import (
     damage_after,
     initial_damage,
     initiation,
     integrity,
 )
-from karamelo_py.points.laws.temperatures import Warm, check_temperatures, homologous
+from karamelo_py.points.laws.temperatures import Warm, homologous
 from karamelo_py.script.errors import ScriptError
 
 # Under triaxialities below this, failure strain is without bounds for most metals.
@@ -69,7 +70,7 @@ class JohnsonCookDamage(NamedTuple):
     d3: float
     d4: Annotated[float, NonNegative]
     d5: Annotated[float, NonNegative]
-    epsdot0: Annotated[float, Positive]
+    epsdot0: Annotated[float, NonNegative]
     Tr: float
     Tm: float
 
@@ -82,7 +83,7 @@ class JohnsonCookDamage(NamedTuple):
                 argument="d1",
                 expected="d1 + d2 above 0",
             )
-        return self
+        return self._replace(epsdot0=reference_rate(self.epsdot0, self.d4, "d4"))
 
 
 column(JohnsonCookDamage, "damage", damage)

@@ -7,8 +7,9 @@ from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.laws.checks import check_temperatures, reference_rate
 from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
-from karamelo_py.points.laws.temperatures import Warm, check_temperatures, homologous
+from karamelo_py.points.laws.temperatures import Warm, homologous
 
 
 class JohnsonCook(NamedTuple):
@@ -23,7 +24,7 @@ class JohnsonCook(NamedTuple):
     B, n
         Hardening: the flow stress rises by B ep^n with the plastic strain ep.
     epsdot0
-        Reference rate of plastic strain.
+        Reference rate of plastic strain; may be 0 where C is.
     C
         Coefficient of the rate; 0 for none.
     m
@@ -54,7 +55,7 @@ class JohnsonCook(NamedTuple):
     A: Annotated[float, Positive]
     B: Annotated[float, NonNegative]
     n: Annotated[float, NonNegative]
-    epsdot0: Annotated[float, Positive]
+    epsdot0: Annotated[float, NonNegative]
     C: Annotated[float, NonNegative]
     m: Annotated[float, NonNegative]
     Tr: float
@@ -63,6 +64,7 @@ class JohnsonCook(NamedTuple):
     def checked(self):
         """The law; without the rate where nothing depends on it."""
         check_temperatures(self.Tr, self.Tm)
+        reference_rate(self.epsdot0, self.C, "C")
         # Without softening T* is to be 0 whatever T is: so it is for an infinite Tm.
         law = self if self.m > 0 else self._replace(m=1.0, Tm=inf)
         return law if self.C > 0 else StaticJohnsonCook(*law[:4], *law[6:])

@@ -8,7 +8,6 @@ other parts see as `heat`: () where the law has no temperature.
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real, shared
-from karamelo_py.script.errors import ScriptError
 
 
 class Warm(NamedTuple):
@@ -66,13 +65,3 @@ def _(like, numbers):
 def homologous(heat, Tr, Tm):
     """(T - Tr) / (Tm - Tr), between 0 and 1."""
     return min(max((heat.T - Tr) / (Tm - Tr), real(0, Tr)), real(1, Tr))
-
-
-def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
-    """Refuse a melting temperature that is not above the reference temperature."""
-    if not Tm > Tr:
-        raise ScriptError(
-            f"the melting temperature Tm = {Tm:g} is not above {name} = {Tr:g}",
-            argument="Tm",
-            expected=f"a number above {Tr:g}",
-        )

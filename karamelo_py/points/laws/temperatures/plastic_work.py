@@ -6,9 +6,9 @@ from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import In, NonNegative, Positive
 from karamelo_py.points.laws import column, conductivity, heat_capacity, temperature
+from karamelo_py.points.laws.checks import check_temperatures
 from karamelo_py.points.laws.temperatures import (
     Warm,
-    check_temperatures,
     heated,
     initial_heat,
     thermal_pressure,
