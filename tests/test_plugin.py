@@ -192,7 +192,7 @@ def test_a_strength_shows_its_own_number(site, tmp_path, compiled):
     (tmp_path / "in.pull").write_text(PULL.replace("{recovery}", str(recovery)))
     done = karamelo_py(site, tmp_path, "in.pull", compiled=compiled)
     assert done.returncode == 0, done.stderr
-    rows = np.loadtxt(tmp_path / "points.100.LAMMPS", skiprows=9)
+    rows = np.loadtxt(tmp_path / "points.100.LAMMPS", skiprows=11)
     ep, R, q = rows[:, -3:].T
     # Exact for steady flow, whose strain rate is 2/3 of the stretching: R = H (dep/dt) / rate.
     np.testing.assert_allclose(R, 1e6 * (2 / 3 * 10) / recovery, rtol=2e-3)

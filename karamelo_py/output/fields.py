@@ -48,8 +48,6 @@ ABSENT_AT_POINTS = (
     "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
 )  # fmt: skip
 
-# What only some materials have (`columns_of` their laws).
-OF_SOME = ("ep", "damage", "damage_init", "T")
 ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez")
 
 
@@ -163,16 +161,20 @@ class Fields:
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
-        return list(PARTICLE_NAMES)
+        return list(dict.fromkeys([*PARTICLE_NAMES, *sorted(self._of_laws())]))
 
     def node_names(self) -> list[str]:
         """Names that `node` knows."""
         return list(NODE_NAMES)
 
+    def _of_laws(self) -> set[str]:
+        """Names of what the laws of the materials declare."""
+        laws = [material.law for material in self.hub.materials.values()]
+        return {name for law in laws for name in columns_of(law)}
+
     def absent_at_points(self) -> list[str]:
         """Names that `particle` knows, but that are 0 because no material has them."""
-        laws = [material.law for material in self.hub.materials.values()]
-        present = {name for law in laws for name in columns_of(law)}
+        present = self._of_laws()
         if self.hub.update.thermal:
             present.add("gamma")
         return [name for name in ABSENT_AT_POINTS if name not in present]
@@ -209,7 +211,7 @@ class Fields:
             return self.reference_volume * self._exported[:, JACOBIAN]
         if name == "ienergy":
             return self._exported[:, ENERGY].copy()
-        if name in OF_SOME:
+        if name in self._of_laws():
             return self._cached(name, lambda s: _shown(s, name)).copy()
         if name == "seq":
             return _von_mises(self._exported[:, :STRAIN])

@@ -4,7 +4,8 @@ Pressure comes from an equation of state, deviatoric stress from a strength. Vis
 temperature may be added. The parts are NamedTuples inside the law's, so that their types select
 their point functions; `Absent` stands for those that are not there, which have no numbers in the
 state. The state of a point is det F, the deviatoric stress of the intact material, what each part
-remembers (`Memory`), and the dissipated energy where there is any.
+remembers (`Memory`), and the dissipated energy where there is any. Parts of other kinds,
+a plug-in's, are chained (`karamelo_py.points.laws.further`).
 """
 
 from __future__ import annotations
@@ -62,6 +63,12 @@ from karamelo_py.points.laws.eos import (
     initial_energy,
     pressure,
     stored_heat,
+)
+from karamelo_py.points.laws.further import (
+    chained,
+    further_after,
+    further_pressure,
+    initial_further,
 )
 from karamelo_py.points.laws.strengths import (
     Remembered,
@@ -170,6 +177,7 @@ class EosStrength(NamedTuple):
     viscosity: Any = Absent()
     damage: Any = Absent()
     temperature: Any = Absent()
+    further: Any = Absent()  # of other kinds
 
     syntax = "eos, strength[, damage][, temperature]"
 
@@ -185,7 +193,9 @@ class EosStrength(NamedTuple):
                     expected="one damage and one temperature at most",
                 )
             kinds[part.kind] = part
-        return cls(**{k: law for part in (eos, strength, *parts) for k, law in part.laws.items()})
+        laws = {k: law for part in (eos, strength, *parts) for k, law in part.laws.items()}
+        further = [laws.pop(kind) for kind in list(laws) if kind not in cls._fields]
+        return cls(**laws, further=chained(further))
 
 
 column(EosStrength, "dissipated", dissipated_energy)
@@ -204,6 +214,7 @@ class Memory(NamedTuple):
     heat: Any  # temperature
     loss: Any  # dissipated energy per reference volume
     strength: Any
+    further: Any
 
 
 @separate.on(EosStrength)
@@ -231,6 +242,7 @@ def _(law, kin, like):
         initial_heat(law.temperature, like),
         lossless(law, like),
         initial_memory(law.strength, like),
+        initial_further(law.further, like),
     )
     return state_of(real(1, like), zero_symmetric(kin, like), m)
 
@@ -249,14 +261,16 @@ def memory_of(law, kin, state):
     heat = heat_from(initial_heat(law.temperature, like), rest)
     rest = following(rest, heat)
     loss = leading(rest, lossless(law, like))
-    return Memory(energy, viscous, broken, heat, loss, following(rest, loss))
+    rest = following(rest, loss)
+    strength = leading(rest, initial_memory(law.strength, like))
+    return Memory(energy, viscous, broken, heat, loss, strength, following(rest, strength))
 
 
 @shared
 def state_of(j, s, m):
     """The state of a point from its numbers."""
     heat = leading(m.heat, m.heat)  # the tuple without its name
-    return (j,) + s + m.energy + m.viscous + m.damage + heat + m.loss + m.strength
+    return (j,) + s + m.energy + m.viscous + m.damage + heat + m.loss + m.strength + m.further
 
 
 # ---- pressure -----------------------------------------------------------------------------------
@@ -267,7 +281,8 @@ def intact_pressure(law, j, m):
     """Pressure of the intact material, without viscous pressure."""
     elastic = elastic_ratio(law.strength, m.strength, j)
     p = pressure(law.eos, elastic, m.energy, m.heat)
-    return plus(p, thermal_pressure(law.temperature, m.heat))
+    p = plus(p, thermal_pressure(law.temperature, m.heat))
+    return further_pressure(law.further, m.further, p)
 
 
 @shared
@@ -403,11 +418,13 @@ def _(law, kin, state, dl, dt):
     energy = compressed(law.eos, m.energy, before, j, work + viscous_work)
     flow = equivalent_plastic_strain(law.strength, memory)
     flow -= equivalent_plastic_strain(law.strength, m.strength)
-    now = Memory(energy, viscous, m.damage, m.heat, m.loss, memory)
+    now = Memory(energy, viscous, m.damage, m.heat, m.loss, memory, m.further)
     broken = broken_further(law.damage, law, kin, now, flow, s, j, dt)
     heat = heated(law.temperature, m.heat, work * specific_volume(law.eos))
     gone = work + viscous_work + released(law.damage, law, kin, j, s, now, broken)
-    return state_of(j, s, Memory(energy, viscous, broken, heat, increased(m.loss, gone), memory))
+    loss = increased(m.loss, gone)
+    further = further_after(law.further, m.further, law, kin, j, s, now, dt)
+    return state_of(j, s, Memory(energy, viscous, broken, heat, loss, memory, further))
 
 
 @cauchy_stress.on(EosStrength)
@@ -489,9 +506,10 @@ def _(law, kin, state, stress):
     m = memory_of(law, kin, state)
     elastic = elastic_ratio(law.strength, m.strength, state[0])
     beside = plus(plus(elastic - elastic, thermal_pressure(law.temperature, m.heat)), m.viscous)
+    beside = further_pressure(law.further, m.further, beside)
     p = -trace(stress) * real(1 / 3, elastic) - beside
     after, energy = at_pressure(law.eos, elastic, m.energy, p, m.heat)
-    now = Memory(energy, m.viscous, m.damage, m.heat, m.loss, m.strength)
+    now = Memory(energy, m.viscous, m.damage, m.heat, m.loss, m.strength, m.further)
     return state_of(state[0] * (after / elastic), deviator(kin, stress), now)
 
 
@@ -520,7 +538,7 @@ def _(law, kin, state):
 def _(law, kin, state, T):
     m = memory_of(law, kin, state)
     heat = heat_from(m.heat, (T,))
-    now = Memory(m.energy, m.viscous, m.damage, heat, m.loss, m.strength)
+    now = Memory(m.energy, m.viscous, m.damage, heat, m.loss, m.strength, m.further)
     return state_of(state[0], leading_symmetric(kin, state[1:]), now)
 
 
