@@ -59,6 +59,7 @@ class FakeHub:
         self.place = None
         self.folder = Path.cwd()
         self.values = Values()
+        self.parts = {}
         self.materials = Catalogue("material", self)
         self.materials.add("steel", Material("material", "fake", FakeLaw()))
         self.rehearsing = self.checking = False

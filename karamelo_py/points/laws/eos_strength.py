@@ -224,7 +224,7 @@ def _(law):
 
 @assemble.on(EosStrengthParts)
 def _(tag, first, second, third, fourth, fifth):
-    return EosStrength(first, second, third, fourth, fifth)
+    return EosStrength(first, second, third, fourth, fifth, Absent())
 
 
 @shared
