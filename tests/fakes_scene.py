@@ -30,12 +30,6 @@ def _(law):
     return 1 / law.rho
 
 
-class FakeMaterial(Material):
-    """A material with this law."""
-
-    law = FakeLaw()
-
-
 class FakeArgument:
     """An argument as a script has it: a number, a word, or a formula (anything else)."""
 
@@ -65,8 +59,9 @@ class FakeHub:
         self.place = None
         self.folder = Path.cwd()
         self.values = Values()
+        self.parts = {}
         self.materials = Catalogue("material", self)
-        self.materials.add("steel", FakeMaterial())
+        self.materials.add("steel", Material("material", "fake", FakeLaw()))
         self.rehearsing = self.checking = False
         self.warnings = []
         self.update = SimpleNamespace(method=Method(self, Linear()), thermal=False)

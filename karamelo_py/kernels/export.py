@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from karamelo_py.compiler.compile import index, kernel, point_function
+from karamelo_py.compiler.compile import index, kernel
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.tuples import put_at, record, row, scale
 from karamelo_py.kernels.visit import place_at
@@ -12,80 +10,17 @@ from karamelo_py.points.basis import entry, locate, reach, support
 from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
 from karamelo_py.points.laws import (
     cauchy_stress,
-    damage,
-    damage_initiation,
-    dissipated_energy,
     elastic_strain,
     energy_density,
     initial_state,
     jacobian,
-    plastic_strain,
+    shown,
     specific_volume,
-    temperature,
     with_stress,
 )
 
 STRAIN, JACOBIAN, ENERGY = 6, 12, 13
 EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point
-
-
-class StoredEnergy(NamedTuple):
-    """Stored energy of a point."""
-
-
-class DissipatedEnergy(NamedTuple):
-    """Dissipated energy of a point."""
-
-
-class PlasticStrain(NamedTuple):
-    """Equivalent plastic strain."""
-
-
-class Damage(NamedTuple):
-    """Damage, from 0 to 1."""
-
-
-class DamageInitiation(NamedTuple):
-    """What grows to 1 before damage begins."""
-
-
-class Temperature(NamedTuple):
-    """Temperature."""
-
-
-@point_function()
-def measured(what, law, kin, state, volume):
-    """A number of a point with this reference volume."""
-
-
-@measured.on(StoredEnergy)
-def _(what, law, kin, state, volume):
-    return volume * energy_density(law, kin, state)
-
-
-@measured.on(DissipatedEnergy)
-def _(what, law, kin, state, volume):
-    return volume * dissipated_energy(law, kin, state)
-
-
-@measured.on(PlasticStrain)
-def _(what, law, kin, state, volume):
-    return plastic_strain(law, kin, state)
-
-
-@measured.on(Damage)
-def _(what, law, kin, state, volume):
-    return damage(law, kin, state)
-
-
-@measured.on(DamageInitiation)
-def _(what, law, kin, state, volume):
-    return damage_initiation(law, kin, state)
-
-
-@measured.on(Temperature)
-def _(what, law, kin, state, volume):
-    return temperature(law, kin, state)
 
 
 @kernel
@@ -102,12 +37,16 @@ def export_state(kin, like, points, laws, out):
 
 
 @kernel
-def export(what, kin, like, points, laws, out):
-    """One number ``out`` (n,) of each point, for laws that have it (`measured`)."""
+def export(what, times_volume, kin, like, points, laws, out):
+    """One number ``out`` (n,) of each point, declared by laws that have it (`columns_of`).
+
+    ``times_volume`` multiplies it by the reference volume: energies from their densities.
+    """
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
         state = load(points.state, p, initial_state(law, kin, like))
-        out[p] = measured(what, law, kin, state, points.mass[p] * specific_volume(law))
+        number = shown(what, law, kin, state)
+        out[p] = points.mass[p] * specific_volume(law) * number if times_volume else number
 
 
 @kernel

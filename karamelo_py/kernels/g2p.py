@@ -48,7 +48,7 @@ from karamelo_py.points.kinematics import (
     volume_ratio,
     zero_tensor,
 )
-from karamelo_py.points.laws import advance, driven, jacobian, wave_speed_squared
+from karamelo_py.points.laws import advance, constrained_velocity, jacobian, wave_speed_squared
 from karamelo_py.points.transfers import (
     Moment,
     add_moment,
@@ -396,9 +396,9 @@ def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
     law = law_of(w, p)
     old = load_vector(w.kin, w.points.v, p)
-    v = driven(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
+    v = constrained_velocity(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
     x = load_vector(w.kin, w.places.x, p)
-    step = scale(dt, driven(law, v, displacing_velocity(w.transfer, v, total[0])))
+    step = scale(dt, constrained_velocity(law, v, displacing_velocity(w.transfer, v, total[0])))
     y = add_scaled(x, real(1, dt), step)
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, total[2])
     increase(field(w.points.fields, Bounces), p, hits)

@@ -71,11 +71,11 @@ def knows(family: str, name: str) -> bool:
 
 
 def name_of(family: str, style: type) -> str:
-    """What a script calls a class; the name of the class where it calls it nothing."""
-    value = f"{style.__module__}:{style.__qualname__}"
-    for name, entries in _families().get(family, {}).items():
-        if any(entry.value == value for entry in entries):
-            return name
+    """What a script calls a class, or the style beside it in its file; else the class's name."""
+    for value in (f"{style.__module__}:{style.__qualname__}", f"{style.__module__}:"):
+        for name, entries in _families().get(family, {}).items():
+            if any(entry.value.startswith(value) for entry in entries):
+                return name
     return style.__name__
 
 

@@ -19,7 +19,7 @@ import inspect
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_type_hints
 
 from karamelo_py.language import docstrings, registry
 from karamelo_py.language.arguments import NULL, Argument
@@ -100,11 +100,33 @@ def parameters(target: Callable) -> list[Parameter]:
     """
     if target not in _signatures:
         function = target.__init__ if inspect.isclass(target) else target
-        function = inspect.unwrap(function)
-        found = list(inspect.signature(function).parameters.values())
         skipped = 2 if inspect.isclass(target) else 1  # self and hub
-        _signatures[target] = [_parameter(p, function) for p in found[skipped:]]
+        if is_record(target):
+            function = getattr(target, "given", target.__new__)
+            skipped = 0 if hasattr(target, "given") else 1
+        function = inspect.unwrap(function)
+        found = list(inspect.signature(function).parameters.values())[skipped:]
+        if function is target.__new__:
+            hints = get_type_hints(target, include_extras=True)
+            found = [p.replace(annotation=hints[p.name]) for p in found]
+        _signatures[target] = [_parameter(p, function) for p in found]
     return _signatures[target]
+
+
+def is_record(target: Any) -> bool:
+    """Whether a style is a NamedTuple, which needs no hub.
+
+    Its fields are its arguments, or those of its classmethod ``given`` where it has one. A method
+    ``checked`` returns what is used in its place.
+    """
+    return inspect.isclass(target) and issubclass(target, tuple)
+
+
+def _made(target: Callable, hub: Any, values: list, named: dict) -> Any:
+    if not is_record(target):
+        return target(hub, *values, **named)
+    made = getattr(target, "given", target)(*values, **named)
+    return made.checked() if hasattr(made, "checked") else made
 
 
 def _parameter(parameter: inspect.Parameter, function: Any) -> Parameter:
@@ -164,7 +186,7 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
             if not inspect.isclass(target):
                 return target(hub, *values, **named)
             with told(name, "__init__", target, getattr(hub, "place", None)):
-                return target(hub, *values, **named)
+                return _made(target, hub, values, named)
         except OSError as error:
             what = f"{error.filename}: " if error.filename else ""
             raise ScriptError(f"{what}{error.strerror or error}") from error
@@ -374,7 +396,8 @@ class Help:
 def describe(target: Callable, name: str) -> Help:
     """Help about a command or style, from its signature and its docstring."""
     doc = inspect.cleandoc(target.__doc__ or "")
-    if inspect.isclass(target) and "Parameters\n---" not in doc and target.__init__.__doc__:
+    written = "Parameters\n---" in doc or is_record(target)
+    if inspect.isclass(target) and not written and target.__init__.__doc__:
         doc = doc + "\n\n" + inspect.cleandoc(target.__init__.__doc__)
     head, sections = docstrings.sections(doc)
     summary, _, text = head.partition("\n\n")

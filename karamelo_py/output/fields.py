@@ -15,21 +15,12 @@ from karamelo_py.kernels.export import (
     EXPORTED,
     JACOBIAN,
     STRAIN,
-    Damage,
-    DamageInitiation,
-    DissipatedEnergy,
-    PlasticStrain,
-    StoredEnergy,
-    Temperature,
     export,
     export_state,
     export_velocity_moment,
 )
-from karamelo_py.kernels.laws import can
 from karamelo_py.language.scene import Scene
-from karamelo_py.points.laws import dissipated_energy, energy_density, plastic_strain
-from karamelo_py.points.laws.damages import damage_begun
-from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density
 from karamelo_py.points.transfers import Moment
 
 AXES = "xyz"
@@ -59,13 +50,6 @@ ABSENT_AT_POINTS = (
     "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
 )  # fmt: skip
 
-# What only some materials have: the number, and the function that shows that a law has it.
-OF_SOME = {
-    "ep": (PlasticStrain(), plastic_strain),
-    "damage": (Damage(), damage_begun),
-    "damage_init": (DamageInitiation(), damage_begun),
-    "T": (Temperature(), initial_heat),
-}
 ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez")
 
 
@@ -171,28 +155,32 @@ class Fields:
 
     def strain_energy(self, group: Any) -> float:
         """Stored energy of a particle group."""
-        return self._energy(group, StoredEnergy(), energy_density)
+        return self._energy(group, energy_density)
 
     def dissipated_energy(self, group: Any) -> float:
         """Dissipated energy of a particle group."""
-        return self._energy(group, DissipatedEnergy(), dissipated_energy)
+        return self._energy(group, dissipated_energy)
 
-    def _energy(self, group: Any, what: Any, function: Any) -> float:
-        energy = self._cached(type(what).__name__, lambda s: _measured(s, what, function))
+    def _energy(self, group: Any, density: Callable) -> float:
+        energy = self._cached(density.__name__, lambda s: _energies(s, density))
         return float(energy.sum() if group.all else energy[group.ids].sum())
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
-        return list(PARTICLE_NAMES)
+        return list(dict.fromkeys([*PARTICLE_NAMES, *sorted(self._of_laws())]))
 
     def node_names(self) -> list[str]:
         """Names that `node` knows."""
         return list(NODE_NAMES)
 
+    def _of_laws(self) -> set[str]:
+        """Names of what the laws of the materials declare."""
+        laws = [material.law for material in self.hub.materials.values()]
+        return {name for law in laws for name in columns_of(law)}
+
     def absent_at_points(self) -> list[str]:
         """Names that `particle` knows, but that are 0 because no material has them."""
-        laws = [material.law for material in self.hub.materials.values()]
-        present = {name for name, (_, has) in OF_SOME.items() if any(can(law, has) for law in laws)}
+        present = self._of_laws()
         if self.hub.update.thermal:
             present.add("gamma")
         kinds = fields.declared(self.hub.fixes.values(), "point_fields")
@@ -231,8 +219,8 @@ class Fields:
             return self.reference_volume * self._exported[:, JACOBIAN]
         if name == "ienergy":
             return self._exported[:, ENERGY].copy()
-        if name in OF_SOME:
-            return self._cached(name, lambda s: _measured(s, *OF_SOME[name])).copy()
+        if name in self._of_laws():
+            return self._cached(name, lambda s: _shown(s, name)).copy()
         if name == "seq":
             return _von_mises(self._exported[:, :STRAIN])
         if name[:1] in "se" and name[1:] in COMPONENTS:
@@ -279,17 +267,15 @@ class Fields:
         return self._cached("exported", _exported_state)
 
 
-def _of_points(
-    simulation: Any, fill: Callable, *columns: int, has: Callable = lambda laws: True
-) -> np.ndarray:
-    """What `fill(kin, like, points, laws, rows)` says of all points, by id, (N, *columns).
+def _of_points(simulation: Any, filler: Callable, *columns: int) -> np.ndarray:
+    """What `filler(laws)(kin, like, points, laws, rows)` says of all points, by id, (N, *columns).
 
-    Points are left at 0 where the scene's laws do not have it.
+    Points are left at 0 where their laws do not have it, and `filler(laws)` is false.
     """
     s = simulation.setup
     out = np.zeros((simulation.count, *columns))
     for block in s.blocks:
-        if has(block.laws):
+        if fill := filler(block.laws):
             rows = np.zeros((len(block.points.id), *columns))
             fill(s.kin, s.nodes.sums[0, MASS], block.points, block.laws, rows)
             out[block.points.id] = rows
@@ -298,12 +284,23 @@ def _of_points(
 
 def _exported_state(simulation: Any) -> np.ndarray:
     # A kinematics fills its own components: in the plane the fourth is 12, as in space.
-    return _of_points(simulation, export_state, EXPORTED)
+    return _of_points(simulation, lambda laws: export_state, EXPORTED)
 
 
-def _measured(simulation: Any, what: Any, function: Any) -> np.ndarray:
-    """A number of all points (`kernels.export.measured`)."""
-    return _of_points(simulation, partial(export, what), has=lambda laws: can(laws, function))
+def _energies(simulation: Any, density: Callable) -> np.ndarray:
+    """Energy of each point, from its density."""
+    fill = partial(export, density.tag, True)
+    return _of_points(simulation, lambda laws: fill if can(laws, density) else None)
+
+
+def _shown(simulation: Any, name: str) -> np.ndarray:
+    """A number of each point that its law declares, 0 of laws that do not."""
+
+    def fill(laws: Any) -> Callable | None:
+        what = columns_of(laws).get(name)
+        return None if what is None else partial(export, what, False)
+
+    return _of_points(simulation, fill)
 
 
 def _column(field: np.ndarray, k: int) -> np.ndarray:

@@ -23,17 +23,19 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.g2p import NodalMean
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.laws import can, elastic_law, law_in, law_kind, law_on, law_table
+from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
 from karamelo_py.kernels.step import Insulated
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried, deformed
 from karamelo_py.points.boundary import ReflectingGrid
 from karamelo_py.points.kinematics import Line
 from karamelo_py.points.laws import (
+    can,
     conductivity,
-    driven,
+    constrained_velocity,
     heat_capacity,
     initial_state,
+    law_kind,
     specific_volume,
     with_temperature,
 )
@@ -94,7 +96,7 @@ def check_rigid(hub: Hub) -> None:
     if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
         return
     for solid in hub.solids.values():
-        if can(solid.material.law, driven):
+        if can(solid.material.law, constrained_velocity):
             raise ScriptError(
                 f"solid '{solid.id}' is rigid, and the domains of its points would deform",
                 place=solid.place,

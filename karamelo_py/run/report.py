@@ -11,9 +11,9 @@ import numpy as np
 from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.arrays import arrays_of
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.laws import law_kind
 from karamelo_py.kernels.step import Fused, Staged, rows_of
 from karamelo_py.kernels.table import says
+from karamelo_py.points.laws import law_kind
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material

@@ -24,7 +24,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.export import impose_stress
 from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, show_heat
 from karamelo_py.kernels.hooks import POINT_STAGES, STAGES, CompiledHook
-from karamelo_py.kernels.laws import can, elastic_law, law_kind
+from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.nodes import ClearSums, SumsToVelocity
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.step import (
@@ -44,7 +44,7 @@ from karamelo_py.kernels.step import (
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, Visit, sweep_nodes
 from karamelo_py.points.boundary import Bounces
-from karamelo_py.points.laws import with_stress
+from karamelo_py.points.laws import can, law_kind, with_stress
 from karamelo_py.run.hooks import lower_hooks
 from karamelo_py.run.lowering import (
     State,

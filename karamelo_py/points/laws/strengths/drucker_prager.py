@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from math import cos, inf, sin, sqrt, tan
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
+from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.laws.strength.drucker_prager import DruckerPrager as DruckerPragerLaw
-from karamelo_py.scene.hub import Hub
-from karamelo_py.styles.strengths.base import Strength
-from karamelo_py.styles.strengths.soils import angles, residual
+from karamelo_py.points.kinematics import contract
+from karamelo_py.points.laws.strengths import pressure_response
+from karamelo_py.points.laws.strengths.frictional import frictional, surface
+from karamelo_py.points.laws.strengths.soils import angles, residual
 
 
 def cone(fit: str, phi: float) -> tuple[float, float]:
@@ -22,7 +24,7 @@ def cone(fit: str, phi: float) -> tuple[float, float]:
     return 6 * cos(phi) / below, 6 * sin(phi) / below
 
 
-class DruckerPrager(Strength):
+class DruckerPrager(NamedTuple):
     """Strength of soil by cohesion and friction: a cone around the axis of pressure.
 
     Parameters
@@ -67,9 +69,18 @@ class DruckerPrager(Strength):
     mohr-coulomb, eos linear, material eos-strength, compute max_plastic_strain
     """
 
-    def __init__(
-        self,
-        hub: Hub,
+    G: float  # shear modulus
+    cohesion: float
+    friction: float
+    dilation: float
+    tension: float
+    residual_cohesion: float  # at the end of softening
+    residual_friction: float
+    softening: float  # share of the way to the residual for each unit of plastic strain, or 0
+
+    @classmethod
+    def given(
+        cls,
         G: Annotated[float, Positive],
         cohesion: Annotated[float, NonNegative],
         phi: float,
@@ -81,10 +92,39 @@ class DruckerPrager(Strength):
         residual_phi: Annotated[float, NonNegative] | None = None,
         softening: Annotated[float, Positive] | None = None,
     ):
+        """The cone from cohesion and angles: sqrt(s:s / 2) <= cohesion + friction p."""
         a, b = angles(cohesion, phi, psi)
         end = residual(cohesion, phi, residual_cohesion, residual_phi, softening)
         xi, eta = cone(fit, a)
         peak = (xi * cohesion, eta, cone(fit, b)[1])
         xi, eta = cone(fit, end.phi)
         left = (xi * end.cohesion, eta, end.softening)
-        self.law = DruckerPragerLaw(G, *peak, inf if tension is None else tension, *left)
+        return cls(G, *peak, inf if tension is None else tension, *left)
+
+
+frictional(DruckerPrager)
+
+
+@pressure_response.on(DruckerPrager)
+def _(strength, kin, s, p, K, strain):
+    cohesion, friction, dilation = surface(strength, strain)
+    zero = real(0, p)
+    trial = sqrt(real(0.5, p) * contract(kin, s, s))
+    lowest = -strength.tension
+    if friction > 0:
+        lowest = max(lowest, -cohesion / friction)
+    f = trial - cohesion - friction * p
+    root = trial
+    if f > 0:
+        x = f / (strength.G + K * friction * dilation)
+        p += K * dilation * x
+        root = cohesion + friction * p
+        if p < lowest:
+            # Beyond the end of the cone: the trial pressure counts again, see below.
+            p -= K * dilation * x
+    if p < lowest:
+        p = lowest
+        root = min(trial, cohesion + friction * lowest)
+    if root < trial:
+        return scale(max(root, zero) / trial, s), p
+    return s, p

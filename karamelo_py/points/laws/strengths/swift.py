@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.laws.strength.swift import Swift as SwiftLaw
-from karamelo_py.scene.hub import Hub
-from karamelo_py.styles.strengths.base import Strength
+from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
+from karamelo_py.points.laws.strengths.johnson_cook import power_law
 
 
-class Swift(Strength):
+class Swift(NamedTuple):
     """Hardening by a power of plastic strain, after a plateau.
 
     Parameters
@@ -39,13 +38,17 @@ class Swift(Strength):
     plastic, johnson_cook, material eos-strength
     """
 
-    def __init__(
-        self,
-        hub: Hub,
-        G: Annotated[float, Positive],
-        A: Annotated[float, Positive],
-        B: Annotated[float, NonNegative],
-        C: float,
-        n: Annotated[float, NonNegative],
-    ):
-        self.law = SwiftLaw(G, A, B, C, n)
+    G: Annotated[float, Positive]
+    A: Annotated[float, Positive]
+    B: Annotated[float, NonNegative]
+    C: float
+    n: Annotated[float, NonNegative]
+
+
+hardening(Swift)
+
+
+@flow_stress.on(Swift)
+def _(strength, memory, increment, heat, dt):
+    hard, slope = power_law(strength.B, strength.n, memory[0] + increment - strength.C)
+    return strength.A + hard, slope
