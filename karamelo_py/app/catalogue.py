@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
 import os
 import shutil
@@ -25,13 +24,6 @@ karamelo-py help FAMILY STYLE    where a name means several things:
                                  karamelo-py help fix kinetic_energy
 karamelo-py styles [FAMILY]      list commands and styles
 """
-# Families whose styles are words of a command and take no arguments of their own.
-WRITTEN = {
-    "scheme": "scheme({name})",
-    "method": "method({name}, transfer, basis[, alpha])",
-    "transfer": "method(kind, {name}, basis{fields})",
-    "basis": "method(kind, transfer, {name}[, alpha])",
-}
 _WIDEST = 88  # running text is hard to read in longer lines
 
 
@@ -52,8 +44,6 @@ def help_of(family: str, name: str) -> Help:
         If there is none of this name, or its package is broken.
     """
     target = registry.find(family, name)
-    if family in WRITTEN:
-        return _help_from_docstring(family, name, target)
     try:
         return signature.describe(target, name if family == COMMAND else f"{family} {name}")
     except TypeError as error:
@@ -61,26 +51,6 @@ def help_of(family: str, name: str) -> Help:
             f"{family} '{name}' of {registry.origin(family, name)} has a signature that cannot be "
             f"understood: {error}"
         ) from error
-
-
-def _help_from_docstring(family: str, name: str, target: Any) -> Help:
-    """Help about a style that is a word of a command: only the docstring speaks of it."""
-
-    def nothing(hub: Any) -> None: ...
-
-    nothing.__doc__ = target.__doc__
-    help_ = signature.describe(nothing, name)
-    described = signature.documented(target.__doc__ or "") if family == "transfer" else {}
-    anything = signature.kind_of(Any)
-    fields = "".join(f", {word}" for word in described)
-    return dataclasses.replace(
-        help_,
-        name=f"{family} {name}",
-        syntax=WRITTEN[family].format(name=name, fields=fields),
-        parameters=[
-            Parameter(word, anything, description=text) for word, text in described.items()
-        ],
-    )
 
 
 def describe_parameter(parameter: Parameter) -> str:

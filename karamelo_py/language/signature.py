@@ -18,12 +18,12 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any, Literal, get_type_hints
 
 from karamelo_py.language import docstrings, registry
 from karamelo_py.language.arguments import NULL, Argument
-from karamelo_py.language.docstrings import documented
 from karamelo_py.language.faults import told
 from karamelo_py.language.kinds import (
     AtLeast,
@@ -53,7 +53,6 @@ __all__ = [
     "Positive",
     "call",
     "describe",
-    "documented",
     "kind_of",
     "parameters",
     "syntax",
@@ -87,45 +86,42 @@ class Parameter:
         return self.name
 
 
-_signatures: dict[Any, list[Parameter]] = {}
-
-
+@cache
 def parameters(target: Callable) -> list[Parameter]:
-    """The parameters of a command or style, without the hub.
+    """The parameters of a command or style, without the hub; of a NamedTuple, its fields.
 
     Raises
     ------
     TypeError
         If the signature cannot be understood (a fault of whoever wrote it).
     """
-    if target not in _signatures:
-        function = target.__init__ if inspect.isclass(target) else target
-        function = inspect.unwrap(function)
-        found = list(inspect.signature(function).parameters.values())
-        skipped = 2 if inspect.isclass(target) else 1  # self and hub
-        _signatures[target] = [_parameter(p, function) for p in found[skipped:]]
-    return _signatures[target]
+    try:
+        if _is_tuple(target):
+            hints = get_type_hints(target, include_extras=True)
+            empty, defaults = inspect.Parameter.empty, target._field_defaults
+            return [_parameter(n, hints[n], defaults.get(n, empty)) for n in target._fields]
+        found = list(inspect.signature(target, eval_str=True).parameters.values())
+    except TypeError:
+        raise
+    except Exception as error:
+        raise TypeError(f"an annotation cannot be evaluated ({error})") from error
+    return [_parameter(p.name, p.annotation, p.default, p.kind) for p in found[1:]]
 
 
-def _parameter(parameter: inspect.Parameter, function: Any) -> Parameter:
-    annotation = parameter.annotation
-    if isinstance(annotation, str):
-        # One by one: types that are imported for checking only may stand elsewhere.
-        try:
-            annotation = eval(annotation, function.__globals__)
-        except Exception as error:
-            raise TypeError(
-                f"the annotation {annotation!r} of {parameter.name} cannot be evaluated ({error}); "
-                "import it outside of TYPE_CHECKING"
-            ) from error
-    optional = parameter.default is not parameter.empty
+def _is_tuple(target: Any) -> bool:
+    """Whether `target` is a NamedTuple: a tag that keeps its parameters and needs no hub."""
+    return inspect.isclass(target) and issubclass(target, tuple)
+
+
+def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Parameter:
+    optional = default is not inspect.Parameter.empty
     return Parameter(
-        parameter.name,
+        name,
         kind_of(annotation),
-        variadic=parameter.kind is parameter.VAR_POSITIONAL,
-        keyword=parameter.kind is parameter.KEYWORD_ONLY,
+        variadic=kind is inspect.Parameter.VAR_POSITIONAL,
+        keyword=kind is inspect.Parameter.KEYWORD_ONLY,
         optional=optional,
-        default=parameter.default if optional else None,
+        default=default if optional else None,
     )
 
 
@@ -157,10 +153,12 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         positional, keywords = _bind(target, expected, arguments, name, bound)
         values, named = [], {}
         for number, (parameter, argument) in enumerate(positional, 1):
-            values.append(_convert(hub, parameter, argument, number))
+            values.append(convert(hub, parameter, argument, number))
         for parameter, argument in keywords:
-            named[parameter.name] = _convert(hub, parameter, argument, None)
+            named[parameter.name] = convert(hub, parameter, argument)
         try:
+            if _is_tuple(target):
+                return target(*values)
             if not inspect.isclass(target):
                 return target(hub, *values, **named)
             with told(name, "__init__", target, getattr(hub, "place", None)):
@@ -198,20 +196,15 @@ def _bind(
     positional: list[tuple[Parameter, Argument]] = []
     keywords: list[tuple[Parameter, Argument]] = []
     given = []
-    variadic = next((p for p in slots if p.variadic), None)
+    # Raw arguments are passed on to a style, which knows the names.
+    passed_on = variadic is not None and is_raw(variadic.kind)
     for argument in arguments:
         pair = argument.keyword()
-        # Raw arguments are passed on to a style, which knows the names.
-        passed_on = variadic is not None and is_raw(variadic.kind)
         if pair is None or (passed_on and pair[0] not in by_name):
             given.append(argument)
             continue
         word, value = pair
         if word not in by_name:
-            if variadic is not None and is_raw(variadic.kind):
-                # For the style that the command passes its arguments on to.
-                given.append(argument)
-                continue
             raise _unknown_keyword(word, argument, expected, by_name)
         if word in bound:
             raise ScriptError(f"{word} is given twice", place=argument.place)
@@ -258,7 +251,14 @@ def _unknown_keyword(
     )
 
 
-def _convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None) -> Any:
+def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
+    """What an argument, the one of this number, stands for as the value of a parameter.
+
+    Raises
+    ------
+    ScriptError
+        With its place if it is of another kind.
+    """
     if argument.is_null and not parameter.kind.nullable and not is_raw(parameter.kind):
         raise _misfit(parameter, argument, number, Unfit(NULL))
     try:
@@ -315,28 +315,42 @@ def _joined(expected: list[Parameter]) -> str:
     return text + "]" * open_brackets
 
 
-def _arguments(target: Callable) -> str:
-    """The arguments as they are written: the target's own `syntax`, or from its signature."""
-    own = getattr(target, "syntax", None)
-    return own if isinstance(own, str) else _joined(parameters(target))
+# The commands that name styles of families without a command of their own.
+_HOMES = {"transfer": "method", "basis": "method"}
 
 
 def syntax(target: Callable, name: str) -> str:
     """The line that shows how a command or style is called."""
-    own = _arguments(target)
+    own = getattr(target, "syntax", None)
+    if not isinstance(own, str):
+        own = _joined(told_of(target))
     family, _, style = name.partition(" ")
     if not style:
         return f"{name}({own})"
-    before = []
-    if registry.knows("command", family):
-        outer = [p for p in parameters(registry.find("command", family)) if not p.variadic]
-        # The last of the command's own arguments is the one that names the style.
-        before = [p.shown for p in outer[:-1] if not p.keyword]
+    command = _HOMES.get(family, family)
+    before = [style]
+    if registry.knows("command", command):
+        outer = parameters(registry.find("command", command))
+        outer = [p for p in outer if not p.variadic and not p.keyword]
+        before = [style if p.kind.family == family else p.shown for p in outer]
     if own.startswith("["):
         own = own.replace("[", "[, ", 1)
     elif own:
         own = ", " + own
-    return f"{family}({', '.join([*before, style])}{own})"
+    return f"{command}({', '.join(before)}{own})"
+
+
+def told_of(target: Callable) -> list[Parameter]:
+    """Parameters for help: with the word that chooses a variant of a style."""
+    variants = getattr(target, "variants", None)
+    if not variants:
+        return parameters(target)
+    # A method chooses by it the shape of domains, which must have one.
+    needed = not _is_tuple(target)
+    default = getattr(target, "default_variant", None)
+    kind = kind_of(Literal[tuple(variants)])
+    variant = Parameter("variant", kind, optional=not needed, default=default)
+    return [variant, *parameters(target)] if needed else [*parameters(target), variant]
 
 
 # ---- help ---------------------------------------------------------------------------------------
@@ -373,16 +387,13 @@ class Help:
 
 def describe(target: Callable, name: str) -> Help:
     """Help about a command or style, from its signature and its docstring."""
-    doc = inspect.cleandoc(target.__doc__ or "")
-    if inspect.isclass(target) and "Parameters\n---" not in doc and target.__init__.__doc__:
-        doc = doc + "\n\n" + inspect.cleandoc(target.__init__.__doc__)
-    head, sections = docstrings.sections(doc)
+    head, sections = docstrings.sections(target.__doc__ or "")
+    if inspect.isclass(target):
+        inner = docstrings.sections(target.__init__.__doc__ or "")[1]
+        sections = sections | {k: v for k, v in inner.items() if k not in sections}
     summary, _, text = head.partition("\n\n")
     descriptions = docstrings.descriptions(sections.pop("Parameters", ""))
-    described = [
-        Parameter(**{**vars(p), "description": descriptions.get(p.name, "")})
-        for p in parameters(target)
-    ]
+    described = [replace(p, description=descriptions.get(p.name, "")) for p in told_of(target)]
     return Help(
         name, syntax(target, name), " ".join(summary.split()), text.strip(), described, sections
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+from karamelo_py.language.kinds import In
 from karamelo_py.points.transfers import terms, updated_velocity
 
 
@@ -18,14 +19,14 @@ class XPIC(NamedTuple):
     Parameters
     ----------
     order
-        m, 1 to 20.
+        m.
 
     Example
     -------
     method(ulmpm, XPIC, quadratic-spline, 5)
     """
 
-    order: int = 2
+    order: Annotated[int, In(1, 20)]
 
     keeps_moment = False
     inverts_spread = False
