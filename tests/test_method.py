@@ -131,7 +131,7 @@ def test_a_name_that_is_taken_disturbs_only_scripts_that_ask_for_it(plugin):
     assert update("method(ulmpm, PIC, linear)").words == "ulmpm PIC linear musl"
     chosen = update("method(ulmpm, PIC, linear)")
     assert registry.name_of("basis", type(chosen.method.basis)) == "linear"
-    with pytest.raises(ScriptError, match="offered by two packages: karamelo-py .* and mpm-steps"):
+    with pytest.raises(ScriptError, match=r"offered by two packages: karamelo-py .* and mpm-steps"):
         update("method(ulmpm, PIC, cubic-spline)")
 
 

@@ -388,11 +388,12 @@ class Help:
 def describe(target: Callable, name: str) -> Help:
     """Help about a command or style, from its signature and its docstring."""
     head, sections = docstrings.sections(target.__doc__ or "")
-    if inspect.isclass(target):
-        inner = docstrings.sections(target.__init__.__doc__ or "")[1]
-        sections = sections | {k: v for k, v in inner.items() if k not in sections}
     summary, _, text = head.partition("\n\n")
     descriptions = docstrings.descriptions(sections.pop("Parameters", ""))
+    if inspect.isclass(target):
+        inner = docstrings.sections(target.__init__.__doc__ or "")[1]
+        descriptions = docstrings.descriptions(inner.pop("Parameters", "")) | descriptions
+        sections = inner | sections
     described = [replace(p, description=descriptions.get(p.name, "")) for p in told_of(target)]
     return Help(
         name, syntax(target, name), " ".join(summary.split()), text.strip(), described, sections

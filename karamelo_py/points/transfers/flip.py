@@ -23,6 +23,8 @@ class FLIP(NamedTuple):
     ----------
     alpha
         Share of FLIP.
+    variant
+        Maps the gradient of velocity, too: TFLIP.
 
     Example
     -------
