@@ -7,6 +7,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, NoReturn
 
 from karamelo_py import __version__
 from karamelo_py.scene.hub import Hub
@@ -15,40 +16,16 @@ from karamelo_py.script.errors import ScriptError, nearest, render_message
 ERROR = 1
 INTERRUPTED = 130  # as a shell reports a program that SIGINT ended
 
-USAGE = """\
-karamelo-py SCRIPT [options]           run a script
-karamelo-py check SCRIPT [options]     read and build a scene, print what it needs, run nothing
-karamelo-py styles [FAMILY]            list commands and styles, and where they come from
-karamelo-py help [FAMILY] STYLE        explain a command or style
-karamelo-py bench [WORKLOAD ...]       measure the speed of this machine on known scenes
-"""
-OPTIONS = """
-options:
-  -var NAME VALUE    (or -v) set a variable; the script's own assignment of it then yields
-  --threads N        threads to use (default: all cores where the scene is large enough)
-  --quiet            write warnings and errors only
-  --debug            show the traceback of an error
-"""
-RUN = f"""\
-karamelo-py SCRIPT [options]
-karamelo-py run SCRIPT [options]       where a script is called check, styles, help or bench
-
-Runs a script. The log goes to the terminal and to log.mpm; files are written to the current folder.
-{OPTIONS}"""
-CHECK = f"""\
-karamelo-py check SCRIPT [options]
-
-Reads a script, builds its scene, and prints what its first run needs: points and nodes, memory,
-the first time step and the stable one, the stages of a step. Mistakes further down are found, too.
-Nothing runs, and nothing is written.
-{OPTIONS}"""
-STYLES = """\
-karamelo-py styles [FAMILY]
-
-Lists commands and styles, all or those of a family (fix, compute, region, ...), with the packages
-they come from.
-"""
-
+RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
+CHECK = """\
+Prints what its first run needs: points and nodes, memory, the first time step and the stable one,
+the stages of a step. Mistakes further down are found, too. Nothing runs, and nothing is written."""
+HELP = """
+karamelo-py help COMMAND         explain a command: karamelo-py help solid
+karamelo-py help STYLE           explain a style: karamelo-py help body_force
+karamelo-py help FAMILY STYLE    where a name means several things:
+                                 karamelo-py help fix kinetic_energy
+karamelo-py styles [FAMILY]      list commands and styles"""
 RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 
 
@@ -58,6 +35,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     debug = "--debug" in arguments
     try:
         return _dispatch(arguments)
+    except SystemExit as done:  # argparse has shown what was asked for
+        return int(done.code or 0)
     except ScriptError as error:
         if debug:
             traceback.print_exc()
@@ -92,68 +71,88 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
+COMMANDS = ("run", "check", "styles", "help", "bench")
+
+
 def _dispatch(arguments: list[str]) -> int:
-    if not arguments or arguments[0] in ("-h", "--help"):
-        version = "  --version          print the version\n"
-        title = f"karamelo-py {__version__}: the material point method"
-        print(f"{title}\n\n{USAGE}{OPTIONS}{version}", end="")
-        return 0
-    if arguments[0] == "--version":
-        print(f"karamelo-py {__version__}")
-        return 0
-    commands: dict[str, Callable[[list[str]], int]] = {
-        "run": _run,
-        "check": _check,
-        "styles": _styles,
-        "help": _help,
-        "bench": _bench,
-    }
-    if arguments[0] in commands:
-        if any(word in ("-h", "--help") for word in arguments[1:]):
-            print(_explanation(arguments[0]), end="")
-            return 0
-        return commands[arguments[0]](arguments[1:])
-    close = nearest(arguments[0], commands)
-    if close and len(arguments) > 1 and not Path(arguments[0]).exists():
-        raise ScriptError(
-            f"there is no file {arguments[0]} and no such subcommand",
-            expected="a script, or one of " + ", ".join(commands),
-            hint=f"did you mean 'karamelo-py {close}'?",
-        )
-    return _run(arguments)
-
-
-def _explanation(subcommand: str) -> str:
-    """What a subcommand does, and how it is called."""
-    if subcommand == "help":
-        from karamelo_py.app.catalogue import HELP
-
-        return HELP
-    if subcommand == "bench":
-        from karamelo_py.app.bench.command import explanation
-
-        return explanation()
-    return {"run": RUN, "check": CHECK, "styles": STYLES}[subcommand]
+    arguments = arguments or ["-h"]
+    first = arguments[0]
+    if first not in (*COMMANDS, "-h", "--help", "--version"):
+        close = nearest(first, COMMANDS)
+        if close and len(arguments) > 1 and not Path(first).exists():
+            raise ScriptError(
+                f"there is no file {first} and no such subcommand",
+                expected="a script, or one of " + ", ".join(COMMANDS),
+                hint=f"did you mean 'karamelo-py {close}'?",
+            )
+        arguments = ["run", *arguments]
+    if first == "help" and len(arguments) == 2 and arguments[1] in COMMANDS[1:]:
+        arguments = [arguments[1], "-h"]
+    options = _parser(arguments[0]).parse_args(arguments)
+    return options.act(options)
 
 
 class CommandLine(argparse.ArgumentParser):
     """A command line whose errors are messages in our own form."""
 
-    def error(self, message: str):
-        raise ScriptError(message, expected=USAGE.rstrip())
+    def __init__(self, **options: Any):
+        form = argparse.RawDescriptionHelpFormatter
+        super().__init__(formatter_class=form, allow_abbrev=False, **options)
+
+    def error(self, message: str) -> NoReturn:
+        raise ScriptError(message, expected=self.format_usage().removeprefix("usage: ").rstrip())
 
 
-def _script_parser() -> CommandLine:
-    parser = CommandLine(prog="karamelo-py", add_help=False, allow_abbrev=False)
-    parser.add_argument("script", nargs="?")
-    parser.add_argument("-i", "-in", dest="input")
-    parser.add_argument("-var", "--var", "-v", nargs=2, action="append", default=[])
-    parser.add_argument("--threads", type=threads_option)
-    parser.add_argument("--quiet", action="store_true")
-    parser.add_argument("--debug", action="store_true")
-    parser.add_argument("--version", action="store_true")
-    parser.add_argument("-h", "--help", action="store_true")
+def _parser(command: str) -> CommandLine:
+    """The command line; what only `command` needs is there only for it."""
+    parser = CommandLine(
+        prog="karamelo-py",
+        usage="karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--quiet] [--debug]\n"
+        "       karamelo-py COMMAND ...",
+        description=f"karamelo-py {__version__}: the material point method",
+        epilog="karamelo-py COMMAND -h explains a command. karamelo-py SCRIPT is short for\n"
+        "karamelo-py run SCRIPT.",
+    )
+    parser.add_argument("--version", action="version", version=f"karamelo-py {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", prog="karamelo-py")
+
+    def add(name: str, act: Callable[[Any], int], summary: str, text: str = "") -> CommandLine:
+        added = commands.add_parser(name, help=summary, description=f"{summary}\n{text}".strip())
+        added.add_argument("--debug", action="store_true", help="show the traceback of an error")
+        added.set_defaults(act=act)
+        return added
+
+    for name, summary, text in (
+        ("run", "Run a script.", RUN), ("check", "Build a scene and say what it needs.", CHECK)
+    ):  # fmt: skip
+        script = add(name, _run, summary, text)
+        script.set_defaults(checking=name == "check")
+        script.add_argument("script", metavar="SCRIPT", nargs="?")
+        script.add_argument("-i", "-in", dest="input", metavar="SCRIPT", help=argparse.SUPPRESS)
+        add_variables(script, "set a variable; the script's own assignment of it then yields")
+        script.add_argument(
+            "--threads", type=threads_option, metavar="N",
+            help="threads to use (default: all cores where the scene is large enough)",
+        )  # fmt: skip
+        script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
+    styles = add("styles", _styles, "List commands and styles, and where they come from.")
+    styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
+    explain = add("help", _help, "Explain a command or a style.", HELP)
+    explain.add_argument("words", metavar="WORD", nargs="*")
+    bench = add("bench", _bench, "Measure the speed of this machine on known scenes.")
+    if command == "bench":
+        from karamelo_py.app.bench.command import configure
+
+        configure(bench)
     return parser
+
+
+def add_variables(parser: CommandLine, text: str) -> None:
+    """Let a command line set variables of scripts."""
+    parser.add_argument(
+        "-var", "--var", "-v", nargs=2, action="append", default=[], metavar=("NAME", "VALUE"),
+        help=text,
+    )  # fmt: skip
 
 
 def threads_option(text: str) -> int | None:
@@ -165,10 +164,7 @@ def threads_option(text: str) -> int | None:
     return int(text)
 
 
-def _run(arguments: list[str], *, checking: bool = False) -> int:
-    options = _script_parser().parse_args(arguments)
-    if options.help or options.version:
-        return _dispatch(["--help" if options.help else "--version"])
+def _run(options: argparse.Namespace) -> int:
     script = options.input or options.script
     if script is None:
         raise ScriptError("no script is named", expected="karamelo-py SCRIPT")
@@ -180,7 +176,7 @@ def _run(arguments: list[str], *, checking: bool = False) -> int:
     hub = Hub(Console(quiet=options.quiet))
     hub.settings.threads = options.threads
     hub.settings.debug = options.debug
-    hub.checking = checking
+    hub.checking = options.checking
     interpreter = Interpreter(hub, presets=dict(options.var))
     hub.interpreter = interpreter
     try:
@@ -207,29 +203,24 @@ def _tell_of_no_run(hub: Hub, script: str) -> None:
         hub.warn(message, hint=RUN_COMMANDS)
 
 
-def _check(arguments: list[str]) -> int:
-    return _run(arguments, checking=True)
-
-
-def _styles(arguments: list[str]) -> int:
+def _styles(options: argparse.Namespace) -> int:
     from karamelo_py.app.catalogue import print_styles
 
-    return print_styles(arguments)
+    return print_styles(options.family)
 
 
-def _help(arguments: list[str]) -> int:
-    if arguments in (["check"], ["styles"], ["help"], ["bench"]):
-        print(_explanation(arguments[0]), end="")
-        return 0
+def _help(options: argparse.Namespace) -> int:
     from karamelo_py.app.catalogue import print_help
 
-    return print_help(arguments)
+    if not options.words:
+        return _dispatch(["help", "-h"])
+    return print_help(options.words)
 
 
-def _bench(arguments: list[str]) -> int:
-    from karamelo_py.app.bench.command import main as bench
+def _bench(options: argparse.Namespace) -> int:
+    from karamelo_py.app.bench.command import measure_all
 
-    return bench(arguments)
+    return measure_all(options)
 
 
 if __name__ == "__main__":

@@ -6,46 +6,42 @@ this command, since machines are shared and their clocks change.
 
 from __future__ import annotations
 
-from argparse import ArgumentTypeError
+from argparse import ArgumentTypeError, Namespace
 from math import inf
 
 from karamelo_py.app.bench import measure
 from karamelo_py.app.bench.workloads import WORKLOADS
-from karamelo_py.app.cli import CommandLine, threads_option
+from karamelo_py.app.cli import CommandLine, add_variables, threads_option
 from karamelo_py.run.report import point_fields
 from karamelo_py.script.errors import ScriptError, nearest
 
 ELSEWHERE = "published, one core of another machine, a small AMD EPYC"
 
 
-def explanation() -> str:
-    """How the subcommand is called, and what it can measure."""
+def configure(parser: CommandLine) -> None:
+    """Say what the subcommand takes, and what it can measure."""
     width = max(map(len, WORKLOADS))
-    workloads = "".join(f"  {name:<{width}}  {w.title}\n" for name, w in WORKLOADS.items())
-    return f"""\
-karamelo-py bench [WORKLOAD ...] [options]
+    parser.description += f"""
 
-Measures the speed of this machine on known scenes, all or those that are named: particle-steps per
-second of the fastest of five repetitions, bytes per particle, and the time of each stage of a step.
+All scenes or those that are named: particle-steps per second of the fastest of five repetitions,
+bytes per particle, and the time of each stage of a step.
 
 workloads:
-{workloads}
-options:
-  -var NAME VALUE    set a variable of the scenes, such as N, their fineness
-  --threads N        threads to use (default: 1)
-  --seconds S        how long each scene is measured (default: 2)
-"""
+{chr(10).join(f"  {name:<{width}}  {w.title}" for name, w in WORKLOADS.items())}"""
+    parser.add_argument("workloads", nargs="*", metavar="WORKLOAD")
+    add_variables(parser, "set a variable of the scenes, such as N, their fineness")
+    parser.add_argument(
+        "--threads", type=threads_option, default=1, metavar="N",
+        help="threads to use (default: 1)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seconds", type=_positive, default=2.0, metavar="S",
+        help="how long each scene is measured (default: 2)",
+    )  # fmt: skip
 
 
-def main(arguments: list[str]) -> int:
+def measure_all(options: Namespace) -> int:
     """The subcommand."""
-    parser = CommandLine(prog="karamelo-py bench", add_help=False, allow_abbrev=False)
-    parser.add_argument("workloads", nargs="*")
-    parser.add_argument("-var", nargs=2, action="append", default=[])
-    parser.add_argument("--threads", type=threads_option, default=1)
-    parser.add_argument("--seconds", type=_positive, default=2.0)
-    parser.add_argument("--debug", action="store_true")
-    options = parser.parse_args(arguments)
     for name in options.workloads:
         if name not in WORKLOADS:
             close = nearest(name, WORKLOADS)
