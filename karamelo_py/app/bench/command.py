@@ -6,6 +6,7 @@ this command, since machines are shared and their clocks change.
 
 from __future__ import annotations
 
+import re
 from argparse import ArgumentTypeError, Namespace
 from math import inf
 
@@ -50,6 +51,13 @@ def measure_all(options: Namespace) -> int:
                 expected="one of " + ", ".join(WORKLOADS),
                 hint=f"did you mean '{close}'?" if close else None,
             )
+    chosen = options.workloads or list(WORKLOADS)
+    known = {name: set(re.findall(r"\w+", WORKLOADS[name].script)) for name in chosen}
+    for variable, _ in options.var:
+        if not any(variable in words for words in known.values()):
+            raise ScriptError(
+                f"-var {variable}: no scene has a variable '{variable}'", expected="N or coarser"
+            )
     import numba
 
     available = numba.config.NUMBA_NUM_THREADS
@@ -57,8 +65,9 @@ def measure_all(options: Namespace) -> int:
     numba.set_num_threads(threads)
     triad = measure.bandwidth(threads)
     print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")
-    for name in options.workloads or WORKLOADS:
-        _print(name, dict(options.var), threads, options.seconds, triad)
+    for name in chosen:
+        presets = {n: value for n, value in options.var if n in known[name]}
+        _print(name, presets, threads, options.seconds, triad)
     return 0
 
 
