@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
+from itertools import groupby
 from typing import Any
 
 from karamelo_py.language import registry, signature
@@ -64,16 +65,15 @@ def method(
     fix heat_flux_particles, fix convection_particles
     """
     call = _Call(hub, kind, transfer, basis, options)
-    values = call.values()
+    parts = call.parts()
     if hub.solids:
         raise ScriptError(
             "the method cannot change once there are solids",
             expected="method(...) before the first solid",
             hint=f"move it above line {next(iter(hub.solids.values())).place.line}",
         )
-    hub.update.transfer = call.styles["transfer"](**values["transfer"])
-    chosen = hub.update.method = call.styles["method"](hub, **values["method"])
-    chosen.basis = call.styles["basis"](**values["basis"])
+    chosen = hub.update.method = parts["method"]
+    hub.update.transfer, chosen.basis = parts["transfer"], parts["basis"]
     chosen.basis_name = f"{basis} {call.variant}".strip()
     chosen.place = hub.place
     hub.update.thermal = chosen.thermal
@@ -112,61 +112,67 @@ FAMILIES = ("transfer", "basis", "method")
 class _Call:
     """The three styles of a call, and which of their parameters each option is."""
 
-    def __init__(self, hub: Hub, kind: str, transfer: str, basis: str, options: tuple):
+    def __init__(self, hub: Hub, kind: str, transfer: str, basis: str, options: Sequence[Argument]):
         self.hub = hub
         self.names = {"method": kind, "transfer": transfer, "basis": basis}
-        self.options = options
+        self.options = list(options)
         self.variant = ""
         domain = hub.domain
         self.dimension = domain.dimension if domain is not None else hub.announced_dimension
-        self.styles = {"method": registry.find("method", kind)}
+        self.styles = {f: registry.find(f, self.names[f]) for f in ("method", "transfer")}
         # Domains have a shape, which chooses the class of the basis.
-        self.shapes: Mapping[str, type] = getattr(self.styles["method"], "variants", {})
-        self.styles["transfer"] = registry.find("transfer", transfer)
+        self.shapes = _variants(self.styles["method"])
+        self.variants = {"method": {}, "transfer": _variants(self.styles["transfer"])}
+        self.fit = [n for n, s in self.shapes.items() if self.dimension in (None, s.dimension)]
         if basis in self.shapes:
-            fit = self._fitting()
-            shape = basis if basis in fit or not fit else fit[0]
-            instead = self.instead(basis="linear", option=shape)
+            shape = basis if basis in self.fit or not self.fit else self.fit[0]
+            instead = self.instead(shape, basis="linear")
             raise ScriptError(
                 f"'{basis}' is the shape of the domains, not a basis",
                 argument="basis",
                 expected=f"linear, and the shape at the end: {instead}",
             )
         self.styles["basis"] = registry.find("basis", basis)
-        self.variants = {
-            "transfer": getattr(self.styles["transfer"], "variants", {}),
-            "basis": self.shapes or getattr(self.styles["basis"], "variants", {}),
-        }
+        self.variants["basis"] = self.shapes or _variants(self.styles["basis"])
 
-    def values(self) -> dict[str, dict[str, Any]]:
-        """What each style is made with; its variant takes its place in `styles`."""
-        rest = list(self.options)
+    def parts(self) -> dict[str, Any]:
+        """Transfer, basis and method, made with the options that are theirs."""
         if self.shapes:
-            self._check_shapes(rest)
-        for family in self.variants:
-            self._choose(family, rest)
+            self._check_shapes()
+        rest = self._choose("basis", self._choose("transfer", self.options))
         slots = [(f, p) for f in FAMILIES for p in signature.parameters(self.styles[f])]
-        values: dict[str, dict[str, Any]] = {family: {} for family in FAMILIES}
         numbers = [slot for slot in slots if not slot[1].kind.words]
-        given: dict[str, Argument] = {}
+        given: dict[str, dict[str, Argument]] = {family: {} for family in FAMILIES}
         for argument in rest:
             slot = next((s for s in slots if _word(argument, s[1].kind.words)), None)
-            slot = slot or (numbers.pop(0) if numbers else None)
-            if slot is None:
+            if slot is None and not numbers:
                 raise self._unknown(argument, slots)
-            family, parameter = slot
-            if parameter.name in values[family]:
-                raise _chosen_twice(given[parameter.name], argument)
-            given[parameter.name] = argument
-            values[family][parameter.name] = signature.convert(self.hub, parameter, argument)
+            family, parameter = slot or numbers.pop(0)
+            if parameter.name in given[family]:
+                raise _chosen_twice(given[family][parameter.name], argument)
+            given[family][parameter.name] = argument
         for family, parameter in slots:
-            if not parameter.optional and parameter.name not in values[family]:
-                raise self._missing(family, parameter, slots, values)
-        return values
+            if not parameter.optional and parameter.name not in given[family]:
+                word = next((a.text for a in self.options if a not in rest), None)
+                raise ScriptError(
+                    f"{self.names[family]} needs {parameter.name} after the basis",
+                    expected=f"{self.instead(word, by_name=True)} with {parameter.name} "
+                    + parameter.kind.text,
+                )
+        values: dict[str, dict[str, Any]] = {family: {} for family in FAMILIES}
+        for family, p in slots:
+            if p.name in given[family]:
+                values[family][p.name] = signature.convert(self.hub, p, given[family][p.name])
+        return {
+            family: signature.make(
+                style, self.hub, f"{family} {self.names[family]}", **values[family]
+            )
+            for family, style in self.styles.items()
+        }
 
-    def _check_shapes(self, rest: list[Argument]) -> None:
+    def _check_shapes(self) -> None:
         """Refuse functions that know no domains, and shapes for another dimension."""
-        kind, fit = self.names["method"], self._fitting()
+        kind, fit = self.names["method"], self.fit
         if self.names["basis"] != "linear":
             raise ScriptError(
                 f"method {kind} maps the corners of domains by linear functions only",
@@ -176,108 +182,88 @@ class _Call:
         if not fit:
             raise ScriptError(
                 f"method {kind} has no domains for {self.dimension} dimension",
-                hint=f"{self.instead(basis='cpgimp', kind='ulmpm')}: in one dimension that is the "
+                hint=f"{self.instead(kind='ulmpm', basis='cpgimp')}: in one dimension that is the "
                 "same thing",
             )
-        shapes = [(argument, _word(argument, self.shapes)) for argument in rest]
-        for argument, shape in shapes:
-            if shape and shape not in fit:
-                raise ScriptError(
-                    f"domains of the shape {shape} are for {self.shapes[shape].dimension} "
-                    f"dimensions, and this scene has {self.dimension}",
-                    place=argument.place,
-                    expected="one of " + ", ".join(fit),
-                )
-        if not any(shape for _, shape in shapes):
-            by_dimension: dict[int, list[str]] = {}
-            for name in fit:
-                by_dimension.setdefault(self.shapes[name].dimension, []).append(name)
-            choices = [f"in {d}D one of {', '.join(s)}" for d, s in by_dimension.items()]
-            choice = "; ".join(choices) if len(choices) > 1 else "one of " + ", ".join(fit)
+        shapes = {shape: a for a in self.options if (shape := _word(a, self.shapes))}
+        for shape in (shape for shape in shapes if shape not in fit):
+            raise ScriptError(
+                f"domains of the shape {shape} are for {self.shapes[shape].dimension} "
+                f"dimensions, and this scene has {self.dimension}",
+                place=shapes[shape].place,
+                expected="one of " + ", ".join(fit),
+            )
+        if not shapes:
+            by_dimension = groupby(fit, lambda name: self.shapes[name].dimension)
+            choice = [f"in {d}D one of {', '.join(names)}" for d, names in by_dimension]
+            choice = choice if len(choice) > 1 else ["one of " + ", ".join(fit)]
             raise ScriptError(
                 f"method {kind} needs the shape of the domains",
-                expected=f"{choice}; at the end, as in {self.instead(option=fit[0])}",
+                expected=f"{'; '.join(choice)}; at the end, as in {self.instead(fit[0])}",
             )
 
-    def _fitting(self) -> list[str]:
-        """Shapes for the dimension of the scene; all as long as that is not known."""
-        d = self.dimension
-        return [name for name, shape in self.shapes.items() if d in (None, shape.dimension)]
-
-    def _choose(self, family: str, rest: list[Argument]) -> None:
-        """Put the variant that a word asks for in the place of the style; take the word away."""
+    def _choose(self, family: str, options: list[Argument]) -> list[Argument]:
+        """Put the variant that a word asks for in the place of the style; the other options."""
         variants = self.variants[family]
-        words = [argument for argument in rest if _word(argument, variants)]
+        words = [argument for argument in options if _word(argument, variants)]
         if len(words) > 1:
             raise _chosen_twice(*words[:2])
-        word = getattr(self.styles[family], "default_variant", None)
-        if words:
-            rest.remove(words[0])
-            word = _word(words[0], variants)
-        if word:
+        default = getattr(self.styles[family], "default_variant", None)
+        if word := _word(words[0], variants) if words else default:
             style = variants[word]
             self.styles[family] = registry.find(family, style) if isinstance(style, str) else style
-            if family == "basis":
-                self.variant = word
+            self.variant = word if family == "basis" else self.variant
+        return [argument for argument in options if argument not in words]
 
     def instead(
-        self, *, basis: str | None = None, option: str | None = None, kind: str | None = None
+        self,
+        option: str | None = None,
+        *,
+        kind: str | None = None,
+        basis: str | None = None,
+        by_name: bool = False,
     ) -> str:
-        """The same call with another basis or kind, and with `option` at the end."""
-        count = len(signature.parameters(self.styles["transfer"]))
-        numbers = [a.text for a in self.options if a.word() is None]
-        numbers = (numbers + ["1"] * count)[:count]
-        known = self._words(shapes=False)
-        kept = [a.text for a in self.options if _word(a, known)]
-        names = [kind or self.names["method"], self.names["transfer"], basis or self.names["basis"]]
-        return f"method({', '.join([*names, *numbers, *kept, *([option] if option else [])])})"
+        """The same call with another kind or basis, what it lacks, and `option` at the end."""
+        asked = [p for f in FAMILIES if f in self.styles for p in _numbers(self.styles[f])]
+        typed = [argument.text for argument in self.options if argument.word() is None]
+        lacking = [p for p in asked[len(typed) :] if not p.optional]
+        known = self._words("method", "transfer")
+        words = [
+            kind or self.names["method"], self.names["transfer"], basis or self.names["basis"],
+            *typed[: len(asked)], *(p.name if by_name else "1" for p in lacking),
+            *(argument.text for argument in self.options if _word(argument, known)),
+        ]  # fmt: skip
+        return f"method({', '.join(words if option in (None, *words) else [*words, option])})"
 
-    def _words(self, shapes: bool = True) -> list[str]:
-        """Words that may stand among the options."""
-        own = [signature.parameters(self.styles["method"])]
-        own += [signature.parameters(self.styles[f]) for f in ("transfer", "basis") if shapes]
-        words = [word for some in own for p in some for word in p.kind.words]
-        words += getattr(registry.find("transfer", self.names["transfer"]), "variants", {})
-        if shapes:
-            words += self._fitting() if self.shapes else self.variants["basis"]
+    def _words(self, *families: str) -> list[str]:
+        """Words that some of the styles know."""
+        words = []
+        for family in families:
+            words += [w for p in signature.parameters(self.styles[family]) for w in p.kind.words]
+            words += self.fit if family == "basis" and self.shapes else self.variants[family]
         return words
 
-    def _missing(self, family: str, parameter: Parameter, slots: list, values: dict) -> ScriptError:
-        name = parameter.name
-        numbers = [p for _, p in slots if not p.kind.words and (not p.optional or p is parameter)]
-        numbers = [p.shown for p in numbers]
-        words = [a.text for a in self.options if a.word() is not None]
-        typed = [a.text for a in self.options if a.word() is None]
-        numbers[: len(typed)] = typed
-        call = f"method({', '.join([*self.names.values(), *numbers, *words])})"
-        return ScriptError(
-            f"{self.names[family]} needs {name} after the basis",
-            expected=f"{call} with {name} {parameter.kind.text}",
-        )
-
-    def _unknown(self, argument: Argument, slots: list) -> ScriptError:
+    def _unknown(self, argument: Argument, slots: list[tuple[str, Parameter]]) -> ScriptError:
         """What is wrong with an option that nothing asks for."""
         word = argument.word()
-        asking = [(f, p.name) for f, p in slots if not p.kind.words]
         if word is None or isinstance(self.hub.interpreter.variables.get(word), float):
-            who = " with ".join(dict.fromkeys(self.names[f] for f, _ in asking))
-            takes = ", ".join(name for _, name in asking)
+            asking = {p.name: self.names[f] for f, p in slots if not p.kind.words}
+            who = " with ".join(dict.fromkeys(asking.values())) or self.names["transfer"]
+            takes = f"{', '.join(asking)} and no further number" if asking else "no number"
             chosen = next((a.text for a in self.options if _word(a, self.variants["basis"])), None)
             return ScriptError(
-                f"{who} takes {takes} and no further number"
-                if asking
-                else f"{self.names['transfer']} takes no number",
-                place=argument.place,
-                expected=self.instead(option=chosen),
+                f"{who} takes {takes}", place=argument.place, expected=self.instead(chosen)
             )
-        if home := _home(word):
-            family, name = home
-            return ScriptError(
-                f"{word} goes with {name}, not with {self.names[family]}",
-                place=argument.place,
-                expected=f"karamelo-py help {family} {name} explains it",
-            )
-        known = self._words()
+        for family in FAMILIES:
+            for name in registry.names(family):
+                with suppress(ScriptError):  # a broken plug-in is not what this is about
+                    if word in _variants(registry.find(family, name)):
+                        return ScriptError(
+                            f"{word} goes with {name}, not with {self.names[family]}",
+                            place=argument.place,
+                            expected=f"karamelo-py help {family} {name} explains it",
+                        )
+        known = self._words("method", "transfer", "basis")
         close = nearest(word, known)
         return ScriptError(
             f"'{argument.text}' is not an option of method({', '.join(self.names.values())})",
@@ -287,7 +273,16 @@ class _Call:
         )
 
 
-def _word(argument: Argument, known: Any) -> str | None:
+def _variants(style: type) -> Mapping[str, Any]:
+    """Words that choose another class (or style, by its name) in the place of a style."""
+    return getattr(style, "variants", {})
+
+
+def _numbers(style: type) -> list[Parameter]:
+    return [p for p in signature.parameters(style) if not p.kind.words]
+
+
+def _word(argument: Argument, known: Container[str]) -> str | None:
     """The one of the `known` words that an argument is; a variable of that name is passed over."""
     word = argument.text if argument.text in known else argument.word()
     return word if word in known else None
@@ -297,13 +292,3 @@ def _chosen_twice(first: Argument, second: Argument) -> ScriptError:
     return ScriptError(
         f"'{first.text}' was chosen already", place=second.place, expected="one of them"
     )
-
-
-def _home(word: str) -> tuple[str, str] | None:
-    """The family and name of the first style that has a variant of this name."""
-    for family in FAMILIES:
-        for name in registry.names(family):
-            with suppress(ScriptError):  # a broken plug-in is not what this is about
-                if word in getattr(registry.find(family, name), "variants", {}):
-                    return family, name
-    return None

@@ -157,12 +157,7 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         for parameter, argument in keywords:
             named[parameter.name] = convert(hub, parameter, argument)
         try:
-            if _is_tuple(target):
-                return target(*values)
-            if not inspect.isclass(target):
-                return target(hub, *values, **named)
-            with told(name, "__init__", target, getattr(hub, "place", None)):
-                return target(hub, *values, **named)
+            return make(target, hub, name, *values, **named)
         except OSError as error:
             what = f"{error.filename}: " if error.filename else ""
             raise ScriptError(f"{what}{error.strerror or error}") from error
@@ -180,6 +175,14 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
             error.place = error.place or _guilty(error, arguments, bound)
             error.command = error.command or name
         raise
+
+
+def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:
+    """Call a command or make a style with values; a fault of its author is told as such."""
+    if not inspect.isclass(target):
+        return target(hub, *values, **named)
+    with told(name, "__init__", target, getattr(hub, "place", None)):
+        return target(*(() if _is_tuple(target) else (hub,)), *values, **named)
 
 
 def _bind(
