@@ -10,7 +10,7 @@ from io import TextIOWrapper
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.signature import Help, Parameter
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 
 COMMAND = "command"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
@@ -92,7 +92,7 @@ def print_styles(given: Sequence[str]) -> int:
         page.line(_plural(family), "bold")
         names = registry.names(family)
         origins = [registry.origin(family, name) for name in names]
-        widths = _longest(names), _longest(origins)
+        widths = [max(map(len, column), default=0) for column in (names, origins)]
         for name, origin in zip(names, origins, strict=True):
             page.row(name.ljust(widths[0]), origin.ljust(widths[1]), *_summary(family, name))
     return 0
@@ -150,11 +150,10 @@ def _plural(family: str) -> str:
 
 def _unknown(what: str, name: str, known: Iterable[str]) -> ScriptError:
     known = sorted(known)
-    close = nearest(name, known)
     return ScriptError(
         f"unknown {what} '{name}'",
         expected="one of " + ", ".join(known) if what == "family" else HELP_USAGE,
-        hint=f"did you mean '{close}'?" if close else "karamelo-py styles lists them all",
+        hint=meant(name, known) or "karamelo-py styles lists them all",
     )
 
 
@@ -197,10 +196,6 @@ def _explain(family: str, name: str) -> int:
 
 
 # ---- how it looks -------------------------------------------------------------------------------
-
-
-def _longest(words: Iterable[str]) -> int:
-    return max(map(len, words), default=0)
 
 
 class _Page:

@@ -11,7 +11,7 @@ from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Parameter
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 
 
 def method(
@@ -264,12 +264,11 @@ class _Call:
                             expected=f"karamelo-py help {family} {name} explains it",
                         )
         known = self._words("method", "transfer", "basis")
-        close = nearest(word, known)
         return ScriptError(
             f"'{argument.text}' is not an option of method({', '.join(self.names.values())})",
             place=argument.place,
             expected="nothing more, or one of " + ", ".join(known),
-            hint=f"did you mean '{close}'?" if close else None,
+            hint=meant(word, known),
         )
 
 

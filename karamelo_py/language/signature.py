@@ -38,25 +38,11 @@ from karamelo_py.language.kinds import (
     is_raw,
     kind_of,
 )
-from karamelo_py.script.errors import Place, ScriptError, nearest
+from karamelo_py.script.errors import Place, ScriptError, meant
 
 __all__ = [
-    "Argument",
-    "AtLeast",
-    "Constraint",
-    "Help",
-    "In",
-    "InputFile",
-    "NonNegative",
-    "OutputFile",
-    "Parameter",
-    "Positive",
-    "call",
-    "describe",
-    "kind_of",
-    "parameters",
-    "syntax",
-]
+    "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
+]  # fmt: skip
 
 # Two words with nothing but blanks between them.
 _GAP = re.compile(r'[\w)"]\s+["\w.]')
@@ -150,12 +136,14 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         raise ScriptError(f"{name} is broken: {error}") from error
     bound: dict[str, list[Argument]] = {}
     try:
-        positional, keywords = _bind(target, expected, arguments, name, bound)
+        _bind(target, expected, arguments, name, bound)
         values, named = [], {}
-        for number, (parameter, argument) in enumerate(positional, 1):
-            values.append(convert(hub, parameter, argument, number))
-        for parameter, argument in keywords:
-            named[parameter.name] = convert(hub, parameter, argument)
+        for parameter in expected:
+            for argument in bound.get(parameter.name, ()):
+                if parameter.keyword:
+                    named[parameter.name] = convert(hub, parameter, argument)
+                else:
+                    values.append(convert(hub, parameter, argument, len(values) + 1))
         try:
             return make(target, hub, name, *values, **named)
         except OSError as error:
@@ -191,13 +179,11 @@ def _bind(
     arguments: Sequence[Argument],
     name: str,
     bound: dict[str, list[Argument]],
-) -> tuple[list[tuple[Parameter, Argument]], list[tuple[Parameter, Argument]]]:
-    """Pair arguments with parameters by position, and by name where a name is given."""
+) -> None:
+    """Add to `bound` the arguments of each parameter: by position, or by name where it is given."""
     by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
     variadic = next((p for p in slots if p.variadic), None)
-    positional: list[tuple[Parameter, Argument]] = []
-    keywords: list[tuple[Parameter, Argument]] = []
     given = []
     # Raw arguments are passed on to a style, which knows the names.
     passed_on = variadic is not None and is_raw(variadic.kind)
@@ -212,7 +198,6 @@ def _bind(
         if word in bound:
             raise ScriptError(f"{word} is given twice", place=argument.place)
         bound[word] = [value]
-        keywords.append((by_name[word], value))
     needed = sum(1 for p in slots if not p.optional and not p.variadic)
     missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
@@ -231,20 +216,16 @@ def _bind(
         )
     for k, argument in enumerate(given):
         parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic
-        assert parameter is not None
-        positional.append((parameter, argument))
         bound.setdefault(parameter.name, []).append(argument)
-    return positional, keywords
 
 
 def _unknown_keyword(
     word: str, argument: Argument, expected: list[Parameter], by_name: dict
 ) -> ScriptError:
-    close = nearest(word, by_name)
     if any(p.name == word for p in expected):
         hint: str | None = f"arguments are given by position: leave out '{word} ='"
     else:
-        hint = f"did you mean '{close}'?" if close else f"leave out '{word} ='; == compares"
+        hint = meant(word, by_name) or f"leave out '{word} ='; == compares"
     known = ", ".join(f"{name}=..." for name in by_name)
     return ScriptError(
         f"there is no argument to be given as '{word} = ...'",

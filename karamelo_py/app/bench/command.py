@@ -14,7 +14,7 @@ from karamelo_py.app.bench import measure
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.cli import CommandLine, add_variables, threads_option
 from karamelo_py.run.report import point_fields
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 
 ELSEWHERE = "published, one core of another machine, a small AMD EPYC"
 
@@ -45,11 +45,10 @@ def measure_all(options: Namespace) -> int:
     """The subcommand."""
     for name in options.workloads:
         if name not in WORKLOADS:
-            close = nearest(name, WORKLOADS)
             raise ScriptError(
                 f"unknown workload '{name}'",
                 expected="one of " + ", ".join(WORKLOADS),
-                hint=f"did you mean '{close}'?" if close else None,
+                hint=meant(name, WORKLOADS),
             )
     chosen = options.workloads or list(WORKLOADS)
     known = {name: set(re.findall(r"\w+", WORKLOADS[name].script)) for name in chosen}
