@@ -32,38 +32,35 @@ RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
-    debug = "--debug" in arguments
     try:
         return _dispatch(arguments)
     except SystemExit as done:  # argparse has shown what was asked for
         return int(done.code or 0)
-    except ScriptError as error:
-        if debug:
-            traceback.print_exc()
-        _complain(error.render())
     except KeyboardInterrupt:
         _complain(render_message("error", "interrupted"))
         return INTERRUPTED
-    except MemoryError:
-        if debug:
-            traceback.print_exc()
-        hint = "a coarser grid, fewer points per cell, or precision(single)"
-        _complain(render_message("error", "the scene does not fit into memory", hint=hint))
     except BrokenPipeError:
         # Whoever read our output has gone; what was written stays.
         sys.stderr.close()
         return ERROR
-    except Exception as error:  # A fault of ours or of a plug-in: no traceback unless asked for.
-        if debug:
+    except Exception as error:
+        if "--debug" in arguments:
             traceback.print_exc()
-        _complain(
-            render_message(
-                "error",
-                f"internal error: {type(error).__name__}: {error}",
-                hint="run again with --debug to see where, and please report it",
-            )
-        )
+        _complain(_rendered(error))
     return ERROR
+
+
+def _rendered(error: Exception) -> str:
+    """What the user is told; no traceback, also where the fault is ours or of a plug-in."""
+    if isinstance(error, ScriptError):
+        return error.render()
+    if isinstance(error, MemoryError):
+        message = "the scene does not fit into memory"
+        hint = "a coarser grid, fewer points per cell, or precision(single)"
+    else:
+        message = f"internal error: {type(error).__name__}: {error}"
+        hint = "run again with --debug to see where, and please report it"
+    return render_message("error", message, hint=hint)
 
 
 def _complain(text: str) -> None:

@@ -74,28 +74,34 @@ class Parameter:
 
 @cache
 def parameters(target: Callable) -> list[Parameter]:
-    """The parameters of a command or style, without the hub; of a NamedTuple, its fields.
+    """The parameters of a command or style, without the hub; of a record, its fields.
 
     Raises
     ------
     TypeError
         If the signature cannot be understood (a fault of whoever wrote it).
     """
+    record = is_record(target)
     try:
-        if _is_tuple(target):
+        if record and not hasattr(target, "given"):
             hints = get_type_hints(target, include_extras=True)
             empty, defaults = inspect.Parameter.empty, target._field_defaults
             return [_parameter(n, hints[n], defaults.get(n, empty)) for n in target._fields]
-        found = list(inspect.signature(target, eval_str=True).parameters.values())
+        function = target.given if record else target
+        found = list(inspect.signature(function, eval_str=True).parameters.values())
     except TypeError:
         raise
     except Exception as error:
         raise TypeError(f"an annotation cannot be evaluated ({error})") from error
-    return [_parameter(p.name, p.annotation, p.default, p.kind) for p in found[1:]]
+    return [_parameter(p.name, p.annotation, p.default, p.kind) for p in found[not record :]]
 
 
-def _is_tuple(target: Any) -> bool:
-    """Whether `target` is a NamedTuple: a tag that keeps its parameters and needs no hub."""
+def is_record(target: Any) -> bool:
+    """Whether a style is a NamedTuple, a tag that needs no hub.
+
+    Its fields are its arguments, or those of its classmethod ``given`` where it has one. A method
+    ``checked`` returns what is used in its place.
+    """
     return inspect.isclass(target) and issubclass(target, tuple)
 
 
@@ -170,7 +176,10 @@ def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> A
     if not inspect.isclass(target):
         return target(hub, *values, **named)
     with told(name, "__init__", target, getattr(hub, "place", None)):
-        return target(*(() if _is_tuple(target) else (hub,)), *values, **named)
+        if not is_record(target):
+            return target(hub, *values, **named)
+        made = getattr(target, "given", target)(*values, **named)
+        return made.checked() if hasattr(made, "checked") else made
 
 
 def _bind(
@@ -330,7 +339,7 @@ def told_of(target: Callable) -> list[Parameter]:
     if not variants:
         return parameters(target)
     # A method chooses by it the shape of domains, which must have one.
-    needed = not _is_tuple(target)
+    needed = not is_record(target)
     default = getattr(target, "default_variant", None)
     kind = kind_of(Literal[tuple(variants)])
     variant = Parameter("variant", kind, optional=not needed, default=default)
