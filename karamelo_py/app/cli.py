@@ -6,6 +6,7 @@ import argparse
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -68,7 +69,12 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-COMMANDS = ("run", "check", "styles", "help", "bench")
+# Subcommands with a module of their own, which is imported when it is asked for: its function
+# add_parser(subparsers) adds a parser whose default `act` takes the options.
+ELSEWHERE = {
+    "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
+}
+COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
 
 
 def _dispatch(arguments: list[str]) -> int:
@@ -93,8 +99,8 @@ class CommandLine(argparse.ArgumentParser):
     """A command line whose errors are messages in our own form."""
 
     def __init__(self, **options: Any):
-        form = argparse.RawDescriptionHelpFormatter
-        super().__init__(formatter_class=form, allow_abbrev=False, **options)
+        usual = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
+        super().__init__(**(usual | options))
 
     def error(self, message: str) -> NoReturn:
         raise ScriptError(message, expected=self.format_usage().removeprefix("usage: ").rstrip())
@@ -136,11 +142,11 @@ def _parser(command: str) -> CommandLine:
     styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
     explain = add("help", _help, "Explain a command or a style.", HELP)
     explain.add_argument("words", metavar="WORD", nargs="*")
-    bench = add("bench", _bench, "Measure the speed of this machine on known scenes.")
-    if command == "bench":
-        from karamelo_py.app.bench.command import configure
-
-        configure(bench)
+    for name, (module, summary) in ELSEWHERE.items():
+        if name == command:
+            import_module(module).add_parser(commands)
+        else:
+            commands.add_parser(name, help=summary)
     return parser
 
 
@@ -212,12 +218,6 @@ def _help(options: argparse.Namespace) -> int:
     if not options.words:
         return _dispatch(["help", "-h"])
     return print_help(options.words)
-
-
-def _bench(options: argparse.Namespace) -> int:
-    from karamelo_py.app.bench.command import measure_all
-
-    return measure_all(options)
 
 
 if __name__ == "__main__":

@@ -9,26 +9,30 @@ from __future__ import annotations
 import re
 from argparse import ArgumentTypeError, Namespace
 from math import inf
+from typing import Any
 
 from karamelo_py.app.bench import measure
 from karamelo_py.app.bench.workloads import WORKLOADS
-from karamelo_py.app.cli import CommandLine, add_variables, threads_option
+from karamelo_py.app.cli import add_variables, threads_option
 from karamelo_py.run.report import point_fields
 from karamelo_py.script.errors import ScriptError, meant
 
 ELSEWHERE = "published, one core of another machine, a small AMD EPYC"
 
 
-def configure(parser: CommandLine) -> None:
+def add_parser(subparsers: Any) -> None:
     """Say what the subcommand takes, and what it can measure."""
     width = max(map(len, WORKLOADS))
-    parser.description += f"""
-
-All scenes or those that are named: particle-steps per second of the fastest of five repetitions,
-bytes per particle, and the time of each stage of a step.
+    parser = subparsers.add_parser(
+        "bench",
+        description=f"""\
+Measure the speed of this machine on known scenes, all or those that are named: particle-steps per
+second of the fastest of five repetitions, bytes per particle, and the time of each stage of a step.
 
 workloads:
-{chr(10).join(f"  {name:<{width}}  {w.title}" for name, w in WORKLOADS.items())}"""
+{chr(10).join(f"  {name:<{width}}  {w.title}" for name, w in WORKLOADS.items())}""",
+    )
+    parser.set_defaults(act=measure_all)
     parser.add_argument("workloads", nargs="*", metavar="WORKLOAD")
     add_variables(parser, "set a variable of the scenes, such as N, their fineness")
     parser.add_argument(
@@ -39,6 +43,7 @@ workloads:
         "--seconds", type=_positive, default=2.0, metavar="S",
         help="how long each scene is measured (default: 2)",
     )  # fmt: skip
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
 def measure_all(options: Namespace) -> int:
