@@ -64,7 +64,8 @@ class FakeHub:
         self.materials.add("steel", Material("material", "fake", FakeLaw()))
         self.rehearsing = self.checking = False
         self.warnings = []
-        self.update = SimpleNamespace(method=Method(self, Linear()), thermal=False)
+        self.update = SimpleNamespace(thermal=False)
+        self.use(Method, Linear())
         self.regions = Catalogue("region", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
@@ -75,6 +76,11 @@ class FakeHub:
     _lattices = None
     lattices = Hub.lattices
     catalogues = Hub.catalogues
+
+    def use(self, method, basis):
+        """Choose method and basis, as the command does."""
+        self.update.method = method(self)
+        self.update.method.basis = basis
 
     def warn(self, message, place=None, hint=None):
         self.warnings.append(message)

@@ -144,6 +144,11 @@ class CPGIMP(NamedTuple):
     that the body falls to pieces numerically anyway. Under total Lagrangian methods, nothing
     deforms, and cpgimp is ugimp.
 
+    Parameters
+    ----------
+    variant
+        How the box follows.
+
     Example
     -------
     method(ulmpm, FLIP, cpgimp, 0.99, stretch)

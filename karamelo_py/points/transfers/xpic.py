@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from karamelo_py.compiler.fields import vector
+from karamelo_py.language.kinds import In
 from karamelo_py.points.transfers import terms, updated_velocity
 
 
@@ -41,14 +42,14 @@ class XPIC(NamedTuple):
     Parameters
     ----------
     order
-        m, 1 to 20.
+        m.
 
     Example
     -------
     method(ulmpm, XPIC, quadratic-spline, 5)
     """
 
-    order: int = 2
+    order: Annotated[int, In(1, 20)]
 
     @property
     def point_fields(self) -> tuple[type, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,8 @@ class Method:
         The basis' tag.
     basis_name
         The basis, with its variant, as the script calls it.
+    thermal
+        Whether heat flows.
     place
         Place of the command in the script, for messages.
     frame
@@ -41,14 +43,23 @@ class Method:
         Whether every solid has a velocity field of its own on the grid of the domain.
     """
 
+    basis: NamedTuple
     basis_name = ""
+    thermal = False
     place: Place | None = None
     frame: NamedTuple = Updated()
     own_grids: ClassVar[bool] = False
     fields_per_solid: ClassVar[bool] = False
 
-    def __init__(self, hub: Hub, basis: NamedTuple):
-        self.basis = basis
+    def __init__(self, hub: Hub, heat: Literal["mechanical", "thermo-mechanical"] = "mechanical"):
+        """What a script may add.
+
+        Parameters
+        ----------
+        heat
+            Whether heat flows between points, too.
+        """
+        self.thermal = heat == "thermo-mechanical"
 
     @property
     def regular_points(self) -> bool:
