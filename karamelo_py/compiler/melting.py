@@ -36,19 +36,30 @@ def _use() -> None:
     class Melting(codegen.JITCodeLibrary):
         """The code of one compiled function and of all that it calls."""
 
+        melted = False
+
         def _optimize_functions(self, ll_module) -> None:
             # Left to the optimisation of the whole module, of other packages' functions, too.
             ll_module.data_layout = self._codegen._data_layout
 
-        def _optimize_final_module(self) -> None:
-            if not melts(self):
-                super()._optimize_final_module()
+        def add_linking_library(self, library) -> None:
+            # What melts has not linked in what it calls itself: whoever becomes machine code does.
+            inner = library._linking_libraries if library.melted else ()
+            for one in (library, *inner):
+                if one not in self._linking_libraries:
+                    super().add_linking_library(one)
 
-        def _finalize_final_module(self) -> None:
-            if melts(self):
+        def finalize(self) -> None:
+            self.melted = melts(self)
+            if self.melted:
+                for function in _own_functions(self):
+                    function.linkage = "linkonce_odr"  # as of all that is linked into others
                 self._finalized = True
             else:
-                super()._finalize_final_module()
+                super().finalize()
+
+        def _get_module_for_linking(self):
+            return self._final_module if self.melted else super()._get_module_for_linking()
 
     @functools.wraps(set_environment)
     def set_env(self, env_name: str, env) -> None:
