@@ -21,8 +21,9 @@ def doubled(x):
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
-def test_what_melts(monkeypatch):
+def test_what_melts(tmp_path, monkeypatch):
     """A helper of point functions melts; a kernel, and a function of anybody else, do not."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))  # nothing is loaded
     seen = {}
     melts = melting.melts
 

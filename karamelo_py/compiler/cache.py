@@ -142,7 +142,9 @@ class KernelCache(_Cache):
             arguments, key = self._key(sig, data.codegen)
             choices, codes = contents(data.library)
             stamp = fingerprint([self._function, self._options], arguments, choices, codes)
-        except Unknown:
+        except Unknown as what:
+            # Never without a word: somebody would wait for it in every run.
+            _say(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
             return
         content = dumps((tuple(sorted(choices)), dumps(data._reduce())))
         try:

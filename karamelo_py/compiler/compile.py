@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
-from llvmlite import binding as llvm
 from llvmlite import ir
 from numba import config, njit
 from numba.core import event
@@ -16,11 +15,14 @@ from numba.core.ccallback import CFunc
 from numba.extending import intrinsic, overload
 
 from karamelo_py.compiler.cache import KernelCache
-from karamelo_py.compiler.fingerprint import SPELLED, declare_point_function, serves, tag_class
-
-# The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in
-# registers and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
-llvm.set_option("", "--unroll-threshold=4000")
+from karamelo_py.compiler.fingerprint import (
+    SPELLED,
+    asks,
+    declare_point_function,
+    noting,
+    serves,
+    tag_class,
+)
 
 
 class _NoCollections(event.Listener):
@@ -71,7 +73,12 @@ def kernel(function: Callable | None = None, **options: Any) -> Callable:
 
 def by_type(function: Callable) -> Callable:
     """Decorate the chooser of what `function` is in a kernel, from the types of its arguments."""
-    return overload(function, _INLINED, strict=False)
+
+    def choose(chooser: Callable) -> Callable:
+        overload(function, _INLINED, strict=False)(noting(chooser))
+        return chooser
+
+    return choose
 
 
 def shared(function: Callable) -> Callable:
@@ -150,7 +157,12 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
         declare_point_function(dispatch)
         dispatch.on = on
         dispatch.otherwise = otherwise
-        dispatch.defined = lambda *classes: classes in table
+
+        def defined(*classes: type) -> bool:
+            asks(dispatch, classes)
+            return classes in table
+
+        dispatch.defined = defined
         return dispatch
 
     return declare

@@ -60,7 +60,35 @@ def declare_point_function(dispatch: Callable) -> None:
 
 def serves(implementation: Callable, dispatch: Callable) -> None:
     """Note that a point function may choose `implementation`."""
-    _serves.setdefault(implementation, []).append(dispatch)
+    function = getattr(implementation, "py_func", implementation)
+    _serves.setdefault(function, []).append(dispatch)
+
+
+_asked: list[set[tuple[Callable, tuple]]] = []  # of the choosers at work, innermost last
+_answers: WeakKeyDictionary[Callable, set[tuple[Callable, tuple]]] = WeakKeyDictionary()
+
+
+def asks(dispatch: Callable, classes: tuple) -> None:
+    """Note that whether `dispatch` is defined for `classes` was asked, maybe by a chooser."""
+    if _asked:
+        _asked[-1].add((dispatch, classes))
+
+
+def noting(chooser: Callable) -> Callable:
+    """The same chooser of code by type; what it asks is noted with the function that it chooses."""
+
+    @functools.wraps(chooser)
+    def choose(*arguments: Any) -> Callable | None:
+        _asked.append(set())
+        try:
+            chosen = chooser(*arguments)
+        finally:
+            asked = _asked.pop()
+        if asked and chosen is not None:
+            _answers.setdefault(getattr(chosen, "py_func", chosen), set()).update(asked)
+        return chosen
+
+    return choose
 
 
 def tag_class(numba_type: Any) -> Any:
@@ -127,6 +155,8 @@ event.register("numba:compile", _Watch())
 def _own_choices(function: Callable, arguments: tuple) -> Iterable[Choice]:
     for dispatch in _serves.get(function, ()):
         classes = tuple(tag_class(a) for a in arguments[: dispatch.tags])
+        yield Choice(name_of(dispatch), tuple(_class_name(c) for c in classes))
+    for dispatch, classes in _answers.get(function, ()):
         yield Choice(name_of(dispatch), tuple(_class_name(c) for c in classes))
 
 
@@ -236,7 +266,7 @@ def fingerprint(
         digest.update(f"{words} {len(parts)};".encode())
         ahead.extend(reversed(parts))
     if codes:
-        raise Unknown(f"{len(codes)} functions that nothing followed leads to: {codes}")
+        raise Unknown(f"the way to {min(c.co_qualname for c in codes)}")
     return digest.hexdigest()
 
 
@@ -318,7 +348,7 @@ def _choosers(function: Callable) -> list:
     parts: list = []
     for template in getattr(known, "templates", ()):
         if hasattr(template, "_overload_func"):
-            parts += [template._overload_func, repr(template._jit_options)]
+            parts += [inspect.unwrap(template._overload_func), repr(template._jit_options)]
     return parts
 
 

@@ -4,7 +4,8 @@ Numba optimises every function that it compiles and makes machine code of it, al
 written into each of its callers (`forceinline`) and that Python cannot call (no wrapper). With
 point functions ten calls deep that is half of the work of a first compilation, for code that nobody
 runs. Here such a function is kept as it is and left to its callers. This leans on the inside of
-Numba: pyproject.toml names the versions that it was written for, and a test knows their text.
+Numba: pyproject.toml names the versions that it was written for, and a test knows their text. The
+text of this file is in the key of every kernel on disk.
 """
 
 from __future__ import annotations
@@ -72,3 +73,7 @@ def _use() -> None:
 
 
 _use()
+
+# The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in
+# registers and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
+llvm.set_option("", "--unroll-threshold=4000")

@@ -36,6 +36,7 @@ def _kind_of_scene(hub: Hub) -> str:
     """What the loops of a scene depend on, roughly: for how long they take to compile."""
     parts = {type(material).__name__ for material in hub.materials.values()}
     parts |= {type(fix).__name__ for fix in hub.fixes.values()}
+    parts |= {str(hub.settings.precision), f"threads={hub.settings.threads}"}
     return f"{hub.domain.dimension}D {hub.update.words} {' '.join(sorted(parts))}"
 
 
