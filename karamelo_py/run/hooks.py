@@ -15,6 +15,7 @@ from karamelo_py.kernels.hooks import (
     STAGES,
     CompiledHook,
 )
+from karamelo_py.language.faults import told
 from karamelo_py.scene.hub import Hub
 
 NO_PROGRAM = (-1, -1, -1, -1)
@@ -28,7 +29,7 @@ def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
     for fix in fixes:
         for name, hook in fix.hooks().items():
             if isinstance(hook, CompiledHook):
-                builder.add(fix, STAGES[name], hook)
+                builder.add(fix, name, hook)
     if not builder.rows:
         return NoHooks()
     x0 = np.concatenate([s.x0 for s in hub.solids.values()]) if builder.on_points else None
@@ -58,8 +59,8 @@ class _Builder:
         self.code: list[np.ndarray] = []
         self.constants: list[np.ndarray] = []
 
-    def add(self, fix: Any, stage: int, hook: CompiledHook) -> None:
-        """Add one compiled hook of a fix."""
+    def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
+        """Add one compiled hook of a fix, which acts at `moment` of a step."""
         begin, end = self._members(fix.group, hook)
         slot = -1
         if hook.publishes and fix.published:
@@ -67,11 +68,12 @@ class _Builder:
             first = "x" if "x" in fix.published else fix.published[0]
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         signature = NODE_FUNCTION if hook.on_nodes else POINT_FUNCTION
-        address = address_of(hook.function, signature)
         if len(fix.formulas) > 3:
             raise ValueError(f"fix '{fix.id}' has more formulas than there are directions, three")
+        with told(f"fix {fix.style}", moment, hook.function, fix.place):
+            address = address_of(hook.function, signature)
         uses = int(hook.uses_before), int(hook.uses_share)
-        self.rows.append((address, stage, begin, end, slot, *uses))
+        self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
         programs = [self._program(formula) for formula in fix.formulas]
         self.programs.append(programs + [NO_PROGRAM] * (3 - len(programs)))
         self.on_points |= not hook.on_nodes

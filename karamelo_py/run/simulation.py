@@ -381,6 +381,16 @@ class Simulation:
             if ended:
                 return DONE
 
+    def compile(self) -> None:
+        """Have the loop over the steps compiled now: nobody waits for it in the midst of a log."""
+        import numba
+
+        if numba.config.DISABLE_JIT or self._python.by_stage:
+            return
+        visits = Staged() if self.staged else Fused()
+        arguments = (self.hub.update.scheme, visits, self.mode, self.setup, self.hooks, 1)
+        advance.compile(tuple(numba.typeof(argument) for argument in arguments))
+
     def _advance(self, count: int) -> int:
         scheme = self.hub.update.scheme
         if self._first is not None:
