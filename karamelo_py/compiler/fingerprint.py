@@ -295,7 +295,7 @@ def _look(thing: Any) -> tuple[str, list]:
         return f"{kind} {array.dtype} {array.shape}", [array.tobytes()]
     if isinstance(thing, (tuple, list)):
         return kind, [type(thing), *thing]
-    if isinstance(thing, dict):
+    if isinstance(thing, (dict, python.MappingProxyType)):
         return kind, [part for item in thing.items() for part in item]
     if isinstance(thing, (set, frozenset)):
         return kind, sorted(thing, key=repr)
