@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
-from karamelo_py.points.basis.product import along, register
+from karamelo_py.compiler.compile import choose, real, shared
+from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -44,7 +44,7 @@ def _(basis, kin, grid, place, direction):
     r = real(1, a) + t
     four = real(4, a) * grid.inv_h
     affine = (-four * r * weights[0], -four * t * weights[1], four * (left + half) * weights[2])
-    return nearest - 1, r, weights, gradients, affine
+    return Along(nearest - 1, r, weights, gradients, affine)
 
 
 @shared
@@ -54,13 +54,15 @@ def _at_wall(grid, a, last):
     first = max(min(cell, last - 2), 0)
     t = a - real(cell, a)
     zero, one = real(0, a), real(1, a)
-    r = a - real(first, a)
+    second = first < cell  # the cell is that between the last two of the three nodes
+    weights = (choose(second, zero, one - t), choose(second, one - t, t), choose(second, t, zero))
+    gradients = (
+        choose(second, zero, -grid.inv_h),
+        choose(second, -grid.inv_h, grid.inv_h),
+        choose(second, grid.inv_h, zero),
+    )
     # For hat functions, N D^-1 (X - x) is the gradient.
-    if first < cell:
-        gradients = (zero, -grid.inv_h, grid.inv_h)
-        return first, r, (zero, one - t, t), gradients, gradients
-    gradients = (-grid.inv_h, grid.inv_h, zero)
-    return first, r, (one - t, t, zero), gradients, gradients
+    return Along(first, a - real(first, a), weights, gradients, gradients)
 
 
 register(QuadraticSpline, 3)

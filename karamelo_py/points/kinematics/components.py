@@ -114,12 +114,12 @@ class _Written(dict):
         if tag not in self.tags:
             raise TypeError(f"{self.definition.__name__} is not defined for {tag.__name__}")
         given = list(inspect.signature(self.definition, eval_str=True).parameters.values())[1:]
-        kind, first = given[0].annotation, given[0].name
+        first = next((p for p in given if p.annotation is not Number), given[0])
         kin = Components(tag)
         self[tag] = written(
             ", ".join(["kin", *(p.name for p in given)]),
             self.definition(kin, *(p.annotation(p.name, kin) for p in given)),
-            like=first if kind is Number else f"{first}[0]",
+            like=first.name if first.annotation is Number else f"{first.name}[0]",
             **self.names,
         )
         return self[tag]
@@ -128,7 +128,8 @@ class _Written(dict):
 def formula(*tags: type, **names: Callable) -> Callable[[Callable], Callable]:
     """Make a function by kinematics of a formula, for these tags (all if none is named).
 
-    `names` are the functions that it calls. Literals get the number type of the first operand.
+    `names` are the functions that it calls. Literals get the number type of the first operand
+    that is no `Number`.
     ``name.on(Tag)`` gives a tag a function that is not of the formula.
     """
 

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-import numpy as np
-
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.tuples import add, scale, subtract
-from karamelo_py.points.basis.cpdi import domain
-from karamelo_py.points.basis.cpdi.corners import register_carried, upright
-from karamelo_py.points.basis.cpdi.initial import element_corners, turned
+from karamelo_py.points.basis.cpdi import CUBE, Domain, Element, domain, upright
+from karamelo_py.points.basis.cpdi.corners import register_carried
 from karamelo_py.points.kinematics import Space
 
-# The order of a mesh: around the lower face, then around the upper.
-SIGNS = np.array([(x, y, z) for z in (-1, 1) for x, y in [(-1, -1), (1, -1), (1, 1), (-1, 1)]])
 # Weights of the ends of an edge at the nearer and the farther of its two Gauss points.
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 
 
-class H8(NamedTuple):
+class H8(Domain):
     """Trilinear hexahedra of eight corners, which neighbouring points move alike.
 
     Weights and gradients are the exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate
@@ -30,21 +23,10 @@ class H8(NamedTuple):
     method(ulcpdi, FLIP, linear, 1, H8)
     """
 
+    __slots__ = ()
     dimension = 3
-    cells = 3
-    nodes_per_cell = 1
-    least_nodes = 2
-    steady_moment = True
-    steep_edge = False
-    element = "hexahedron"  # of a mesh
-
-    @staticmethod
-    def shapes(kin: Any, solid: Any) -> np.ndarray:
-        """Corners (n, 24) of hexahedra with a positive volume."""
-        places = element_corners(solid, SIGNS)
-        x = places.reshape(-1, 8, 3)
-        edges = np.stack([x[:, 1] - x[:, 0], x[:, 3] - x[:, 0], x[:, 4] - x[:, 0]], axis=1)
-        return turned(places, np.linalg.det(edges) < 0, [4, 5, 6, 7, 0, 1, 2, 3], 3)
+    shape = ("corners",)
+    element = Element("hexahedron", 8, ((0, 1), (0, 3), (0, 4)), (4, 5, 6, 7, 0, 1, 2, 3), CUBE)
 
 
 @shared
@@ -186,4 +168,4 @@ def _(basis, kin, place):
     return min(lower, upper) > 0
 
 
-register_carried(H8, 3, 8)
+register_carried(H8)
