@@ -11,19 +11,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from math import sqrt
 from typing import Any
 
-from karamelo_py.compiler.compile import choose, define, fma, index, real
-
-_KNOWN = {"choose": choose, "fma": fma, "index": index, "real": real, "sqrt": sqrt}
+from karamelo_py.compiler.compile import define, fma, real
 
 
 class Symbol:
     """An expression: a pattern such as ``({} + {})`` with its parts."""
 
-    def __init__(self, pattern: str, *parts: Any):
-        self.pattern = pattern
+    def __init__(self, pattern: str, *parts: Any, called: Callable | None = None):
+        self.pattern, self.called = pattern, called
         self.parts = tuple(_symbol(part) for part in parts)
         self.text = pattern.format(*(part.text for part in self.parts))
 
@@ -66,7 +63,7 @@ class Symbol:
         return Symbol("({} > {})", self, other)
 
     def __abs__(self) -> Symbol:
-        return call("abs", self)
+        return call(abs, self)
 
 
 def _is(number: int, item: Any) -> bool:
@@ -87,18 +84,20 @@ def _symbol(item: Any) -> Symbol:
         return item
     if isinstance(item, tuple | list):
         return Symbol("(" + "{}, " * len(item) + ")", *item)
-    return Symbol(f"real({item!r}, {{}})", Symbol("like"))
+    number = repr(item).replace("inf", "1e999")
+    return Symbol(f"real({number}, {{}})", Symbol("like"), called=real)
 
 
-def call(name: str, *arguments: Any) -> Symbol:
-    """The function `name` of these arguments; an `int` is a literal index or word of it."""
+def call(function: Callable, *arguments: Any) -> Symbol:
+    """`function` of these arguments; an `int` among them is a literal number of a direction."""
     given = (Symbol(str(a)) if type(a) is int else a for a in arguments)
-    return Symbol(name + "(" + ", ".join(["{}"] * len(arguments)) + ")", *given)
+    holes = ", ".join(["{}"] * len(arguments))
+    return Symbol(f"{function.__name__}({holes})", *given, called=function)
 
 
 def add_product(a: Any, b: Any, c: Any) -> Any:
     """a b + c with one rounding (`fma`), or c where a or b does not exist."""
-    return c if _is(0, a) or _is(0, b) else call("fma", a, b, c)
+    return c if _is(0, a) or _is(0, b) else call(fma, a, b, c)
 
 
 def cofactor(m: Any, d: int, i: int, j: int) -> Any:
@@ -116,22 +115,25 @@ def determinant(m: Any, d: int) -> Any:
     return sum(m[0, j] * cofactor(m, d, 0, j) for j in range(d))
 
 
-def written(parameters: str, result: Any, like: str = "", **names: Any) -> Callable:
+def written(parameters: str, result: Any, like: str = "") -> Callable:
     """The function of `parameters` that returns `result`: a symbol, or tuples of symbols.
 
-    `like` is the expression whose number type literals get; `names` are the functions used.
+    `like` is the expression whose number type literals get.
     """
     result = _symbol(result)
     uses: Counter = Counter()
+    names: dict[str, Callable] = {}
 
     def count(symbol: Symbol) -> None:
         uses[symbol.text] += 1
         if uses[symbol.text] == 1:
+            if symbol.called is not None:
+                names[symbol.called.__name__] = symbol.called
             for part in symbol.parts:
                 count(part)
 
     count(result)
-    lines = [f"like = {like}"] if like and "like" in uses else []
+    lines = [f"like = {like}"] if like not in ("", "like") and "like" in uses else []
     known: dict[str, str] = {}
 
     def spell(symbol: Symbol) -> str:
@@ -144,4 +146,4 @@ def written(parameters: str, result: Any, like: str = "", **names: Any) -> Calla
         return known[symbol.text]
 
     last = f"return {spell(result)}"
-    return define(parameters, *lines, last, **_KNOWN, **names)
+    return define(parameters, *lines, last, **names)

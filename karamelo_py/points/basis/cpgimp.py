@@ -6,7 +6,7 @@ from math import prod
 from types import MappingProxyType
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.compile import choose, index, real, shared
 from karamelo_py.compiler.symbols import Symbol, call
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.basis import carried, carrier, carriers, carry, deformed, mapped_again
@@ -252,14 +252,14 @@ def _side(line, corner, j):
     return (i + 1, b) if j else (i, real(1, b) - b)
 
 
-@formula(_side=_side)
+@formula()
 def _carrier(kin, grid: Number, stencil: Number, corner: Number, j: Number):
     """Node number and weight of the j-th node that carries a corner."""
     bits = kin.vector(lambda i: Symbol(f"{{}} & {1 << i}", corner))
     nodes = kin.vector(lambda i: Symbol(f"{{}} & {1 << i}", j))
-    sides = kin.vector(lambda i: call("_side", stencil.lines[i], bits[i], nodes[i]))
+    sides = kin.vector(lambda i: call(_side, stencil.lines[i], bits[i], nodes[i]))
     number = node_number(stencil.first, [side[0] for side in sides])
-    return call("index", number), prod(side[1] for side in sides)
+    return call(index, number), prod(side[1] for side in sides)
 
 
 @carrier.on(CPGIMPCorners)
@@ -273,7 +273,7 @@ def _carry(kin, place: Vector, corner: Number, u: Vector):
     d = kin.dimension
 
     def half(i):
-        outward = call("choose", Symbol(f"{{}} & {1 << i}", corner), u[i], -u[i])
+        outward = call(choose, Symbol(f"{{}} & {1 << i}", corner), u[i], -u[i])
         return place[d + i] + 0.5**d * outward
 
     return kin.vector(lambda i: place[i]) + kin.vector(half)

@@ -11,7 +11,7 @@ from functools import cache
 from math import prod
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, define, point_function, real, shared
+from karamelo_py.compiler.compile import choose, define, index, point_function, real, shared
 from karamelo_py.compiler.symbols import Symbol, call, written
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.kinematics import Axisymmetric
@@ -98,11 +98,11 @@ def digits(k: str, base: int, d: int) -> list[Symbol]:
 def _written(kin: type, width: int) -> dict[Callable, Callable]:
     """The point functions of a product of `width` nodes a direction."""
     d, axisymmetric = kin.dimension, kin is Axisymmetric
-    grid, stencil = Symbol("grid"), Symbol("stencil")
-    lines = [Symbol("along(basis, kin, grid, place, {})", Symbol(str(i))) for i in range(d)]
+    basis, grid, stencil = Symbol("basis"), Symbol("grid"), Symbol("stencil")
+    lines = [call(along, basis, Symbol("kin"), grid, Symbol("place"), i) for i in range(d)]
     first = node_number(grid.first, [line.first for line in lines])
-    inv_r = Symbol("inverse_radius(_radius(basis, grid, {}))", lines[0]) if axisymmetric else 0
-    located = call("Stencil", first, lines, inv_r)
+    inv_r = call(inverse_radius, call(_radius, basis, grid, lines[0])) if axisymmetric else 0
+    located = call(Stencil, first, lines, inv_r)
 
     lines = [stencil.lines[i] for i in range(d)]
     at = digits("k", width, d)
@@ -116,16 +116,15 @@ def _written(kin: type, width: int) -> dict[Callable, Callable]:
 
     gradient = with_one("gradients")
     if axisymmetric:
-        gradient.append(call("hoop", weight, gradient[0], stencil.inv_r))
-    node = call("index", node_number(stencil.first, at))
-    arms = [call("_arm", Symbol("basis"), grid, *pair) for pair in zip(lines, at, strict=True)]
+        gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
+    node = call(index, node_number(stencil.first, at))
+    arms = [call(_arm, basis, grid, *pair) for pair in zip(lines, at, strict=True)]
     seen = "basis, kin, grid, stencil, k"
-    names = {f.__name__: f for f in (Stencil, along, hoop, inverse_radius, _arm, _radius)}
     return {
-        locate: written("basis, kin, grid, place", located, **names),
+        locate: written("basis, kin, grid, place", located),
         support: define("basis, kin", f"return {width**d}"),
-        entry: written(seen, (node, weight, gradient), **names),
-        reach: written(seen, arms, **names),
+        entry: written(seen, (node, weight, gradient)),
+        reach: written(seen, arms),
         affine_weight: written(seen, with_one("affine")),
     }
 

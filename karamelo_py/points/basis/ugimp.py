@@ -61,7 +61,7 @@ def averaged_hats(cells: int) -> Callable:
     The domain lies within so many `cells` from that node; lengths are in cells, counted from it.
     """
     lo, hi, inv_h = Symbol("lo"), Symbol("hi"), Symbol("grid").inv_h
-    parts = [call("in_cell", lo, hi, j) for j in range(cells)]
+    parts = [call(in_cell, lo, hi, j) for j in range(cells)]
     k = 1 / sum(part[0] for part in parts)
     slope = k * inv_h
     weights, gradients = [], []
@@ -77,8 +77,8 @@ def averaged_hats(cells: int) -> Callable:
     spread = sum(w * arm * arm for w, arm in zip(weights, arms, strict=True))
     k = inv_h / spread
     affine = [k * arm * w for w, arm in zip(weights, arms, strict=True)]
-    line = call("Along", Symbol("first"), r, weights, gradients, affine)
-    return shared(written("grid, first, lo, hi", line, "lo", Along=Along, in_cell=in_cell))
+    line = call(Along, Symbol("first"), r, weights, gradients, affine)
+    return shared(written("grid, first, lo, hi", line, "lo"))
 
 
 _averaged = averaged_hats(2)

@@ -107,8 +107,8 @@ class Symmetric(Tensor):
 class _Written(dict):
     """The functions of a formula by tag, each written when it is first asked for."""
 
-    def __init__(self, definition: Callable, tags: Iterable[type], names: dict[str, Callable]):
-        self.definition, self.tags, self.names = definition, tags, names
+    def __init__(self, definition: Callable, tags: Iterable[type]):
+        self.definition, self.tags = definition, tags
 
     def __missing__(self, tag: type) -> Callable:
         if tag not in self.tags:
@@ -120,21 +120,19 @@ class _Written(dict):
             ", ".join(["kin", *(p.name for p in given)]),
             self.definition(kin, *(p.annotation(p.name, kin) for p in given)),
             like=first.name if first.annotation is Number else f"{first.name}[0]",
-            **self.names,
         )
         return self[tag]
 
 
-def formula(*tags: type, **names: Callable) -> Callable[[Callable], Callable]:
+def formula(*tags: type) -> Callable[[Callable], Callable]:
     """Make a function by kinematics of a formula, for these tags (all if none is named).
 
-    `names` are the functions that it calls. Literals get the number type of the first operand
-    that is no `Number`.
+    Literals get the number type of the first operand that is no `Number`.
     ``name.on(Tag)`` gives a tag a function that is not of the formula.
     """
 
     def declare(definition: Callable) -> Callable:
-        table = _Written(definition, tags or TAGS, names)
+        table = _Written(definition, tags or TAGS)
 
         @wraps(definition)
         def dispatch(kin, *operands):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any
 
 from karamelo_py.compiler import symbols
@@ -109,7 +110,7 @@ def stretch(kin, f: Tensor):
         return kin.symmetric(lambda i, j: along[i, j])
     c = {(i, j): sum(f[k, i] * f[k, j] for k in range(2)) for i in range(2) for j in range(2)}
     size = abs(symbols.determinant(f, 2))
-    k = 1 / call("sqrt", c[0, 0] + c[1, 1] + size + size)
+    k = 1 / call(sqrt, c[0, 0] + c[1, 1] + size + size)
     within = {(0, 0): k * (c[0, 0] + size), (1, 1): k * (c[1, 1] + size), (0, 1): k * c[0, 1]}
     return kin.symmetric(lambda i, j: (along | within)[i, j])
 
@@ -132,7 +133,7 @@ def _towards_rotation(kin, r: Tensor):
     """A step of Newton's iteration from `r` to its rotation."""
     back = inverse_of(kin, r)
     squares = (sum(t[pair] * t[pair] for pair in kin.pairs) for t in (back, r))
-    g = call("sqrt", call("sqrt", next(squares) / next(squares)))
+    g = call(sqrt, call(sqrt, next(squares) / next(squares)))
     return kin.tensor(lambda i, j: (0.5 * g) * r[i, j] + (0.5 / g) * back[j, i])
 
 

@@ -70,7 +70,7 @@ def after_symmetric(kin, values: Number):
 def largest_row_sum(kin, s: Symmetric):
     """max_i sum_j |s_ij|: a bound of the largest eigenvalue (Gershgorin)."""
     order = ([i, *(j for j in range(3) if j != i)] for i in range(3))
-    return call("max", *(sum(abs(s[row[0], j]) for j in row) for row in order))
+    return call(max, *(sum(abs(s[row[0], j]) for j in row) for row in order))
 
 
 @point_function()

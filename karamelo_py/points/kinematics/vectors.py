@@ -85,4 +85,4 @@ def diagonal(kin, t: Tensor):
 def largest_component(kin, a: Vector):
     """max_i |a_i| of a vector."""
     sizes = [abs(a[i]) for i in kin.directions]
-    return call("max", *sizes) if len(sizes) > 1 else sizes[0]
+    return call(max, *sizes) if len(sizes) > 1 else sizes[0]

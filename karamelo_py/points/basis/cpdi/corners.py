@@ -6,7 +6,7 @@ from collections.abc import Callable
 from math import inf, prod
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, define, real, shared
+from karamelo_py.compiler.compile import choose, define, index, real, shared
 from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant, written
 from karamelo_py.compiler.tuples import add_row, add_scaled, scale
 from karamelo_py.points.basis import (
@@ -65,13 +65,13 @@ def along_cell(grid, direction, x):
     return i, a - real(i, a), pick(direction, grid.x0, grid.y0, grid.z0) + a * grid.h
 
 
-@formula(along_cell=along_cell, Corner=Corner)
+@formula()
 def _corner(kin, grid: Number, x: Vector):
     """Where a corner at `x` lies on the grid."""
-    cells = kin.vector(lambda i: call("along_cell", grid, i, x[i]))
+    cells = kin.vector(lambda i: call(along_cell, grid, i, x[i]))
     first = node_number(grid.first, [cell[0] for cell in cells])
     fractions, positions = ([cell[n] for cell in cells] for n in (1, 2))
-    return call("Corner", first, fractions, positions)
+    return call(Corner, first, fractions, positions)
 
 
 @shared
@@ -79,17 +79,17 @@ def _side(far, fraction):
     return choose(far > 0, fraction, real(1, fraction) - fraction)
 
 
-@formula(_side=_side)
+@formula()
 def _hat(kin, corner: Number, j: Number):
     """The linear function of the j-th node of a corner's cell."""
     sides = zip(digits("j", 2, kin.dimension), kin.directions, strict=True)
-    return prod(call("_side", far, corner.fractions[i]) for far, i in sides)
+    return prod(call(_side, far, corner.fractions[i]) for far, i in sides)
 
 
 @formula()
 def _node(kin, grid: Number, corner: Number, j: Number):
     """The number of the j-th node of a corner's cell."""
-    return call("index", node_number(corner.first, digits("j", 2, kin.dimension)))
+    return call(index, node_number(corner.first, digits("j", 2, kin.dimension)))
 
 
 @shared
@@ -97,11 +97,11 @@ def _arm(grid, far, fraction):
     return (real(far, fraction) - fraction) * grid.h
 
 
-@formula(_arm=_arm)
+@formula()
 def _away(kin, grid: Number, corner: Number, centre: Vector, j: Number):
     """From the weighted centre to the j-th node of a corner's cell."""
     far = digits("j", 2, kin.dimension)
-    arms = kin.vector(lambda i: call("_arm", grid, far[i], corner.fractions[i]))
+    arms = kin.vector(lambda i: call(_arm, grid, far[i], corner.fractions[i]))
     return kin.vector(lambda i: arms[i] + (corner.x[i] - centre[i]))
 
 
@@ -139,37 +139,35 @@ def _solve(kin, spread: Vector, a: Vector):
 def _domain_functions(tag: type, corners: int) -> dict[Callable, Callable]:
     """The point functions of domains of so many corners."""
     basis, kin, grid, place, stencil = map(Symbol, ("basis", "kin", "grid", "place", "stencil"))
-    described = call("domain", basis, kin, place)
+    described = call(domain, basis, kin, place)
     x, weights, gradients = (described[i] for i in range(3))
-    at = [call("_corner", kin, grid, x[c]) for c in range(corners)]
-    centre = call("scale", weights[0], at[0].x)
+    at = [call(_corner, kin, grid, x[c]) for c in range(corners)]
+    centre = call(scale, weights[0], at[0].x)
     for c in range(1, corners):
-        centre = call("add_scaled", centre, weights[c], at[c].x)
+        centre = call(add_scaled, centre, weights[c], at[c].x)
     spread = (0,) * len(_spread_pairs(Components(tag)))
     for c in range(corners):
-        spread = call("_add_spread", kin, grid, spread, weights[c], at[c], centre)
-    inv_r = call("inverse_radius", centre[0])
-    located = call("Stencil", at, weights, gradients, centre, spread, inv_r)
+        spread = call(_add_spread, kin, grid, spread, weights[c], at[c], centre)
+    inv_r = call(inverse_radius, centre[0])
+    located = call(Stencil, at, weights, gradients, centre, spread, inv_r)
 
     d = tag.dimension
     c, j = (Symbol(f"({{}} {operation} {2**d})", Symbol("k")) for operation in ("//", "%"))
     corner = stencil.corners[c]
-    hat = call("_hat", kin, corner, j)
+    hat = call(_hat, kin, corner, j)
     weight = stencil.weights[c] * hat
     gradient = [hat * stencil.gradients[c][i] for i in range(d)]
     if tag is Axisymmetric:
-        gradient.append(call("hoop", weight, gradient[0], stencil.inv_r))
-    away = call("_away", kin, grid, corner, stencil.centre, j)
-    solved = call("_solve", kin, stencil.spread, away)
-    used = (Stencil, domain, scale, add_scaled, hoop, inverse_radius)
-    names = {f.__name__: f for f in (*used, _corner, _add_spread, _hat, _node, _away, _solve)}
+        gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
+    away = call(_away, kin, grid, corner, stencil.centre, j)
+    solved = call(_solve, kin, stencil.spread, away)
     seen = "basis, kin, grid, stencil, k"
     return {
-        locate: written("basis, kin, grid, place", located, "place[0]", **names),
+        locate: written("basis, kin, grid, place", located, "place[0]"),
         support: define("basis, kin", f"return {corners * 2**d}"),
-        entry: written(seen, (call("_node", kin, grid, corner, j), weight, gradient), **names),
-        reach: written(seen, away, **names),
-        affine_weight: written(seen, [weight * solved[i] for i in range(d)], **names),
+        entry: written(seen, (call(_node, kin, grid, corner, j), weight, gradient)),
+        reach: written(seen, away),
+        affine_weight: written(seen, [weight * solved[i] for i in range(d)]),
     }
 
 
@@ -218,7 +216,6 @@ def register_carried(basis: type) -> None:
     basis_, kin, place, grid = map(Symbol, ("basis", "kin", "place", "grid"))
     far = abs(place[d] - place[0])
     for k in range(d + 1, d + d * corners):
-        far = call("max", abs(place[k] - place[k % d]), far)
-    reached = call("choose", call("upright", basis_, kin, place), far * grid.inv_h, inf)
-    names = {"upright": upright, "inf": inf}
-    extent.on(basis)(written("basis, kin, grid, place", reached, "place[0]", **names))
+        far = call(max, abs(place[k] - place[k % d]), far)
+    reached = call(choose, call(upright, basis_, kin, place), far * grid.inv_h, inf)
+    extent.on(basis)(written("basis, kin, grid, place", reached, "place[0]"))

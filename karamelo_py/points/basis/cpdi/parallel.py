@@ -91,7 +91,7 @@ def _extent(kin, grid: Number, place: Vector):
     away = kin.vector(lambda i: sum(abs(edges[e, i]) for e in kin.directions))
     far = away[0]
     for other in away[1:]:  # so written, NaN comes through
-        far = far + call("max", other - far, 0.0)
+        far = far + call(max, other - far, 0.0)
     return far * grid.inv_h
 
 
