@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import fma, point_function, real, shared
+from karamelo_py.compiler.compile import fma, real, shared
 from karamelo_py.compiler.symbols import call
-from karamelo_py.points.kinematics.components import Number, Symmetric, Tensor, formula
+from karamelo_py.points.kinematics.components import Components, Number, Symmetric, Tensor, formula
 from karamelo_py.points.kinematics.deformation import inverse_of, zero_tensor
-from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
 
 
 @formula()
@@ -73,45 +72,25 @@ def largest_row_sum(kin, s: Symmetric):
     return call(max, *(sum(abs(s[row[0], j]) for j in row) for row in order))
 
 
-@point_function()
-def spin(kin, dl, s):
-    """R s R^T, with R the rotation of the increment dl: the objective (Jaumann) turn of a stress.
-
-    R is the rotation by the vector w = axial(skew(dl)), built by Cayley's formula from
-    tan(|w|/2) ~ |w|/2 (1 + |w|^2/12): orthogonal to round-off, its angle right to |w|^5/120
-    (Hughes & Winget 1980 use tan(|w|/2) ~ |w|/2, right to |w|^3/12).
-    """
-
-
-@spin.on(Line)
-def _(kin, dl, s):
-    return s
-
-
-@spin.on(PlaneStrain)
-@spin.on(Axisymmetric)
-def _(kin, dl, s):
-    one = real(1, dl[0])
-    t = real(0.25, dl[0]) * (dl[2] - dl[1])
+def _spin_in_plane(kin: Components, dl: Tensor, s: Symmetric) -> tuple:
+    t = 0.25 * (dl[1, 0] - dl[0, 1])
+    t = call(fma, t * (t * t), 1 / 3, t)
     tt = t * t
-    t = fma(t * tt, real(1 / 3, dl[0]), t)
-    tt = t * t
-    scale = one / (one + tt)
-    cosine = (one - tt) * scale
+    scale = 1 / (1 + tt)
+    cosine = (1 - tt) * scale
     sine = (t + t) * scale
     # The deviator in the plane turns by twice the angle; written as a change, which is exactly
     # nothing where nothing turns.
-    double_sine = real(2, dl[0]) * sine * cosine
-    double_versine = real(-2, dl[0]) * sine * sine
-    apart = real(0.5, dl[0]) * (s[0] - s[1])
-    change = fma(double_versine, apart, -(double_sine * s[3]))
-    shear = fma(double_sine, apart, double_versine * s[3])
-    return (s[0] + change, s[1] - change, s[2], s[3] + shear)
+    double_sine = 2 * sine * cosine
+    double_versine = -2 * sine * sine
+    apart = 0.5 * (s[0, 0] - s[1, 1])
+    change = call(fma, double_versine, apart, -(double_sine * s[0, 1]))
+    shear = call(fma, double_sine, apart, double_versine * s[0, 1])
+    return (s[0, 0] + change, s[1, 1] - change, s[2, 2], s[0, 1] + shear)
 
 
-@formula(Space)
-def _spin_in_space(kin, dl: Tensor, s: Symmetric):
-    """R s R^T with R = I + k (T + T T), T the cross product with the scaled w / 2."""
+def _spin_in_space(kin: Components, dl: Tensor, s: Symmetric) -> tuple:
+    # R = I + k (T + T T), T the cross product with the scaled w / 2
     w = []
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -131,9 +110,17 @@ def _spin_in_space(kin, dl: Tensor, s: Symmetric):
     return kin.symmetric(lambda i, j: sum(a[i, m] * r[j, m] for m in range(3)))
 
 
-@spin.on(Space)
-def _(kin, dl, s):
-    return _spin_in_space(kin, dl, s)
+@formula()
+def spin(kin, dl: Tensor, s: Symmetric):
+    """R s R^T, with R the rotation of the increment dl: the objective (Jaumann) turn of a stress.
+
+    R is the rotation by the vector w = axial(skew(dl)), built by Cayley's formula from
+    tan(|w|/2) ~ |w|/2 (1 + |w|^2/12): orthogonal to round-off, its angle right to |w|^5/120
+    (Hughes & Winget 1980 use tan(|w|/2) ~ |w|/2, right to |w|^3/12).
+    """
+    if kin.dimension == 1:
+        return kin.symmetric(lambda i, j: s[i, j])
+    return (_spin_in_plane if kin.dimension == 2 else _spin_in_space)(kin, dl, s)
 
 
 @formula()
