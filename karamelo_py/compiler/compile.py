@@ -219,6 +219,16 @@ def _fma(a, b, c):
     return lambda a, b, c: a * b + c
 
 
+def choose(condition: bool, a: float, b: float) -> float:
+    """`a` where `condition` holds, else `b`; both are computed, and nothing is branched over."""
+    return a if condition else b
+
+
+@by_type(choose)
+def _choose(condition, a, b):
+    return lambda condition, a, b: a if condition else b
+
+
 def index(i: int) -> int:
     """`i` as an array index that is known not to be negative.
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from karamelo_py.kernels.g2p import FBar, PointByPoint
 from karamelo_py.language import registry
-from karamelo_py.points.basis import blank
 from karamelo_py.points.frames import Updated
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice, numbered
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.styles.methods.domains import initial_shape
 
 
 class NoContact(NamedTuple):
@@ -64,7 +64,7 @@ class Method:
     @property
     def regular_points(self) -> bool:
         """Whether points of a cell stand at equal distances, so that their domains tile it."""
-        return hasattr(type(self.basis), "shapes")
+        return bool(getattr(self.basis, "shape", ()))
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """How solids with velocity fields of their own touch: a tag with what that takes."""
@@ -106,10 +106,7 @@ class Method:
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
         """What the basis keeps of the domains of a solid's points, (n, s)."""
-        width = len(blank(self.basis, kin, (0.0,) * kin.dimension)) - kin.dimension
-        if not width:
-            return np.empty((len(solid.x0), 0))
-        return type(self.basis).shapes(kin, solid)
+        return initial_shape(type(self.basis), solid)
 
     def _lattice(
         self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float
