@@ -295,6 +295,8 @@ def _look(thing: Any) -> tuple[str, list]:
         return f"{kind} {array.dtype} {array.shape}", [array.tobytes()]
     if isinstance(thing, (tuple, list)):
         return kind, [type(thing), *thing]
+    if hasattr(type(thing), "made_of"):  # a memo
+        return kind, list(thing.made_of)
     if isinstance(thing, (dict, python.MappingProxyType)):
         return kind, [part for item in thing.items() for part in item]
     if isinstance(thing, (set, frozenset)):

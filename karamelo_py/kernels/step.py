@@ -422,8 +422,20 @@ MOMENTUM_AGAIN = (
 class _Spelled:
     """Text of a function that takes the rows of a table in turn."""
 
+    # A class attribute, where the cache of kernels sees what a step is made of.
+    words = (
+        at_nodes,
+        at_points,
+        average_volumes,
+        check_moves,
+        real,
+        step_size,
+        sweep,
+        sweep_nodes,
+    )
+
     def __init__(self) -> None:
-        self.names: dict[str, Any] = dict(globals())
+        self.names: dict[str, Any] = {word.__name__: word for word in self.words}
         self.lines = ["dt = step_size(s)"]
 
     def name(self, thing: Any, stem: str) -> str:
@@ -485,19 +497,31 @@ def rows_of(scheme: type, visits: type) -> list[Any]:
     return table.fused(scheme.rows) if visits is Fused else table.staged(scheme.rows)
 
 
-_steps: dict[tuple[type, type], Callable] = {}
-
-
 def _spelled_step(scheme: type, visits: type) -> Callable:
     """One step, row after row."""
-    key = scheme, visits
-    if key not in _steps:
-        text = _Spelled()
-        for row in rows_of(scheme, visits):
-            text.row(row)
-        names = "scheme, visits, mode, s, hooks, more"
-        _steps[key] = define(names, *text.lines, "return True", **text.names)
-    return _steps[key]
+    text = _Spelled()
+    for row in rows_of(scheme, visits):
+        text.row(row)
+    names = "scheme, visits, mode, s, hooks, more"
+    return define(names, *text.lines, "return True", **text.names)
+
+
+def _spelled_begin(scheme: type, visits: type) -> Callable:
+    """Fused steps expect the sums on the nodes: the scatter of the last visit, alone."""
+    text = _Spelled()
+    if visits is Fused:
+        last = rows_of(scheme, Fused)[-1]
+        text.row(last._replace(gathers=False, only_if_more=False, moves=False))
+    return define("scheme, visits, mode, s", *text.lines, "return True", **text.names)
+
+
+def _spelled(spell: Callable, scheme: type, visits: type) -> Callable:
+    """What `spell` makes for interpreted steps, made once."""
+    # Beside the function, not in a global: what kernels are made of does not change in a run.
+    made = vars(spell).setdefault("made", {})
+    if (scheme, visits) not in made:
+        made[scheme, visits] = spell(scheme, visits)
+    return made[scheme, visits]
 
 
 def step(scheme, visits, mode, s, hooks, more):
@@ -505,7 +529,8 @@ def step(scheme, visits, mode, s, hooks, more):
 
     Returns whether all points went well.
     """
-    return _spelled_step(type(scheme), type(visits))(scheme, visits, mode, s, hooks, more)
+    take = _spelled(_spelled_step, type(scheme), type(visits))
+    return take(scheme, visits, mode, s, hooks, more)
 
 
 @by_type(step)
@@ -513,25 +538,9 @@ def _step(scheme, visits, mode, s, hooks, more):
     return _spelled_step(scheme.instance_class, visits.instance_class)
 
 
-_begins: dict[tuple[type, type], Callable] = {}
-
-
-def _spelled_begin(scheme: type, visits: type) -> Callable:
-    """Fused steps expect the sums on the nodes: the scatter of the last visit, alone."""
-    key = scheme, visits
-    if key not in _begins:
-        text = _Spelled()
-        if visits is Fused:
-            last = rows_of(scheme, Fused)[-1]
-            text.row(last._replace(gathers=False, only_if_more=False, moves=False))
-        names = "scheme, visits, mode, s"
-        _begins[key] = define(names, *text.lines, "return True", **text.names)
-    return _begins[key]
-
-
 def begin(scheme, visits, mode, s):
     """Before the first of several steps; returns whether all points are on the grid."""
-    return _spelled_begin(type(scheme), type(visits))(scheme, visits, mode, s)
+    return _spelled(_spelled_begin, type(scheme), type(visits))(scheme, visits, mode, s)
 
 
 @by_type(begin)

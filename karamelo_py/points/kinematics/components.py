@@ -109,6 +109,17 @@ class _Written(dict):
 
     def __init__(self, definition: Callable, tags: Iterable[type]):
         self.definition, self.tags = definition, tags
+        self.given: dict[type, Callable] = {}  # not of the formula
+
+    @property
+    def made_of(self) -> tuple:
+        """What the cache of kernels follows: not what happens to be written already."""
+        return self.definition, tuple(self.tags), self.given, written, Components
+
+    def give(self, tag: type, function: Callable) -> Callable:
+        """A tag gets a function that is not of the formula."""
+        self[tag] = self.given[tag] = function
+        return function
 
     def __missing__(self, tag: type) -> Callable:
         if tag not in self.tags:
@@ -140,7 +151,7 @@ def formula(*tags: type) -> Callable[[Callable], Callable]:
 
         del dispatch.__wrapped__  # Numba would read its signature
         by_type(dispatch)(lambda kin, *operands: table[tag_class(kin)])
-        dispatch.on = lambda tag: lambda function: table.setdefault(tag, function)
+        dispatch.on = lambda tag: lambda function: table.give(tag, function)
         return dispatch
 
     return declare
