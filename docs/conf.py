@@ -1,14 +1,17 @@
 """Configuration of the documentation: python -m sphinx -W -b html docs docs/_build/html"""
 
 import sys
-from importlib.metadata import version as version_of
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+HERE = Path(__file__).parent
+# The tree is documented, whatever is installed.
+sys.path[:0] = [str(HERE.parent), str(HERE / "_ext")]
+
+from karamelo_py import __version__  # noqa: E402  (only now is it found)
 
 project = "karamelo-py"
 author = "the authors of karamelo-py"
-release = version = version_of("karamelo-py")
+release = version = __version__
 copyright = author
 
 extensions = ["myst_parser", "reference_pages", "script_lexer"]
