@@ -3,9 +3,11 @@
 import sys
 from pathlib import Path
 
+from numpy import cos, pi
+
 HERE = Path(__file__).parent
 # The tree is documented, whatever is installed.
-sys.path[:0] = [str(HERE.parent), str(HERE / "_ext")]
+sys.path[:0] = [str(HERE.parent), str(HERE), str(HERE / "_ext")]
 
 from karamelo_py import __version__  # noqa: E402  (only now is it found)
 
@@ -22,3 +24,26 @@ exclude_patterns = ["_build", "_ext"]
 html_theme = "furo"
 html_title = f"karamelo-py {release}"
 html_static_path = ["_static"]
+
+
+def draw_reference_step(app):
+    """Run the reference step; the page shows the picture."""
+    import matplotlib
+    from reference_step import vibrating_bar
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    times, shares = vibrating_bar()
+    figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
+    axes.plot(times, cos(10 * pi * times), "k-", lw=1, label="exact")
+    axes.plot(times, shares, ".", ms=3, label="reference step")
+    axes.set(xlabel="time", ylabel="share of the first mode")
+    axes.legend()
+    figure.savefig(HERE / "reference" / "generated" / "reference-step.svg")
+    plt.close(figure)
+
+
+def setup(app):
+    """After the pages of the reference, which empty their folder first."""
+    app.connect("builder-inited", draw_reference_step, priority=900)
