@@ -23,7 +23,7 @@ from combinations import (
     write_mesh,
 )
 from selection import covering
-from states import final_state, same_bits
+from states import final_state
 
 CASES = [
     (kinematics, *base) for kinematics in KINEMATICS for base in BASES if fits(kinematics, base[2])
@@ -104,7 +104,7 @@ COMPILED = [pytest.param(case, id=named(case)) for case in PAIRWISE]
 
 
 def compare(case, state_interpreted, tmp_path):
-    """Compiled and interpreted, one and two threads."""
+    """Compiled and interpreted."""
     option = case[3]
     mesh = write_mesh(tmp_path / "m.vtk", MESHED[option]) if option in MESHED else None
     text = scene(*case, mesh=mesh)
@@ -127,11 +127,14 @@ def test_pairwise(case, state_interpreted, tmp_path):
     compare(case, state_interpreted, tmp_path)
 
 
-SELECTION = COMPILED[:: max(1, len(COMPILED) // 2)]
+# One each of the kinematics that no other test compiles: with F around the axis, and domains.
+SELECTION = [
+    ("axisymmetric", "tlmpm", "quadratic-spline", "", "TPIC", "usf"),
+    ("plane", "ulcpdi", "linear", "Q4", "AFLIP", "usavg"),
+]
 
 
-@pytest.mark.parametrize("case", SELECTION)
+@pytest.mark.parametrize("case", SELECTION, ids=named)
 def test_selection(case, state_interpreted, tmp_path):
-    """Some of them, compiled; both numbers of threads give the same bits."""
-    one = compare(case, state_interpreted, tmp_path)
-    assert same_bits(one, final_state(tmp_path / "in.script", threads=2))
+    """Two of them, compiled. That threads make no difference, test_identical.py says."""
+    compare(case, state_interpreted, tmp_path)
