@@ -43,6 +43,7 @@ run_time({time})
 
 
 @pytest.mark.parametrize("d, law", [(2, "linear"), (1, "neo-hookean")])
+@pytest.mark.xdist_group("bar")
 def test_flip_holds_frequency_and_energy(run_script, d, law):
     """Ten periods with 25 cells; comparisons/vibrating_bar.py has the linear bar in 1D.
 

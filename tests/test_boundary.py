@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scenes import SCHEMES, TRANSFERS, block
+from selection import parameters
 from states import final_state, same_bits
 
 from comparisons.results import read_dump, read_log
@@ -140,8 +141,11 @@ STAGES = (
 )
 
 
-@pytest.mark.parametrize("how", ["delete", "reflect"])
-@pytest.mark.parametrize("scheme", SCHEMES)
+DELETED = [("delete", scheme) for scheme in SCHEMES]
+REFLECTED = [("reflect", scheme) for scheme in SCHEMES]
+
+
+@pytest.mark.parametrize("how, scheme", parameters([*DELETED, REFLECTED[0]], REFLECTED[1:]))
 def test_the_same_bits_in_pieces(state_interpreted, how, scheme):
     """However a run is cut, and stage by stage, while points leave in several steps."""
     options = {"scheme": scheme, "law": "linear"}
@@ -155,6 +159,7 @@ def test_the_same_bits_in_pieces(state_interpreted, how, scheme):
 
 
 @pytest.mark.parametrize("how", ["delete", "reflect"])
+@pytest.mark.xdist_group("boundary")
 def test_the_same_bits_on_two_threads(tmp_path, monkeypatch, how):
     monkeypatch.chdir(tmp_path)
     script = tmp_path / "in.script"

@@ -93,6 +93,7 @@ def test_interpreted(state_interpreted, d, basis):
         ),
     ],
 )
+@pytest.mark.xdist_group("neo-hookean")
 def test_compiled(tmp_path, d, basis):
     """Contracted products and sums change the last bits only."""
     path = tmp_path / "in.script"

@@ -29,6 +29,7 @@ def at_steps(log, steps):
     return rows
 
 
+@pytest.mark.xdist_group("disks")
 def test_an_objective_rate_changes_the_rebound_by_a_few_per_cent(run_script, karamelo):
     """The points turn a little during the contact; Karamelo leaves their stress behind.
 
@@ -43,6 +44,7 @@ def test_an_objective_rate_changes_the_rebound_by_a_few_per_cent(run_script, kar
     assert 0.001 < worst < 0.04
 
 
+@pytest.mark.xdist_group("disks")
 def test_output_of_the_two_disks(run_script):
     """The first state, every 250th step, the last state; the plot."""
     text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
@@ -59,6 +61,7 @@ def test_output_of_the_two_disks(run_script):
     assert result.log.Time[-1] == 0.6
 
 
+@pytest.mark.xdist_group("disks")
 def test_momentum_is_conserved(run_script):
     """What one disk gains the other loses; masses are equal, so the mean velocities add to zero.
 
@@ -81,6 +84,7 @@ run_time(3.5)
 
 
 @pytest.mark.parametrize("name, kinetic", [("2020", "Ek_s"), ("karamelo", "Ek")])
+@pytest.mark.xdist_group("disks")
 def test_scripts_as_others_write_them(run_script, karamelo, name, kinetic):
     """The published forms of the script compute the same (they have no word for rate=none)."""
     result = run_script(INPUTS / f"in.two_disks_{name}", "-var", "N_log", "250")

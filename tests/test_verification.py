@@ -97,6 +97,7 @@ def test_cures_of_cell_crossing_keep_second_order(run_script, way, ppc):
 @pytest.mark.parametrize(
     ("way", "least"), table((LINEAR, 0.5), (BERNSTEIN, 0.5), (UGIMP, 0.05), (QUADRATIC, 0.05))
 )
+@pytest.mark.xdist_group("neo-hookean")
 def test_order_is_lost_when_points_cross_cells(run_script, way, least):
     """With two points a direction. Hats (Steffen et al. 2008) and Bernstein functions have kinks.
 
@@ -108,6 +109,7 @@ def test_order_is_lost_when_points_cross_cells(run_script, way, least):
     assert errors[-1] > least
 
 
+@pytest.mark.xdist_group("neo-hookean")
 def test_wrong_body_force_does_not_converge(run_script):
     """Orders tell an error: a modulus of the source 5 % off leaves an error that stays."""
     text = (INPUTS / "in.axis_aligned").read_text("utf-8")
@@ -147,6 +149,7 @@ def test_axis_aligned_3d(run_script, way):
         (TOTAL_CPDI,),
     ),
 )  # fmt: skip
+@pytest.mark.xdist_group("neo-hookean")
 def test_vortex_converges_at_small_angle(run_script, way):
     """Cells of 1/8, 1/16, 1/32; the ring is 0.5 wide, its profile changes within four cells.
 
@@ -186,6 +189,7 @@ def column_error(run_script, way, grid, g=9.81):
     return np.abs(points.s22 - exact.column_stress(points.y0, 80, g, 10)).mean() / (80 * g * 10)
 
 
+@pytest.mark.xdist_group("disks")
 def test_linear_basis_has_one_stress_a_cell_while_points_stay(run_script):
     """A hundredth of the weight: the top sinks by h/16 at most, and no point crosses.
 
@@ -281,6 +285,7 @@ SUPPORTS = [(LINEAR, 2), (QUADRATIC, 3), (CUBIC, 4), (UGIMP, 3), (STRETCH, 3)]
 
 
 @pytest.mark.parametrize(("way", "support"), table(*SUPPORTS))
+@pytest.mark.xdist_group("disks")
 def test_contact_is_felt_early_in_proportion_to_the_cells(run_script, way, support):
     """Exact: 1.5858 s. Felt (a ten-thousandth of the energy stored) not after 1.6, and not earlier
     than the functions overlap, support h / (2 v); half the cells, about half the lead.
