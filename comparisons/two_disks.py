@@ -8,7 +8,7 @@ import numpy as np
 
 from comparisons.row import Row
 
-KARAMELO = Path(__file__).parents[1] / "tests" / "data" / "two_disks_karamelo.csv"
+KARAMELO = Path(__file__).parent / "data" / "two_disks_karamelo.csv"
 SMALL = {}
 
 

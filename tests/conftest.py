@@ -20,8 +20,6 @@ from karamelo_py.app.cli import main
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
 INPUTS = ROOT / "inputs"
-# Numbers of other programs; each file says which one and how.
-REFERENCE = TESTS / "data"
 
 # Processes that tests start run the tree, whatever is installed.
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import INPUTS, REFERENCE
+from conftest import INPUTS
 
 from comparisons.results import read_dump
+from comparisons.two_disks import KARAMELO
 
 # 416 points of 1/1600 each weigh 260, and move at sqrt(0.1^2 + 0.1^2).
 INITIAL_ENERGY = 0.5 * 260 * 0.02
@@ -18,8 +19,7 @@ INITIAL_ENERGY = 0.5 * 260 * 0.02
 @pytest.fixture(scope="module")
 def karamelo():
     """Karamelo's energies by step."""
-    path = REFERENCE / "two_disks_karamelo.csv"
-    return np.genfromtxt(path, delimiter=",", names=True, skip_header=1)
+    return np.genfromtxt(KARAMELO, delimiter=",", names=True, skip_header=1)
 
 
 def at_steps(log, steps):
