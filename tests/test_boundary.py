@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from scenes import SCHEMES, TRANSFERS, block
@@ -28,7 +30,7 @@ def thrown(d: int, how: str, *lines: str, **options) -> str:
     velocity = ", ".join(map(str, V[:d]))
     fly = f"fix(v, initial_velocity_particles, all, {velocity})"
     text = block(d, f"boundary({how})", fly, *WATCH, *lines, **{"law": "soft", **options})
-    return text.replace(f"dimension({d}, 0, 1.2", f"dimension({d}, 0, 0.7")
+    return re.sub(rf"dimension\({d}, 0, [\d.]+", f"dimension({d}, 0, 0.7", text)
 
 
 def single(d: int, how: str, *lines: str, transfer: str = "FLIP") -> str:
