@@ -31,7 +31,7 @@ HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"
 PICTURES = DOCS / "_static" / "comparison"
 INPUTS = HERE.parent / "inputs"
-TOOLS = ("__main__", "lines", "results", "row")
+TOOLS = ("__main__", "exact", "lines", "results", "row")
 
 
 def scenes() -> list[str]:

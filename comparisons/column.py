@@ -6,7 +6,7 @@ import numpy as np
 
 from comparisons.row import Row
 
-SMALL = None  # tests of its own (tests/test_verification.py)
+SMALL = None  # orders take several grids; tests/test_verification.py has other properties
 WEIGHT = 80 * 9.81 * 10
 
 

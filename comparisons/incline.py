@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from math import cos, radians, sin
+from math import radians
 
 import numpy as np
 
+from comparisons.exact import incline_acceleration
 from comparisons.row import Row
 
-SMALL = None  # tests of its own (tests/test_verification_beams.py)
+SMALL = {}
 G = 10.0
 
 
 def compare(run, axes, full):
     """Acceleration down the incline, from 0.2 s on."""
-    slides = G * (sin(radians(45)) - 0.1 * cos(radians(45)))
-    rolls = 2 / 3 * G * sin(radians(30))
     cases = {
-        "slides": ({"angle": 45, "mu": 0.1}, slides, 0.002),
-        "rolls, 24 cells across": ({"refine": 2}, rolls, 0.05),
+        "slides": ({"angle": 45, "mu": 0.1}, 0.001),
+        "slides without friction": ({"angle": 30, "mu": 0}, 0.001),
     }
-    for name, (words, expected, within) in cases.items():
+    if full:
+        # What comes near the base meets it a cell too early: 13 % are missing with 12 cells across
+        # the disk, and 0.5 % with 24.
+        rolls = {"angle": 30, "mu": 0.5}
+        cases["rolls, 12 cells across"] = rolls, 0.2
+        cases["rolls, 24 cells across"] = rolls | {"refine": 2}, 0.05
+    for name, (words, within) in cases.items():
+        expected = incline_acceleration(radians(words["angle"]), words["mu"], G)
         log = run(**words).log
         late = log.Time > 0.2
         found = np.polyfit(log.Time[late], log.v_x[late], 1)[0]

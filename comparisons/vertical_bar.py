@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from comparisons.row import Row
 
-SMALL = None  # tests of its own (tests/test_verification_beams.py)
+SMALL = None  # with fewer cells it is another bar
 
 
 def compare(run, axes, full):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import pi
 
 import numpy as np
 
+from comparisons.exact import bar_frequency
 from comparisons.row import Row
 
-SMALL = None  # tests of its own (tests/test_verification.py)
-OMEGA = pi / (2 * 25) * sqrt(100 / 1)
+SMALL = {}
 
 
 def frequency(time, v):
@@ -20,12 +20,18 @@ def frequency(time, v):
 
 
 def compare(run, axes, full):
-    """FLIP, linear functions, 25 cells."""
+    """FLIP, linear functions, 25 cells.
+
+    Lumping and hats change omega by (k h)^2 / 24 with k h = pi / 50: 2e-4; masses that the free end
+    shares with an empty node count as up to h/4 of length, 1 % of it, but of second order in k h
+    where the wave has no slope.
+    """
     log = run().log
-    yield Row("frequency (rad/s)", OMEGA, frequency(log.Time, log.v_x), 0.002, "first mode (exact)")
+    omega, source = bar_frequency(25, 100, 1), "first mode (exact)"
+    yield Row("frequency (rad/s)", omega, frequency(log.Time, log.v_x), 0.002, source)
     energy = log.Ek + log.Es
-    last = log.Time > log.Time[-1] * 0.9
-    yield Row("energy kept", 1.0, energy[last].mean() / energy[0], 0.01, "exact")
+    first, last = energy[log.Time < 10].mean(), energy[log.Time > 90].mean()
+    yield Row("energy kept", (0.98, 1.002), last / first, 0.0, "exact; lumped masses cost a little")
     axes.plot(log.Time, log.exact, "k-", lw=1, label="exact")
     axes.plot(log.Time, log.v_x, ".", ms=2, label="computed")
     axes.set(xlabel="time", ylabel="mean velocity")

@@ -1,14 +1,19 @@
 """Configuration of the documentation: python -m sphinx -W -b html docs docs/_build/html"""
 
 import sys
-from importlib.metadata import version as version_of
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+from numpy import cos, pi
+
+HERE = Path(__file__).parent
+# The tree is documented, whatever is installed.
+sys.path[:0] = [str(HERE.parent), str(HERE), str(HERE / "_ext")]
+
+from karamelo_py import __version__  # noqa: E402  (only now is it found)
 
 project = "karamelo-py"
 author = "the authors of karamelo-py"
-release = version = version_of("karamelo-py")
+release = version = __version__
 copyright = author
 
 extensions = ["myst_parser", "reference_pages", "script_lexer"]
@@ -19,3 +24,26 @@ exclude_patterns = ["_build", "_ext"]
 html_theme = "furo"
 html_title = f"karamelo-py {release}"
 html_static_path = ["_static"]
+
+
+def draw_reference_step(app):
+    """Run the reference step; the page shows the picture."""
+    import matplotlib
+    from reference_step import vibrating_bar
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    times, shares = vibrating_bar()
+    figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
+    axes.plot(times, cos(10 * pi * times), "k-", lw=1, label="exact")
+    axes.plot(times, shares, ".", ms=3, label="reference step")
+    axes.set(xlabel="time", ylabel="share of the first mode")
+    axes.legend()
+    figure.savefig(HERE / "reference" / "generated" / "reference-step.svg")
+    plt.close(figure)
+
+
+def setup(app):
+    """After the pages of the reference, which empty their folder first."""
+    app.connect("builder-inited", draw_reference_step, priority=900)

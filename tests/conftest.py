@@ -18,14 +18,11 @@ from comparisons.results import Result
 from karamelo_py.app.cli import main
 
 TESTS = Path(__file__).parent
-INPUTS = TESTS.parent / "inputs"
-# Numbers of other programs; each file says which one and how.
-REFERENCE = TESTS / "data"
+ROOT = TESTS.parent
+INPUTS = ROOT / "inputs"
 
 # Processes that tests start run the tree, whatever is installed.
-os.environ["PYTHONPATH"] = os.pathsep.join(
-    filter(None, [str(TESTS.parent), os.environ.get("PYTHONPATH")])
-)
+os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
 
 # No test asserts a time, and a failure is the same in every run.
 settings.register_profile("tests", deadline=None, derandomize=True, max_examples=40)
@@ -73,6 +70,8 @@ def _interpreter() -> Iterator[subprocess.Popen]:
         text=True,
         encoding="utf-8",
     )
+    package = process.stdout.readline().strip()
+    assert Path(package).is_relative_to(ROOT), f"{package} is run, and not the tree"
     yield process
     process.stdin.close()
     process.wait(timeout=30)
@@ -101,13 +100,14 @@ def run_interpreted(tmp_path, _interpreter) -> Callable[..., Result]:
 
 
 @pytest.fixture
-def state_interpreted(tmp_path, _interpreter) -> Callable[[str], dict[str, np.ndarray]]:
-    """The exact state at the end of a script, interpreted."""
+def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndarray]]:
+    """``state_interpreted(script, *columns)``: the exact state at the end, or columns of it."""
 
-    def run(script: str) -> dict[str, np.ndarray]:
+    def run(script: str, *columns: str) -> dict[str, np.ndarray]:
         path = _prepared(tmp_path, script)
         file = str(tmp_path / "state.npz")
         request = {"folder": str(tmp_path), "arguments": [str(path)], "state": file}
+        request["columns"] = columns
         answer = _ask(_interpreter, request)
         assert answer["status"] == 0, answer["err"]
         with np.load(file) as arrays:

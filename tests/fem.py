@@ -1,7 +1,8 @@
 """A small finite element program: an independent witness where no exact solution is known.
 
 Total Lagrangian bricks (quadrilaterals in plane strain) with full integration, the neo-Hookean law
-of tests/exact.py, lumped masses, explicit central differences. It shares no code with the package.
+of comparisons/exact.py, lumped masses, explicit central differences. It shares no code with the
+package.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from collections.abc import Callable
 from itertools import product
 
 import numpy as np
-from exact import first_piola_kirchhoff, lame
+
+from comparisons.exact import first_piola_kirchhoff, lame
 
 
 def falling(

@@ -37,9 +37,10 @@ def block(
 ) -> str:
     """A block of `size` with its lower corner at 0.3 in a domain of side 1.2, and more `lines`.
 
-    E = 100, nu = 0.3, rho = 2; cells of 0.1 with `ppc` points per direction.
+    E = 100, nu = 0.3, rho = 2; cells of 0.1 with `ppc` points per direction. In 3D the domain ends
+    0.4 from the block: interpreted steps go through every node near it.
     """
-    domain = ", ".join(["0, 1.2"] * d)
+    domain = ", ".join(f"0, {0.7 + size[k]:g}" if d == 3 else "0, 1.2" for k in range(d))
     extent = ", ".join(f"0.3, {0.3 + size[k]}" for k in range(d))
     head = [
         f"method(ulmpm, {TRANSFERS[transfer]})",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,12 @@ def final_hub(script: Path, threads: int | None = None) -> Hub:
     hub.interpreter = Interpreter(hub)
     hub.interpreter.run_file(str(script))
     return hub
+
+
+def final_columns(script: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Columns of all points by id, in full precision."""
+    hub = final_hub(script)
+    return {name: hub.fields.particle(name) for name in names}
 
 
 def final_state(script: Path, threads: int | None = None) -> dict[str, np.ndarray]:

@@ -42,9 +42,10 @@ run_time({time})
 """.replace("sin(PI*x0/(2*25)))", "sin(PI*x0/(2*25))" + no_motion + ")")
 
 
-@pytest.mark.parametrize("d, law", [(1, "linear"), (2, "linear"), (1, "neo-hookean")])
+@pytest.mark.parametrize("d, law", [(2, "linear"), (1, "neo-hookean")])
+@pytest.mark.xdist_group("bar")
 def test_flip_holds_frequency_and_energy(run_script, d, law):
-    """Ten periods with 25 cells.
+    """Ten periods with 25 cells; comparisons/vibrating_bar.py has the linear bar in 1D.
 
     Frequency within 0.5 %: dispersion of linear elements with wave number k is (k h)^2 / 24 = 2e-4,
     the strains of 0.6 % add as much. Stress and velocity follow each other as in symplectic Euler,

@@ -36,6 +36,7 @@ def test_scenes_run(name, run_interpreted):
     assert result.log.Step[-1] == 3
 
 
+@pytest.mark.xdist_group("disks")
 def test_what_is_said(capsys, monkeypatch):
     monkeypatch.setattr(measure, "bandwidth", lambda threads: 1e9)
     assert main(["bench", "disks-20", "--seconds", "0.01"]) == 0
@@ -51,6 +52,7 @@ def test_what_is_said(capsys, monkeypatch):
     assert "another machine" in out
 
 
+@pytest.mark.xdist_group("disks")
 def test_another_size(capsys, monkeypatch):
     """Published numbers are not compared with another scene."""
     monkeypatch.setattr(measure, "bandwidth", lambda threads: 1e9)

@@ -23,7 +23,20 @@ def found(run_script, name: str, full: bool) -> list[Row]:
     return rows
 
 
-@pytest.mark.parametrize("name", [name for name in scenes() if scene(name).SMALL is not None])
+# Scenes that share compiled loops with each other or with other tests.
+SHARED = {
+    "two_disks": "disks", "axis_aligned": "neo-hookean", "vibrating_bar": "bar",
+    "incline": "contact", "collapse": "soil", "slump": "soil",
+    "dam_break": "water", "dam_ritter": "water",
+}  # fmt: skip
+SMALL = [
+    pytest.param(name, marks=pytest.mark.xdist_group(SHARED.get(name, name)))
+    for name in scenes()
+    if scene(name).SMALL is not None
+]
+
+
+@pytest.mark.parametrize("name", SMALL)
 def test_scene(run_script, name):
     """Each row says what is allowed."""
     rows = found(run_script, name, full=False)

@@ -204,23 +204,23 @@ def test_groups_of_nodes_belong_to_solids(run_interpreted):
     assert (log.ContactForce_base_x == 0).all()
 
 
-def incline(mu: str, h: float = 0.05) -> str:
+def incline(mu: float) -> str:
     """A disk (R 0.4) on a base that is held; gravity leans by 30 degrees."""
     return f"""
         method(ulmpm/contacts, FLIP, linear, 1)
-        dimension(2, 0, 3, -0.2, 1.2, {h})
+        dimension(2, 0, 3, -0.2, 1.2, 0.05)
         theta = PI/6
         region(r, cylinder, 0.8, 0.4, 0.4)
         region(b, block, 0, 3, -0.2, 0)
         material(m, neo-hookean, 1, 1e4, 0.3)
-        solid(disk, region, r, 2, m, {h}, 0)
-        solid(base, region, b, 2, m, {h}, 0)
+        solid(disk, region, r, 2, m, 0.05, 0)
+        solid(base, region, b, 2, m, 0.05, 0)
         region(low, block, INF, INF, INF, 0.3)
         group(hold, nodes, region, low, solid, base)
         group(p, particles, region, r, solid, disk)
         fix(g, body_force, all, 10*sin(theta), -10*cos(theta))
         fix(hold, velocity_nodes, hold, 0, 0)
-        {f"fix(rub, contact/friction, disk, base, {mu})" if mu else ""}
+        fix(rub, contact/friction, disk, base, {mu})
         compute(v, average_velocity, p)
         log_modify(custom, step, time, v_x, ContactForce_disk_y)
         set_output(5)
@@ -229,36 +229,21 @@ def incline(mu: str, h: float = 0.05) -> str:
     """
 
 
-@pytest.mark.parametrize("mu, share", [("", 0.5), ("0.1", 0.5 - 0.1 * 3**0.5 / 2)])
-def test_disk_slides_down_an_incline(run_script, mu, share):
-    """Bardenhagen, Brackbill & Sulsky 2000: g (sin - mu cos)."""
-    log = run_script(incline(mu)).log
+@pytest.mark.xdist_group("contact")
+def test_contact_carries_the_weight_of_a_sliding_disk(run_script):
+    """The force across the incline is m g cos. How fast the disk slides, comparisons/incline.py."""
+    log = run_script(incline(0.1)).log
     late = log.Time > 0.1
-    a = np.polyfit(log.Time[late], log.v_x[late], 1)[0]
-    assert a == pytest.approx(10 * share, rel=0.01)
+    assert log.v_x[-1] > 0.1
     weight = np.pi * 0.4**2 * 10 * 3**0.5 / 2
     assert log.ContactForce_disk_y[late].mean() == pytest.approx(weight, rel=0.03)
 
 
-@pytest.mark.full
-def test_disk_rolls_down_an_incline(run_script):
-    """(2/3) g sin in the limit. Contact is felt before surfaces meet, which brakes the rolling.
-
-    What the leading side meets up to a cell above the base is stopped there: with 8 cells in the
-    radius half of the acceleration is lost, with 16 a fifth.
-    """
-    shares = []
-    for h in (0.05, 0.025):
-        log = run_script(incline("0.5", h)).log
-        late = log.Time > 0.1
-        shares.append(np.polyfit(log.Time[late], log.v_x[late], 1)[0] / (10 / 3))
-    assert 0.4 < shares[0] < 0.7 < shares[1] < 1
-
-
+@pytest.mark.xdist_group("contact")
 def test_one_thread_or_two(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "in.script"
-    script = incline("0.5").replace("run_time(0.4)", "run(60)")
+    script = incline(0.5).replace("run_time(0.4)", "run(60)")
     path.write_text(dedent(script), encoding="utf-8")
     assert same_bits(final_state(path, 1), final_state(path, 2))
 

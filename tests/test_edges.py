@@ -70,8 +70,8 @@ def test_prescribed_velocity_is_not_asked_for_a_time_before_the_start(run_interp
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("top", [1.075, 0.9, 1.4665])
 def test_points_on_a_wall_are_in_the_domain(run_interpreted, top, precision):
-    """A domain may end on a point, whatever the rounding of its place."""
-    run_interpreted(
+    """A domain may end on a point, whatever the rounding of its place; none is missing."""
+    result = run_interpreted(
         f"""
         method(ulmpm, FLIP, linear, 1)
         precision({precision})
@@ -79,9 +79,13 @@ def test_points_on_a_wall_are_in_the_domain(run_interpreted, top, precision):
         region(all, block, 0, {top})
         material(m, linear, 1, 1, 0)
         solid(s, region, all, 2, m, {H}, 0)
+        dump(d, all, particle, 3, d.*.LAMMPS, x)
         run(3)
         """
     )
+    x = result.dump("d.3.LAMMPS").x
+    assert x == pytest.approx(0.025 + 0.05 * np.arange(len(x)), abs=1e-6)
+    assert top - 0.05 < x[-1] < top + 1e-6
 
 
 def test_usl_keeps_the_two_disks_together(run_script):

@@ -95,10 +95,12 @@ def test_a_step_that_comes_to_lie_above_the_limit(run_interpreted):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to one process")
+@pytest.mark.xdist_group("neo-hookean")
 def test_an_interrupted_run_is_whole(tmp_path):
     """Ctrl-C: exit status 130, the log and the dumps whole (uncompiled or not alike)."""
     script = block(2, "set_dt(0.001)", "set_output(10)", "log_modify(custom, step, time)",
-                   "dump(d, all, particle, 10, d.*.LAMMPS, x)", "run(100000000)")  # fmt: skip
+                   "dump(d, all, particle, 10, d.*.LAMMPS, x)", "run(100000000)",
+                   law="neo-hookean")  # fmt: skip
     (tmp_path / "in.script").write_text(script, encoding="utf-8")
     process = subprocess.Popen(
         [sys.executable, "-m", "karamelo_py.app.cli", "in.script"],

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fakes_scene import FakeArgument, FakeHub
+from hubs import SmallHub, arguments
 
 from karamelo_py.commands.solids import group
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
@@ -19,7 +19,7 @@ from karamelo_py.styles.regions.difference import Difference
 
 def scene():
     """Two squares of 4 x 4 points each in a unit square with cells of 0.1."""
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     hub.solid("s1", hub.region("r1", Block, 0, 0.2, 0, 0.2))
     hub.solid("s2", hub.region("r2", Block, 0.5, 0.7, 0.5, 0.7))
     return hub
@@ -58,7 +58,7 @@ def test_an_id_again_adds_members():
 
 def test_nodes_by_position():
     """A disc of radius 0.2, h = 0.05, centred on a node holds 49 nodes (reference, section 4.5)."""
-    hub = FakeHub(2, -0.5, 0.5, 0.05)
+    hub = SmallHub(2, -0.5, 0.5, 0.05)
     group(hub, "g", "nodes", "region", hub.region("d", Cylinder, 0.1, -0.1, 0.2), "all")
     assert len(hub.groups["g"]) == 49
 
@@ -66,7 +66,7 @@ def test_nodes_by_position():
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 @pytest.mark.parametrize("exterior", [(), ("exterior",)])
 def test_nodes_in_a_box_are_all_nodes_in_it(dimension, exterior):
-    hub = FakeHub(dimension, 0, 1, 0.15)
+    hub = SmallHub(dimension, 0, 1, 0.15)
     region = hub.region("r", Block, *[0.3, 0.75] * dimension, *exterior)
     group(hub, "g", "nodes", "region", region, "all")
     want = np.flatnonzero(region.inside(hub.lattices[0].positions()))
@@ -75,13 +75,13 @@ def test_nodes_in_a_box_are_all_nodes_in_it(dimension, exterior):
 
 
 def test_open_ends_take_in_the_nodes_beyond_the_domain():
-    hub = FakeHub(2, 0, 1, 0.3)  # the grid reaches to 1.2
+    hub = SmallHub(2, 0, 1, 0.3)  # the grid reaches to 1.2
     group(hub, "g", "nodes", "region", hub.region("r", Block, 0, 0, "INF", "INF"), "all")
     np.testing.assert_array_equal(hub.groups["g"].nodes, np.arange(5))
 
 
 def test_nodes_far_away_are_none():
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     for k, bounds in enumerate([(3, 4, 0, 1), (-5, -4, 0, 1), (0.01, 0.02, 0, 1)]):
         group(hub, f"g{k}", "nodes", "region", hub.region(f"r{k}", Block, *bounds), "all")
         assert len(hub.groups[f"g{k}"]) == 0
@@ -90,9 +90,9 @@ def test_nodes_far_away_are_none():
 
 def test_all_is_everything_also_later():
     hub = scene()
-    points = ParticleGroup.from_script(hub, FakeArgument("all"))
-    nodes = NodeGroup.from_script(hub, FakeArgument("all"))
-    assert points.all and nodes.all and AnyGroup.from_script(hub, FakeArgument("all")).all
+    points = ParticleGroup.from_script(hub, arguments("all")[0])
+    nodes = NodeGroup.from_script(hub, arguments("all")[0])
+    assert points.all and nodes.all and AnyGroup.from_script(hub, arguments("all")[0]).all
     assert len(nodes.nodes) == 121
     assert len(points.ids) == 32
     hub.solid("s3", hub.region("r3", Block, 0.8, 0.9, 0.8, 0.9))
@@ -108,7 +108,7 @@ def test_points_made_later_do_not_join():
 
 @pytest.mark.parametrize("method", [TLMPM, ULMPMContacts])
 def test_nodes_of_grids_made_later_join(method):
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     hub.use(method, Linear())
     r1 = hub.region("r1", Block, 0, 0.2, 0, 0.2)
     r2 = hub.region("r2", Block, 0.5, 0.7, 0.5, 0.7)
@@ -125,7 +125,7 @@ def test_nodes_of_grids_made_later_join(method):
 
 def test_nodes_of_the_grid_of_a_method_that_comes_later():
     """Functions with nodes in the middle of cells number the nodes in their own way."""
-    hub = FakeHub(1, 0, 1, 0.25)
+    hub = SmallHub(1, 0, 1, 0.25)
     hub.update.method = None
     group(hub, "g", "nodes", "region", hub.region("r", Block, 0.5, 1), "all")
     np.testing.assert_array_equal(hub.groups["g"].nodes, [2, 3, 4])
@@ -137,19 +137,19 @@ def test_groups_by_name():
     hub = scene()
     group(hub, "p", "particles", "region", hub.regions["r1"], "all")
     group(hub, "n", "nodes", "region", hub.regions["r1"], "all")
-    assert ParticleGroup.from_script(hub, FakeArgument("p")) is hub.groups["p"]
-    assert AnyGroup.from_script(hub, FakeArgument("n")) is hub.groups["n"]
+    assert ParticleGroup.from_script(hub, arguments("p")[0]) is hub.groups["p"]
+    assert AnyGroup.from_script(hub, arguments("n")[0]) is hub.groups["n"]
     with pytest.raises(ScriptError) as caught:
-        NodeGroup.from_script(hub, FakeArgument("p"))
+        NodeGroup.from_script(hub, arguments("p")[0])
     assert "group 'p' is a group of particles" in str(caught.value)
     assert "a group of nodes" in caught.value.expected
     with pytest.raises(ScriptError) as caught:
-        AnyGroup.from_script(hub, FakeArgument("q", 2))
+        AnyGroup.from_script(hub, arguments("q")[0])
     assert caught.value.place.column == 3
 
 
 def test_empty_groups_are_warned_about():
-    hub = FakeHub()
+    hub = SmallHub()
     group(hub, "g", "particles", "region", hub.region("r", Block, 0, 1, 0, 1), "all")
     assert "holds no particles" in hub.warnings[0]
 

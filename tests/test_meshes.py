@@ -7,7 +7,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from fakes_scene import DENSITY, FakeHub
+from hubs import DENSITY, SmallHub
 from meshed import CUTS, grid_mesh, write
 from test_scene_script import message
 
@@ -33,7 +33,7 @@ Mesh.MeshSizeMax = 0.1;
 
 
 def solid_of(path, dimension, h=0.25, lo=-1.0, hi=2.0, **options):
-    hub = FakeHub(dimension, lo, hi, h)
+    hub = SmallHub(dimension, lo, hi, h)
     return hub, MeshSolid(hub, path, hub.materials["steel"], h, **options)
 
 
@@ -112,7 +112,7 @@ def test_axisymmetric_volumes_are_those_of_rings(tmp_path):
     """Per radian a square of side 1 at x = 0.5 to 1.5 has (1.5^2 - 0.5^2) / 2 = 1."""
     nodes, cells = grid_mesh("triangle", (3, 5))
     path = write(tmp_path / "m.vtu", nodes + [0.5, 0, 0], {"triangle": cells})
-    hub = FakeHub(2, 0, 2, 0.25)
+    hub = SmallHub(2, 0, 2, 0.25)
     hub.domain.axisymmetric = True
     solid = MeshSolid(hub, path, hub.materials["steel"], 0.25)
     assert math.isclose(solid.volume0.sum(), 1, rel_tol=1e-14)
@@ -234,7 +234,7 @@ def test_a_geometry_and_its_groups(plate, name, capfd):
 
 
 def test_groups_are_regions(plate):
-    hub = FakeHub(2, 0, 1, 0.01)
+    hub = SmallHub(2, 0, 1, 0.01)
     core = MeshRegion(hub, plate / "plate4.1.msh", "core")
     rest = MeshRegion(hub, plate / "plate4.1.msh", "rest")
     x = np.random.default_rng(0).random((20_000, 2))
@@ -260,7 +260,7 @@ def test_a_boundary_holds_the_nodes_on_it(tmp_path):
                    "gmsh:geometrical": [np.array([1, 1]), np.array([1])]},
     )  # fmt: skip
     meshio.write(tmp_path / "m.msh", mesh, file_format="gmsh22", binary=False)
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     edge = MeshRegion(hub, tmp_path / "m.msh", 7)
     nodes = hub.lattices[0].positions()[:, :2]
     want = (nodes[:, 1] == 0) | np.isclose(nodes[:, 0], 1)
@@ -277,7 +277,7 @@ def test_inside_of_meshes(cell, tmp_path):
     move = affine(dimension)
     nodes, cells = grid_mesh(cell, COUNTS[dimension], move)
     path = write(tmp_path / "m.vtu", nodes, {cell: cells})
-    hub = FakeHub(dimension, -3, 3, 0.25)
+    hub = SmallHub(dimension, -3, 3, 0.25)
     region = MeshRegion(hub, path)
     rng = np.random.default_rng(1)
     natural = rng.random((5000, dimension)) * 1.4 - 0.2
@@ -294,7 +294,7 @@ def test_warped_hexahedra_leave_no_gaps(tmp_path):
     nodes, cells = grid_mesh("hexahedron", (4, 4, 4))
     inner = ((nodes > 0) & (nodes < 1)).all(axis=1)
     nodes[inner] += rng.uniform(-0.05, 0.05, (inner.sum(), 3))
-    hub = FakeHub(3, 0, 1, 0.1)
+    hub = SmallHub(3, 0, 1, 0.1)
     region = MeshRegion(hub, write(tmp_path / "m.vtu", nodes, {"hexahedron": cells}))
     assert region.inside(rng.random((20_000, 3))).all()
     _, volume, _ = measured(elements_of(read(tmp_path / "m.vtu", 3), 3)[0])
@@ -304,7 +304,7 @@ def test_warped_hexahedra_leave_no_gaps(tmp_path):
 def test_a_quadrilateral_with_a_reflex_corner(tmp_path):
     kite = np.array([[0, 0, 0], [1, 0, 0], [0.45, 0.45, 0], [0, 1, 0]])
     path = write(tmp_path / "m.vtu", kite, {"quad": [[1, 2, 3, 0]]})
-    region = MeshRegion(FakeHub(2, 0, 1, 0.1), path)
+    region = MeshRegion(SmallHub(2, 0, 1, 0.1), path)
     x = np.array([[0.4, 0.4], [0.6, 0.1], [0.1, 0.6], [0.49, 0.49], [0.75, 0.22]])
     np.testing.assert_array_equal(region.inside(x), [True, True, True, False, False])
 

@@ -1,7 +1,7 @@
 """Domain, regions, solids and groups as a script makes them, and what it gets wrong."""
 
 import pytest
-from fakes_scene import FakeHub
+from hubs import SmallHub
 
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.language.signature import describe
@@ -20,7 +20,7 @@ region(left, block, -0.5, 0, INF, +INF)
 
 
 def run(text, hub=None):
-    hub = hub or FakeHub(dimension=0)
+    hub = hub or SmallHub(dimension=0)
     Interpreter(hub).run_text(text)
     return hub
 

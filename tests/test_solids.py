@@ -5,7 +5,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from fakes_scene import DENSITY, FakeHub
+from hubs import DENSITY, SmallHub
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -51,7 +51,7 @@ def karamelo_points(region, domain, ppc, dimension):
 
 def test_two_disks_have_208_points_each():
     """Karamelo's count for the 2020 paper's example (reference, section 4.5)."""
-    hub = FakeHub(2, -0.5, 0.5, 0.05)
+    hub = SmallHub(2, -0.5, 0.5, 0.05)
     for number, centre in enumerate((-0.3, 0.3), start=1):
         solid = hub.solid(f"s{number}", hub.region(f"d{number}", Cylinder, centre, centre, 0.2))
         assert solid.count == 208
@@ -61,7 +61,7 @@ def test_two_disks_have_208_points_each():
 
 def test_first_point_of_karamelos_dump():
     """Reference, section 4.1: (-0.4525, -0.4025), after moving by 0.01 in both directions."""
-    hub = FakeHub(2, -0.5, 0.5, 0.05)
+    hub = SmallHub(2, -0.5, 0.5, 0.05)
     solid = hub.solid("s", hub.region("d", Cylinder, -0.3, -0.3, 0.2))
     np.testing.assert_allclose(solid.x0[0] + 0.01, [-0.4525, -0.4025])
 
@@ -69,7 +69,7 @@ def test_first_point_of_karamelos_dump():
 @pytest.mark.parametrize("ppc", [1, 2, 3, 4, 5])
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_places_and_order(dimension, ppc):
-    hub = FakeHub(dimension, 0.1, 0.75, 0.2)  # 4 cells a side, the last one cut by the domain
+    hub = SmallHub(dimension, 0.1, 0.75, 0.2)  # 4 cells a side, the last one cut by the domain
     ball = hub.region("r", Sphere, *[0.45] * dimension, 0.28)
     solid = hub.solid("s", ball, ppc=ppc)
     want = karamelo_points(ball, hub.domain, ppc, dimension)
@@ -90,7 +90,7 @@ def test_order_within_a_cell():
 
 def test_points_do_not_depend_on_chunks(monkeypatch):
     def points():
-        hub = FakeHub(3, 0, 1, 0.1)
+        hub = SmallHub(3, 0, 1, 0.1)
         return hub.solid("s", hub.region("r", Sphere, 0.5, 0.5, 0.5, 0.4)).x0
 
     whole_at_once = points()
@@ -99,7 +99,7 @@ def test_points_do_not_depend_on_chunks(monkeypatch):
 
 
 def test_volume_and_mass():
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     solid = hub.solid("s", whole(hub), ppc=3, T0=293.0)
     assert solid.count == 900
     assert solid.T0 == 293.0
@@ -110,7 +110,7 @@ def test_volume_and_mass():
 
 @given(st.floats(0.3, 1.0), st.floats(0.02, 0.2), st.integers(1, 4))
 def test_a_region_of_any_size_is_filled_to_within_a_layer_of_points(width, h, ppc):
-    hub = FakeHub(1, 0.0, 1.0, h)
+    hub = SmallHub(1, 0.0, 1.0, h)
     solid = hub.solid("s", hub.region("r", Block, 0, width), ppc=ppc)
     gap = 0.3873 * h if ppc == 3 else h / ppc
     assert abs(solid.volume0.sum() - width) <= 2 * gap
@@ -118,7 +118,7 @@ def test_a_region_of_any_size_is_filled_to_within_a_layer_of_points(width, h, pp
 
 
 def test_exterior_fills_the_rest_of_the_domain():
-    hub = FakeHub(2, 0, 1, 0.05)
+    hub = SmallHub(2, 0, 1, 0.05)
     hole = hub.region("hole", Cylinder, 0.5, 0.5, 0.2)
     rest = hub.region("rest", Cylinder, 0.5, 0.5, 0.2, "exterior")
     inner, outer = hub.solid("a", hole), hub.solid("b", rest)
@@ -127,7 +127,7 @@ def test_exterior_fills_the_rest_of_the_domain():
 
 
 def test_points_outside_the_domain_are_left_out_with_a_warning():
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     solid = hub.solid("s", hub.region("r", Block, 0.8, 1.2, -0.2, 0.2))
     assert solid.count == 16
     assert solid.x0.max() < 1
@@ -135,21 +135,21 @@ def test_points_outside_the_domain_are_left_out_with_a_warning():
 
 
 def test_a_huge_region_is_not_walked_through():
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     solid = hub.solid("s", hub.region("r", Block, -1e15, 1e15, -1e15, 1e15))
     assert solid.count == 400
     assert hub.warnings == ["points of region 'r' outside the domain left out of the solid"]
 
 
 def test_a_domain_that_is_no_multiple_of_h_loses_no_points_silently():
-    hub = FakeHub(2, 0, 1, 0.3)
+    hub = SmallHub(2, 0, 1, 0.3)
     solid = hub.solid("s", whole(hub), ppc=2)
     assert solid.x0.max() <= 1
     assert not hub.warnings
 
 
 def test_open_ends_of_a_part_do_not_warn():
-    hub = FakeHub(2, 0, 1, 0.3)
+    hub = SmallHub(2, 0, 1, 0.3)
     strip = hub.region("strip", Block, "INF", "INF", 0, 0.3)
     ball = hub.region("ball", Sphere, 0.5, 0.5, 0.1)
     hub.solid("s", hub.combine("u", Union, strip, ball))
@@ -167,7 +167,7 @@ def test_open_ends_of_a_part_do_not_warn():
     ],
 )
 def test_wrong_solids(region, options, says, argument):
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     with pytest.raises(ScriptError) as caught:
         hub.solid("s", hub.region("r", Block, *region), **options)
     assert says in str(caught.value)
@@ -175,12 +175,12 @@ def test_wrong_solids(region, options, says, argument):
 
 
 def test_a_solid_needs_a_method_and_a_domain():
-    hub = FakeHub()
+    hub = SmallHub()
     hub.update.method = None
     with pytest.raises(ScriptError) as caught:
         commands.solid(hub, "s", "region")
     assert "method(" in caught.value.expected
-    hub = FakeHub(dimension=0)
+    hub = SmallHub(dimension=0)
     with pytest.raises(ScriptError, match="no domain"):
         commands.solid(hub, "s", "region")
 
@@ -188,13 +188,13 @@ def test_a_solid_needs_a_method_and_a_domain():
 @pytest.mark.parametrize("kind", ["file", "regoin"])
 def test_other_kinds_of_solids(kind):
     with pytest.raises(ScriptError, match="unknown solid style") as caught:
-        commands.solid(FakeHub(), "s", kind)
+        commands.solid(SmallHub(), "s", kind)
     assert caught.value.expected == "one of mesh, region"
 
 
 def test_gauss_points_carry_the_weights_of_the_quadrature():
     """Legendre points of order 3: +-sqrt(3/5) and 0 with weights 5/18, 8/18, 5/18."""
-    hub = FakeHub(2, 0, 1, 0.5)
+    hub = SmallHub(2, 0, 1, 0.5)
     solid = hub.solid("s", whole(hub), ppc=3, points="gauss")
     assert math.isclose(solid.volume0.sum(), 1, rel_tol=1e-14)
     place = 0.25 * math.sqrt(0.6)
@@ -207,9 +207,9 @@ def test_gauss_points_carry_the_weights_of_the_quadrature():
 
 
 def test_gauss_points_at_the_edge_of_a_region_keep_their_own_weights():
-    hub = FakeHub(2, 0, 1, 0.5)
+    hub = SmallHub(2, 0, 1, 0.5)
     solid = hub.solid("s", hub.region("r", Block, 0, 0.3, 0, 1), ppc=3, points="gauss")
-    full = FakeHub(2, 0, 1, 0.5)
+    full = SmallHub(2, 0, 1, 0.5)
     every = full.solid("s", whole(full), ppc=3, points="gauss")
     kept = every.x0[:, 0] < 0.3
     np.testing.assert_array_equal(solid.x0, every.x0[kept])
@@ -218,7 +218,7 @@ def test_gauss_points_at_the_edge_of_a_region_keep_their_own_weights():
 
 def test_three_points_are_those_of_karamelo_unless_said_otherwise():
     """Reference, section 3.2: offsets 0.3873 h with equal volumes."""
-    hub = FakeHub(1, 0, 1, 1)
+    hub = SmallHub(1, 0, 1, 1)
     solid = hub.solid("s", whole(hub), ppc=3)
     np.testing.assert_allclose(solid.x0[:, 0], [0.1127, 0.5, 0.8873])
     np.testing.assert_allclose(solid.volume0, 1 / 3)
@@ -228,7 +228,7 @@ def test_three_points_are_those_of_karamelo_unless_said_otherwise():
 
 @pytest.mark.parametrize("method, basis", [(Method, UGIMP()), (ULCPDI, R4())])
 def test_three_points_with_domains_stand_so_that_these_tile_the_cell(method, basis):
-    hub = FakeHub(2, 0, 1, 1)
+    hub = SmallHub(2, 0, 1, 1)
     hub.use(method, basis)
     solid = hub.solid("s", whole(hub), ppc=3)
     np.testing.assert_allclose(np.unique(solid.x0), [1 / 6, 1 / 2, 5 / 6])
@@ -236,7 +236,7 @@ def test_three_points_with_domains_stand_so_that_these_tile_the_cell(method, bas
 
 
 def test_domains_of_points_are_boxes():
-    hub = FakeHub(3, 0, 1, 0.1)
+    hub = SmallHub(3, 0, 1, 0.1)
     solid = hub.solid("s", hub.region("r", Block, 0.2, 0.61, 0.3, 2, "INF", 0.5))
     assert solid.shape == "box" and solid.corners is None
     assert solid.half_size.shape == (solid.count, 3)
@@ -247,12 +247,12 @@ def test_domains_of_points_are_boxes():
 
 def test_axisymmetric_volumes_are_times_the_radius():
     """Per radian, from x = 0 to 1 and y = 0 to 1: 1/2, by the midpoint rule exactly."""
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     hub.domain.axisymmetric = True
     solid = hub.solid("s", whole(hub))
     np.testing.assert_allclose(solid.volume0, 0.05**2 * solid.x0[:, 0])
     assert math.isclose(solid.mass.sum(), DENSITY / 2)
-    hub = FakeHub(2, -1, 1, 0.1)
+    hub = SmallHub(2, -1, 1, 0.1)
     hub.domain.axisymmetric = True
     with pytest.raises(ScriptError, match="x is the radius") as caught:
         hub.solid("s", whole(hub))
@@ -268,7 +268,7 @@ def own_grids(hub, **attributes):
 
 def test_a_grid_of_its_own_begins_at_the_lower_corner_of_the_solid():
     """Reference, sections 3.1, 4.5: region 0.3..0.65 x 0.3..0.5, points up to x = 0.625."""
-    hub = own_grids(FakeHub(2, 0, 1, 0.25))
+    hub = own_grids(SmallHub(2, 0, 1, 0.25))
     solid = hub.solid("s", hub.region("r", Block, 0.3, 0.65, 0.3, 0.5), h=0.1)
     assert solid.h == 0.1 and hub.domain.h == 0.25
     np.testing.assert_allclose(solid.x0[0], [0.325, 0.325])
@@ -279,7 +279,7 @@ def test_a_grid_of_its_own_begins_at_the_lower_corner_of_the_solid():
 
 
 def test_a_grid_of_its_own_ends_at_the_domain():
-    hub = own_grids(FakeHub(2, 0, 1, 0.25))
+    hub = own_grids(SmallHub(2, 0, 1, 0.25))
     strip = hub.region("strip", Block, "INF", "INF", 0.5, 1.3)
     solid = hub.solid("s", strip, h=0.1, ppc=1)
     np.testing.assert_allclose(solid.x0[0], [0.05, 0.55])
@@ -289,7 +289,7 @@ def test_a_grid_of_its_own_ends_at_the_domain():
 
 
 def test_glue():
-    hub = FakeHub(2, 0, 1, 0.1)
+    hub = SmallHub(2, 0, 1, 0.1)
     first = hub.solid("a", hub.region("l", Block, 0, 0.5, 0, 1))
     assert first.glued_to is None
     second = hub.solid("b", hub.region("r", Block, 0.5, 1, 0, 1), GlueToSolid=first)
@@ -301,7 +301,7 @@ def test_glue():
 
 
 def test_placing_a_million_points_is_quick_and_lean():
-    hub = FakeHub(2, 0, 1, 1 / 500)
+    hub = SmallHub(2, 0, 1, 1 / 500)
     region = whole(hub)
     tracemalloc.start()
     solid = hub.solid("s", region)

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from fakes_scene import FakeHub
+from hubs import SmallHub
 from meshed import cube_surface, enclosed_volume, sphere_surface, write
 from test_scene_script import message
 
@@ -27,7 +27,7 @@ def stl(request, tmp_path):
 
 def test_a_cube(stl):
     """Nodes on its faces belong to it; the body fills exactly its volume."""
-    hub = FakeHub(3, -0.5, 1.5, 0.1)
+    hub = SmallHub(3, -0.5, 1.5, 0.1)
     region = STL(hub, stl(*cube_surface(0.1, 0.9)))
     nodes = hub.lattices[0].positions()
     want = ((nodes > 0.1 - 1e-6) & (nodes < 0.9 + 1e-6)).all(axis=1)
@@ -41,7 +41,7 @@ def test_a_cube(stl):
 def test_a_sphere(stl):
     """The volume of the polyhedron, by the divergence theorem, to within the lattice of points."""
     points, triangles = sphere_surface(0.4, 24, 12, (0.05, 0, 0))
-    hub = FakeHub(3, -0.5, 0.5, 0.04)
+    hub = SmallHub(3, -0.5, 0.5, 0.04)
     solid = hub.solid("s", STL(hub, stl(points, triangles)))
     assert math.isclose(solid.volume0.sum(), enclosed_volume(points, triangles), rel_tol=5e-3)
     assert not hub.warnings
@@ -122,4 +122,4 @@ def test_what_is_no_surface(tmp_path, monkeypatch):
     with pytest.raises(ScriptError, match="not exist"):
         from karamelo_py.language.interpreter import Interpreter
 
-        Interpreter(FakeHub(3)).run_text("region(r, stl, bdy.stl)")
+        Interpreter(SmallHub(3)).run_text("region(r, stl, bdy.stl)")

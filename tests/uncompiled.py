@@ -1,7 +1,8 @@
 """Runs scripts without compiling anything: the same Python sources, interpreted.
 
-Started by the fixture `interpreted` as a process of its own (``NUMBA_DISABLE_JIT=1`` must be set
-before Numba is imported). Reads one JSON request a line, answers with one JSON line.
+Started by a fixture of conftest.py as a process of its own (``NUMBA_DISABLE_JIT=1`` must be set
+before Numba is imported). Tells where its package lies, then reads one JSON request a line and
+answers with one JSON line.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ import warnings
 
 
 def save_state(request: dict) -> int:
-    """Run a script and save its final state; a failure is told, not raised."""
+    """Run a script and save its final state or columns; a failure is told, not raised."""
     import numpy as np
-    from states import final_state
+    from states import final_columns, final_state
 
+    script, columns = request["arguments"][0], request["columns"]
     try:
-        np.savez(request["state"], **final_state(request["arguments"][0]))
+        arrays = final_columns(script, columns) if columns else final_state(script)
+        np.savez(request["state"], **arrays)
     except Exception:
         traceback.print_exc()
         return 1
@@ -31,8 +34,11 @@ def save_state(request: dict) -> int:
 def main() -> None:
     """Serve requests until the input ends."""
     requests, answers = sys.stdin, sys.stdout
+    import karamelo_py
     from karamelo_py.app.cli import main as command
 
+    # Which package it is: the first line.
+    print(karamelo_py.__file__, flush=True)
     # Interpreted arithmetic warns about what compiled kernels pass over in silence.
     warnings.simplefilter("ignore")
     for line in requests:

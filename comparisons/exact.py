@@ -11,13 +11,13 @@ by numerical differentiation, and holds the rest against independent numbers.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from math import atan, cos, pi, sin, sqrt, tan
 from pathlib import Path
 
 import numpy as np
-import pytest
+
+DATA = Path(__file__).parent / "data"
 
 # --- Manufactured solutions ------------------------------------------------------------------
 
@@ -271,32 +271,14 @@ def prandtl_load(cohesion: float) -> float:
     return (2 + pi) * cohesion
 
 
-# --- Curves of others, which lie beside the repository -----------------------------------------
-
-SHARED = Path(
-    os.environ.get("KARAMELO_PY_SHARED", Path(__file__).resolve().parent.parent.parent / "shared")
-)
-
-
-def shared_file(name: str) -> Path:
-    """A file of reference/data; the test is skipped where it is not."""
-    path = SHARED / "reference" / "data" / name
-    if not path.exists():
-        pytest.skip(f"no {path}: the curves of other programs are not part of the repository")
-    return path
+# --- Curves ------------------------------------------------------------------------------------
 
 
 def cantilever_curve() -> tuple[np.ndarray, np.ndarray]:
     """Time and tip deflection by finite elements (Sadeghirad et al. 2011), digitised."""
-    rows = np.loadtxt(shared_file("cantilever_2d_fem_sadeghirad.csv"), delimiter=",")
+    rows = np.loadtxt(DATA / "cantilever_fem_sadeghirad.csv", delimiter=",")
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
     return rows[:, 0], rows[:, 1]
-
-
-def vertical_bar_curve() -> tuple[np.ndarray, np.ndarray]:
-    """Time (s) and tip displacement (m) by finite elements; the file counts in 1000 s."""
-    rows = np.loadtxt(shared_file("vertical_bar_3d_fem.dat"), skiprows=1)
-    return rows[:, 0] * 1000, rows[:, 1]
 
 
 def minimum(time: np.ndarray, value: np.ndarray) -> tuple[float, float]:
