@@ -109,6 +109,10 @@ class Formula:
         """The formula that is nothing but a name."""
         return cls(_Term("name", (), name))
 
+    def minus(self, other: Formula) -> Formula:
+        """The formula of the difference."""
+        return Formula(_term("-", self._term, other._term))
+
     @property
     def names(self) -> frozenset[str]:
         return self._term.names
