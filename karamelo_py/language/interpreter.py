@@ -11,10 +11,10 @@ from typing import Any
 
 from karamelo_py.language import registry, signature
 from karamelo_py.script import expressions
-from karamelo_py.script.elsewhere import instead
+from karamelo_py.script.elsewhere import KARAMELO_COMMANDS, instead
 from karamelo_py.script.errors import Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
-from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
+from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.parser import parse, parse_expression, parse_text
 from karamelo_py.script.syntax import (
     Assignment,
@@ -219,6 +219,12 @@ class Interpreter:
             if isinstance(self.variables.get(name), str):
                 self.variables[name] = self._preset_value(name)
             return
+        if name not in self.variables and (name in FUNCTIONS or registry.knows("command", name)):
+            kind = "function" if name in FUNCTIONS else "command"
+            self._warn(
+                f"'{name}' is a {kind}, too; from here on it means the variable that is assigned "
+                f"here, and the {kind} cannot be called"
+            )
         if name in self.hub.values and name not in self.variables:
             self._warn(
                 f"'{name}' is a value of a fix or a compute; "
@@ -291,6 +297,8 @@ class Interpreter:
 
     def _call(self, statement: Call) -> None:
         name = statement.name
+        if self.hides(name):
+            raise self._unknown_call(name, statement.place, statement=True)
         if registry.knows("command", name):
             arguments = [signature.Argument(raw, self) for raw in statement.arguments]
             signature.call(registry.find("command", name), self.hub, arguments, name)
@@ -306,7 +314,7 @@ class Interpreter:
         name = node.name
         begin = raw.start + node.start
         place = raw.source.place(begin, begin + len(name))
-        if not registry.knows("command", name):
+        if not registry.knows("command", name) or self.hides(name):
             raise self._unknown_call(name, place, statement=False)
         target = registry.find("command", name)
         # What gives no value must not be carried out here, least of all a run.
@@ -370,6 +378,10 @@ class Interpreter:
             name in self.variables or name in SEEDS or name in CONSTANTS or name in self.hub.values
         )
 
+    def hides(self, name: str) -> bool:
+        """Whether a variable has the name of a function or command, which it hides then."""
+        return name in self.variables
+
     def name(self, name: str, node: Name, raw: Raw) -> Value:
         """What a name in an expression stands for."""
         if name in SEEDS:
@@ -408,6 +420,13 @@ class Interpreter:
         later = self._later(name)
         if later:
             return later(place)
+        if name == "i":
+            return ScriptError(
+                "'i' is the number of a point in Karamelo, which no formula knows here",
+                place=place,
+                expected="a formula of positions",
+                hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) scatters over 0 to 1 as well",
+            )
         published = [value for value in self.hub.values.names() if value not in SEEDS]
         known = [*self.variables, *published, *SEEDS, *CONSTANTS]
         by_style = self._values_by_style()
@@ -541,9 +560,9 @@ def _check_name(name: str) -> None:
         what = "a coordinate of points"
     elif name in WORDS or name == "quit":
         what = "a word of the language"
-    elif registry.knows("command", name):
+    elif registry.knows("command", name) and name in KARAMELO_COMMANDS:
         what = "a command"
-    elif name in FUNCTIONS:
+    elif name in RESERVED:
         what = "a function"
     else:
         return

@@ -9,6 +9,17 @@ _DOMAIN = "dimension(2, xlo, xhi, ylo, yhi, h) makes the domain and its grid"
 _VELOCITY = "fix(ID, initial_velocity_particles, group, vx, vy, vz) sets velocities"
 _NEEDLESS = "leave it out"
 
+# Commands of Karamelo, whose names its scripts cannot use for variables. Others are free.
+KARAMELO_COMMANDS = frozenset((
+    "anti_volumetric_locking", "axisymmetric", "compute", "create_domain", "damage",
+    "delete_compute", "delete_dump", "delete_fix", "delete_particles", "dimension", "dt_factor",
+    "dump", "eos", "evaluate", "external_force", "fix", "group", "include", "internal_force", "log",
+    "log_modify", "material", "method", "partition_domain", "plot",
+    "populate_cylindrical_coordinates", "print", "quit", "read_restart", "region", "restart", "run",
+    "run_time", "run_until", "run_while", "save_plot", "scheme", "set_dt", "set_output", "solid",
+    "strength", "temperature", "translate_particles", "value", "write_restart", "xcm",
+))  # fmt: skip
+
 # By family and name.
 INSTEAD = {
     "command": {

@@ -21,7 +21,7 @@ class Reaction(Compute):
 
     Example
     -------
-    compute(R, reaction, grips)
+    compute(R, reaction, all)
     log_modify(custom, time, R_x, R_y)
 
     Notes
