@@ -209,6 +209,40 @@ def test_static_column_under_traction(run_interpreted):
     assert log.s_11[1:].mean() == pytest.approx(-0.01, rel=0.1)
 
 
+@pytest.mark.full
+def test_indentation_after_hertz(run_script):
+    """A quarter of a block under a frictionless ball: 4/3 E* sqrt(R) delta^1.5, within 10 %.
+
+    Where the contact is three to four cells wide. With fewer the grid is too soft, later the block
+    of one side is: its foot is held, and five times the radius of contact away.
+    """
+    walls = [
+        line
+        for k, axis in enumerate("xyz")
+        for line in (
+            f"region({axis}0, block, " + ", ".join("INF, 0.001" if j == k else "INF, INF"
+                                                   for j in range(3)) + ")",
+            f"group(g{axis}, nodes, region, {axis}0, all)",
+            f"fix(s{axis}, velocity_nodes, g{axis}, "
+            + ", ".join("0" if j == k else "NULL" for j in range(3)) + ")",
+        )
+    ]  # fmt: skip
+    log = run_script(
+        "\n".join([
+            "method(ulmpm, FLIP, linear, 0.95)", "h = 0.0625",
+            "dimension(3, 0, 1.25, 0, 1.25, 0, 1.25, h)", "region(box, block, 0, 1, 0, 1, 0, 1)",
+            "material(m, neo-hookean, 1, 1000, 0.3)", "solid(body, region, box, 2, m, h, 0)",
+            *walls, "R = 2", "delta = time/24",
+            "fix(F, indent/minimize_penetration, all, sphere, R, 0, 0, 1 + R - delta, 0, 0, 0, 0)",
+            "hertz = 1000/(1 - 0.3^2)*R^0.5*delta^1.5/3", "set_output(40)",
+            "log_modify(custom, step, delta, F_z, hertz)", "run_time(0.72)",
+        ])
+    ).log  # fmt: skip
+    wide = (log.delta > 0.015) & (log.delta < 0.03)
+    assert wide.sum() > 5
+    assert -log.F_z[wide] == pytest.approx(log.hertz[wide], rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("line", "says"),
     [

@@ -119,6 +119,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     hub.values.publish_vector(ID, new.published)
     _warn_if_empty(hub, "fix", ID, new)
     _warn_if_idle(hub, style, new)
+    new.defined()
 
 
 def delete_fix(hub: Hub, ID: str) -> None:

@@ -432,6 +432,8 @@ class Interpreter:
         by_style = self._values_by_style()
         close = nearest(name, known) or by_style.get(nearest(name, by_style) or "")
         hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
+        if re.match("leq|geq", name) and not close:
+            hint = f"{name[:3]} stands in front of a bound in fix velocity_nodes only"
         if name.upper() in WORDS:
             hint = f"write {name.upper()}"
         if name.lower() in ("true", "false"):

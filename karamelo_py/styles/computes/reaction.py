@@ -8,6 +8,7 @@ from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.fixes.velocity_nodes import VelocityNodes
 
 
 class Reaction(Compute):
@@ -44,7 +45,7 @@ class Reaction(Compute):
         values = self.hub.values
         total = np.zeros(3)
         for fix in self.hub.fixes.values():
-            if fix.holds_nodes and self._contains(fix):
+            if isinstance(fix, VelocityNodes) and self._contains(fix):
                 total += [values.get(f"{fix.id}_{axis}") for axis in "xyz"]
         self.publish_components(total)
 
