@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws.damages.johnson_cook import JohnsonCookDamage
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.part import check_temperatures
+from karamelo_py.scene.part import check_temperatures, reference_rate
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.damages.base import Damage
 
@@ -60,7 +60,7 @@ class DamageJohnsonCook(Damage):
         d3: float,
         d4: Annotated[float, NonNegative],
         d5: Annotated[float, NonNegative],
-        epsdot0: Annotated[float, Positive],
+        epsdot0: Annotated[float, NonNegative],
         Tr: float,
         Tm: float,
     ):
@@ -71,4 +71,5 @@ class DamageJohnsonCook(Damage):
                 argument="d1",
                 expected="d1 + d2 above 0",
             )
+        epsdot0 = reference_rate(epsdot0, d4, "d4")
         self.law = JohnsonCookDamage(d1, d2, d3, d4, d5, epsdot0, Tr, Tm)

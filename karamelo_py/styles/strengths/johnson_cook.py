@@ -7,7 +7,7 @@ from typing import Annotated
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.strength.johnson_cook import JohnsonCook as JohnsonCookLaw
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.part import check_temperatures
+from karamelo_py.scene.part import check_temperatures, reference_rate
 from karamelo_py.styles.strengths.base import Strength
 
 
@@ -23,7 +23,7 @@ class JohnsonCook(Strength):
     B, n
         Hardening: the flow stress rises by B ep^n with the plastic strain ep.
     epsdot0
-        Reference rate of plastic strain.
+        Reference rate of plastic strain; may be 0 where C is.
     C
         Coefficient of the rate; 0 for none.
     m
@@ -57,11 +57,12 @@ class JohnsonCook(Strength):
         A: Annotated[float, Positive],
         B: Annotated[float, NonNegative],
         n: Annotated[float, NonNegative],
-        epsdot0: Annotated[float, Positive],
+        epsdot0: Annotated[float, NonNegative],
         C: Annotated[float, NonNegative],
         m: Annotated[float, NonNegative],
         Tr: float,
         Tm: float,
     ):
         check_temperatures(Tr, Tm)
+        epsdot0 = reference_rate(epsdot0, C, "C")
         self.law = JohnsonCookLaw(G, A, B, n, epsdot0, C, m, Tr, Tm)
