@@ -7,12 +7,13 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from karamelo_py.language import registry, signature
+from karamelo_py.language.collecting import further_errors
 from karamelo_py.script import expressions
 from karamelo_py.script.elsewhere import KARAMELO_COMMANDS, instead
-from karamelo_py.script.errors import Quit, ScriptError, nearest
+from karamelo_py.script.errors import Place, Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.parser import parse, parse_expression, parse_text
@@ -35,6 +36,16 @@ MEANINGS = {
     "dt": "the time step",
     "PI": "the number pi",
 }
+
+
+@runtime_checkable
+class Rehearsed(Protocol):
+    """A hub on whose copies the rest of a script can be tried."""
+
+    rehearsed: bool
+
+    def rehearsal(self) -> Any:
+        """Such a copy."""
 
 
 @dataclass
@@ -72,6 +83,7 @@ class Interpreter:
         self.files: list[Path] = []
         self._presets: dict[str, str] = {}
         self._frames: list[_Frame] = []
+        self.statement: Statement | None = None  # the last that was begun
         for name, text in (presets or {}).items():
             self._set_preset(name, text)
 
@@ -110,7 +122,12 @@ class Interpreter:
             error.argument = "file"
             raise
         self.files.append(path)
-        self._frames.append(_Frame(parse(text, str(path)), path))
+        try:
+            statements = parse(text, str(path))
+        except ScriptError as error:
+            error.included = self._including(len(self._frames))
+            raise
+        self._frames.append(_Frame(statements, path))
         self._go_on(self._frames[-1])
         self._frames.pop()
 
@@ -122,19 +139,28 @@ class Interpreter:
         Raises
         ------
         ScriptError
-            For the first mistake.
+            For the first mistake, with those behind it that do not follow from it.
         """
-        other = Interpreter(hub)
-        other.variables = dict(self.variables)
-        other.files = list(self.files)
-        other._presets = dict(self._presets)
-        other._frames = [_Frame(f.statements, f.path, f.next) for f in self._frames]
+        other = self._copy(hub)
         try:
             while other._frames:
                 other._go_on(other._frames[-1])
                 other._frames.pop()
         except Quit:
             return
+        except ScriptError as error:
+            error.others = further_errors(other, error)
+            raise
+
+    def _copy(self, hub: Any) -> Interpreter:
+        """The same place in the script, on another hub."""
+        other = Interpreter(hub)
+        other.variables = dict(self.variables)
+        other.files = list(self.files)
+        other._presets = dict(self._presets)
+        other._frames = [_Frame(f.statements, f.path, f.next) for f in self._frames]
+        other.statement = self.statement
+        return other
 
     @property
     def folder(self) -> Path:
@@ -155,24 +181,51 @@ class Interpreter:
             self._go_on(self._frames[-1])
         except Quit:
             return
+        except ScriptError as error:
+            # Once a run has begun, the rest of the script has been tried.
+            if isinstance(self.hub, Rehearsed) and not self.hub.rehearsed:
+                error.others = further_errors(self._copy(self.hub.rehearsal()), error)
+            raise
         finally:
             self._frames.clear()
 
     def _go_on(self, frame: _Frame) -> None:
         while frame.next < len(frame.statements):
-            statement = frame.statements[frame.next]
             frame.next += 1
-            self.hub.place = statement.place
-            try:
-                self._execute(statement)
-            except ScriptError as error:
-                error.place = error.place or statement.place
-                error.complete = True
-                raise
-            except RecursionError:
-                raise ScriptError(
-                    "this is nested too deeply", place=statement.place, hint="use more names"
-                ) from None
+            self.execute(frame.statements[frame.next - 1])
+
+    def next_statement(self) -> Statement | None:
+        """The statement that comes next, in whichever file; it counts as carried out."""
+        while self._frames:
+            frame = self._frames[-1]
+            if frame.next < len(frame.statements):
+                frame.next += 1
+                return frame.statements[frame.next - 1]
+            self._frames.pop()
+        return None
+
+    def execute(self, statement: Statement) -> None:
+        """Carry out one statement; errors know its place, and which scripts include it."""
+        self.statement = statement
+        self.hub.place = statement.place
+        depth = len(self._frames)
+        try:
+            self._execute(statement)
+        except ScriptError as error:
+            error.place = error.place or statement.place
+            if not error.included:
+                error.included = self._including(depth - 1)
+            error.complete = True
+            raise
+        except RecursionError:
+            raise ScriptError(
+                "this is nested too deeply", place=statement.place, hint="use more names"
+            ) from None
+
+    def _including(self, depth: int) -> list[Place]:
+        """The include statements of the first `depth` scripts in progress, the nearest first."""
+        frames = self._frames[:depth]
+        return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
 
     def _execute(self, statement: Statement) -> None:
         if isinstance(statement, Assignment):
