@@ -113,13 +113,30 @@ def test_materials_as_in_2020(run_interpreted):
     assert logs[0].Es[-1] > 0
 
 
+def test_solids_as_in_2020(run_interpreted):
+    """solid(ID, regionID, ppc, material, h) fills the region, whatever it is called."""
+    logs = [
+        run_interpreted(
+            block(2, *MEASURED, *RUN).replace("solid(body, region, box, 2, rubber, 0.1, 0)", line)
+        ).log
+        for line in (
+            "solid(body, region, box, 2, rubber, 0.1)",
+            "solid(body, box, 2, rubber, 0.1)",
+            "solid(body, rectangle, box, 2, rubber, 0.1)",
+        )
+    ]
+    assert [log.c_x[0] for log in logs] == pytest.approx([0.45] * 3, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("line", "says"),
     [
         ("method_modify(FLIP, 0.99)", "method(ulmpm, FLIP, linear, 0.99)"),
-        ("solid(s, box, 0, 1, 0, 1, 2, rubber, 0.1)", "region(box, block, ...)"),
+        ("solid(s, block, 0, 1, 0, 1, 2, rubber, 0.1)", "region(box, block, ...)"),
         ("solid(s, cylinder, 0.5, 0.5, 0.1, 2, rubber, 0.1)", "region(box, cylinder, ...)"),
         ("solid(s, rectangle, 0, 1, 0, 1, 2, rubber, 0.1)", "solid(ID, region, box, ppc"),
+        ("strength(s, JC, 1, 1, 1, 1, 1, 1)", "the style johnson_cook"),
+        ("region(r, block, INF, INF, 0.5, INF, INF, INF)", "too many in 2D"),
         ("restart(100, r.*)", "leave it out"),
         ("write_restart(r.*)", "leave it out"),
         ("read_restart(r.%)", "leave it out"),

@@ -106,6 +106,7 @@ INSTEAD = {
         "plastic": "the style eos-strength, of an eos and a strength",
         "fluid": "the style eos-strength, of an eos and a strength",
     },
+    "strength": {"JC": "the style johnson_cook, with G, A, B, n, epsdot0, C, m, Tr, Tm"},
     "dump": {
         "atom": "the style particle",
         "custom": "the style particle",
