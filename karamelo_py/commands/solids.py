@@ -16,7 +16,6 @@ from karamelo_py.scene.solid import Solid, own_grids, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse_text
 
-
 # Words that stood in the place of the style region in 2020.
 SHAPES = ("block", "box", "cylinder", "rectangle", "sphere")
 
