@@ -142,7 +142,7 @@ def _tried(lines, dimension, folder):
     interpreter = _scene(dimension, folder)
     for line in lines:
         words = re.findall(r"\w+", line)
-        if words[2] == "contact":
+        if words[2] == "contact" and words[4] != "plane":
             interpreter = _scene(dimension, folder, "ulmpm/contacts")
             h = STAGES[dimension][0].split()[-1]
             for solid in words[4:6]:

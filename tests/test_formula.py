@@ -2,6 +2,7 @@
 
 import math
 import re
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -48,6 +49,7 @@ def formula(hub, text):
 erf = np.vectorize(math.erf)
 gamma = np.vectorize(math.gamma)
 lgamma = np.vectorize(math.lgamma)
+inv_norm = np.vectorize(NormalDist().inv_cdf)
 A, B = np.random.default_rng(1).uniform(-0.9, 0.9, (2, 300))
 CASES = {
     "x + y": A + B,
@@ -107,6 +109,7 @@ CASES = {
     "gamma(1 + x)": gamma(1 + A),
     "tgamma(1 + x)": gamma(1 + A),
     "lgamma(1 + x)": lgamma(1 + A),
+    "inv_norm(1/(1 + exp(-10*x)))": inv_norm(1 / (1 + np.exp(-10 * A))),
     "if(x > 0, x, y)": np.where(A > 0, A, B),
     "if(x > 0, time, 1)": np.where(A > 0, 0.7, 1),
     "if(time > 0, x, 1)": A,

@@ -14,6 +14,7 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS
+from karamelo_py.script.parser import parse_text
 
 
 def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
@@ -79,6 +80,10 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
     --------
     solid
     """
+    if style in hub.parts["eos"] and arguments and not registry.knows("material", style):
+        # The form of 2020, material(ID, eosID, strengthID), has no style.
+        arguments = (Argument(parse_text(style)[0], hub.interpreter), *arguments)
+        style = "eos-strength"
     define(hub, hub.materials, ID, style, arguments)
 
 
@@ -117,6 +122,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     hub.values.publish_vector(ID, new.published)
     _warn_if_empty(hub, "fix", ID, new)
     _warn_if_idle(hub, style, new)
+    new.defined()
 
 
 def delete_fix(hub: Hub, ID: str) -> None:

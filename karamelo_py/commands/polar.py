@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
+from karamelo_py.commands.points import has_run, refuse_chosen, replace_points
 from karamelo_py.language.forms import Forms, place_of
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
-from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.scene.region import Region, check_radius
-from karamelo_py.scene.solid import Solid, warn_of_coinciding
+from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
 FORMS = Forms(
@@ -64,54 +64,30 @@ def populate_cylindrical_coordinates(
     --------
     solid, region
     """
-    if hub.rehearsed or hub.update.step:
+    if has_run(hub):
         raise ScriptError(
             f"the points of solid '{solid.id}' have been in a run",
             argument="solid",
             expected="populate_cylindrical_coordinates before the first run",
         )
-    _refuse_chosen(hub, solid)
+    refuse_chosen(hub, solid, "populate_cylindrical_coordinates")
     dimension = require_domain(hub).dimension
     values = FORMS.read(hub, lattice, dimension)
     placed = _polar(values, FORMS.names[dimension], lattice)
     if not region.unknown:
         placed = _kept(hub, region, placed)
-    before = solid.count
     T0, solid.T0 = solid.T0, values["T0"]
     try:
-        solid.put(hub, placed, may_be_empty=region.unknown)
+        replace_points(hub, solid, placed, may_be_empty=region.unknown)
     except ScriptError as error:
         solid.T0 = T0
         error.argument = "region"
         raise
-    for other in hub.solids.values():
-        if other.index > solid.index:
-            other.first_id += solid.count - before
-    hub.forget_simulation()
-    warn_of_coinciding(hub, solid, solid.id)
 
 
 populate_cylindrical_coordinates.syntax = (
     "solidID, regionID[, axis], c1, c2, R[, lo, hi, Ndx], Ndr, Ndtheta, T0"
 )
-
-
-def _refuse_chosen(hub: Hub, solid: Solid) -> None:
-    """Groups of points and contact know points by number, and the numbers from here on change."""
-    for fix in hub.fixes.values():
-        if fix.point_fields:
-            raise ScriptError(
-                f"fix '{fix.id}' was made for points that would be replaced or renumbered",
-                argument="solid",
-                expected=f"fix({fix.id}, ...) after populate_cylindrical_coordinates",
-            )
-    for group in hub.groups.values():
-        if isinstance(group, ParticleGroup) and len(group) and group.ids[-1] >= solid.first_id:
-            raise ScriptError(
-                f"group '{group.id}' was chosen from points that would be replaced or renumbered",
-                argument="solid",
-                expected=f"group({group.id}, ...) after populate_cylindrical_coordinates",
-            )
 
 
 def _polar(values: dict, names: tuple[str, ...], given: tuple[Argument, ...]) -> Placement:

@@ -14,6 +14,10 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, own_grids, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.parser import parse_text
+
+# Words that stood in the place of the style region in 2020.
+SHAPES = ("block", "box", "cylinder", "rectangle", "sphere")
 
 
 def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> None:
@@ -50,6 +54,13 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
         )
     require_domain(hub)
     hub.solids.refuse(ID)
+    if not registry.knows("solid", kind):
+        # The forms of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).
+        if kind in hub.regions:
+            arguments = (Argument(parse_text(kind)[0], hub.interpreter), *arguments)
+            kind = "region"
+        elif kind in SHAPES and arguments and arguments[0].word() in hub.regions:
+            kind = "region"
     target = registry.find("solid", kind)
     new = signature.call(target, hub, list(arguments), f"solid {kind}")
     warn_of_coinciding(hub, new, ID)

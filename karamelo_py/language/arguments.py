@@ -113,6 +113,16 @@ class Argument:
             )
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
+    def behind(self, count: int) -> Argument:
+        """What follows the first `count` characters."""
+        return Argument(
+            Raw(self._raw.source, self._raw.start + count, self._raw.end), self._interpreter
+        )
+
+    def knows(self, name: str) -> bool:
+        """Whether a name means something where the argument stands."""
+        return self._interpreter.knows(name)
+
     def keyword(self) -> tuple[str, Argument] | None:
         """Name and value if it is written ``name = value``."""
         match = _KEYWORD.match(self.text)

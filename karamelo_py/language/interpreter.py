@@ -7,14 +7,15 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from karamelo_py.language import registry, signature
+from karamelo_py.language.collecting import further_errors
 from karamelo_py.script import expressions
-from karamelo_py.script.elsewhere import instead
-from karamelo_py.script.errors import Quit, ScriptError, nearest
+from karamelo_py.script.elsewhere import KARAMELO_COMMANDS, instead
+from karamelo_py.script.errors import Place, Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
-from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
+from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.parser import parse, parse_expression, parse_text
 from karamelo_py.script.syntax import (
     Assignment,
@@ -36,6 +37,16 @@ MEANINGS = {
     "dt": "the time step",
     "PI": "the number pi",
 }
+
+
+@runtime_checkable
+class Rehearsed(Protocol):
+    """A hub on whose copies the rest of a script can be tried."""
+
+    rehearsed: bool
+
+    def rehearsal(self) -> Any:
+        """Such a copy."""
 
 
 @dataclass
@@ -73,6 +84,7 @@ class Interpreter:
         self.files: list[Path] = []
         self._presets: dict[str, str] = {}
         self._frames: list[_Frame] = []
+        self.statement: Statement | None = None  # the last that was begun
         for name, text in (presets or {}).items():
             self._set_preset(name, text)
 
@@ -109,7 +121,12 @@ class Interpreter:
             error.argument = "file"
             raise
         self.files.append(path)
-        self._frames.append(_Frame(parse(text, str(path)), path))
+        try:
+            statements = parse(text, str(path))
+        except ScriptError as error:
+            error.included = self._including(len(self._frames))
+            raise
+        self._frames.append(_Frame(statements, path))
         self._go_on(self._frames[-1])
         self._frames.pop()
 
@@ -126,19 +143,28 @@ class Interpreter:
         Raises
         ------
         ScriptError
-            For the first mistake.
+            For the first mistake, with those behind it that do not follow from it.
         """
-        other = Interpreter(hub)
-        other.variables = dict(self.variables)
-        other.files = list(self.files)
-        other._presets = dict(self._presets)
-        other._frames = [_Frame(f.statements, f.path, f.next) for f in self._frames]
+        other = self._copy(hub)
         try:
             while other._frames:
                 other._go_on(other._frames[-1])
                 other._frames.pop()
         except Quit:
             return
+        except ScriptError as error:
+            error.others = further_errors(other, error)
+            raise
+
+    def _copy(self, hub: Any) -> Interpreter:
+        """The same place in the script, on another hub."""
+        other = Interpreter(hub)
+        other.variables = dict(self.variables)
+        other.files = list(self.files)
+        other._presets = dict(self._presets)
+        other._frames = [_Frame(f.statements, f.path, f.next) for f in self._frames]
+        other.statement = self.statement
+        return other
 
     @property
     def folder(self) -> Path:
@@ -160,24 +186,51 @@ class Interpreter:
             self._go_on(self._frames[-1])
         except Quit:
             return
+        except ScriptError as error:
+            # Once a run has begun, the rest of the script has been tried.
+            if isinstance(self.hub, Rehearsed) and not self.hub.rehearsed:
+                error.others = further_errors(self._copy(self.hub.rehearsal()), error)
+            raise
         finally:
             self._frames.clear()
 
     def _go_on(self, frame: _Frame) -> None:
         while frame.next < len(frame.statements):
-            statement = frame.statements[frame.next]
             frame.next += 1
-            self.hub.place = statement.place
-            try:
-                self._execute(statement)
-            except ScriptError as error:
-                error.place = error.place or statement.place
-                error.complete = True
-                raise
-            except RecursionError:
-                raise ScriptError(
-                    "this is nested too deeply", place=statement.place, hint="use more names"
-                ) from None
+            self.execute(frame.statements[frame.next - 1])
+
+    def next_statement(self) -> Statement | None:
+        """The statement that comes next, in whichever file; it counts as carried out."""
+        while self._frames:
+            frame = self._frames[-1]
+            if frame.next < len(frame.statements):
+                frame.next += 1
+                return frame.statements[frame.next - 1]
+            self._frames.pop()
+        return None
+
+    def execute(self, statement: Statement) -> None:
+        """Carry out one statement; errors know its place, and which scripts include it."""
+        self.statement = statement
+        self.hub.place = statement.place
+        depth = len(self._frames)
+        try:
+            self._execute(statement)
+        except ScriptError as error:
+            error.place = error.place or statement.place
+            if not error.included:
+                error.included = self._including(depth - 1)
+            error.complete = True
+            raise
+        except RecursionError:
+            raise ScriptError(
+                "this is nested too deeply", place=statement.place, hint="use more names"
+            ) from None
+
+    def _including(self, depth: int) -> list[Place]:
+        """The include statements of the first `depth` scripts in progress, the nearest first."""
+        frames = self._frames[:depth]
+        return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
 
     def _execute(self, statement: Statement) -> None:
         if isinstance(statement, Assignment):
@@ -224,6 +277,12 @@ class Interpreter:
             if isinstance(self.variables.get(name), str):
                 self.variables[name] = self._preset_value(name)
             return
+        if name not in self.variables and (name in FUNCTIONS or registry.knows("command", name)):
+            kind = "function" if name in FUNCTIONS else "command"
+            self._warn(
+                f"'{name}' is a {kind}, too; from here on it means the variable that is assigned "
+                f"here, and the {kind} cannot be called"
+            )
         if name in self.hub.values and name not in self.variables:
             self._warn(
                 f"'{name}' is a value of a fix or a compute; "
@@ -315,6 +374,8 @@ class Interpreter:
 
     def _call(self, statement: Call) -> None:
         name = statement.name
+        if self.hides(name):
+            raise self._unknown_call(name, statement.place, statement=True)
         if registry.knows("command", name):
             arguments = [signature.Argument(raw, self) for raw in statement.arguments]
             signature.call(registry.find("command", name), self.hub, arguments, name)
@@ -330,7 +391,7 @@ class Interpreter:
         name = node.name
         begin = raw.start + node.start
         place = raw.source.place(begin, begin + len(name))
-        if not registry.knows("command", name):
+        if not registry.knows("command", name) or self.hides(name):
             raise self._unknown_call(name, place, statement=False)
         target = registry.find("command", name)
         # What gives no value must not be carried out here, least of all a run.
@@ -394,6 +455,10 @@ class Interpreter:
             name in self.variables or name in SEEDS or name in CONSTANTS or name in self.hub.values
         )
 
+    def hides(self, name: str) -> bool:
+        """Whether a variable has the name of a function or command, which it hides then."""
+        return name in self.variables
+
     def name(self, name: str, node: Name, raw: Raw) -> Value:
         """What a name in an expression stands for."""
         if name in SEEDS:
@@ -432,11 +497,20 @@ class Interpreter:
         later = self._later(name)
         if later:
             return later(place)
+        if name == "i":
+            return ScriptError(
+                "'i' is the number of a point in Karamelo, which no formula knows here",
+                place=place,
+                expected="a formula of positions",
+                hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) scatters over 0 to 1 as well",
+            )
         published = [value for value in self.hub.values.names() if value not in SEEDS]
         known = [*self.variables, *published, *SEEDS, *CONSTANTS]
         by_style = self._values_by_style()
         close = nearest(name, known) or by_style.get(nearest(name, by_style) or "")
         hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
+        if re.match("leq|geq", name) and not close:
+            hint = f"{name[:3]} stands in front of a bound in fix velocity_nodes only"
         if name.upper() in WORDS:
             hint = f"write {name.upper()}"
         if name.lower() in ("true", "false"):
@@ -565,9 +639,9 @@ def _check_name(name: str) -> None:
         what = "a coordinate of points"
     elif name in WORDS or name == "quit":
         what = "a word of the language"
-    elif registry.knows("command", name):
+    elif registry.knows("command", name) and name in KARAMELO_COMMANDS:
         what = "a command"
-    elif name in FUNCTIONS:
+    elif name in RESERVED:
         what = "a function"
     else:
         return

@@ -67,6 +67,12 @@ class Output:
         """Write the headers and the first state of a run."""
         if self.hub.rehearsing:
             return
+        if self.plots.file is not None and not len(self.plots):
+            self.hub.warn(
+                f"{self.plots.file} will not be drawn: there is nothing to plot",
+                place=self.plots.place,
+                hint="plot(ID, every, x, y) gives a curve",
+            )
         self.log.begin()
         self.write(last=True)
 

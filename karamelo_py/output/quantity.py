@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from karamelo_py.language.scene import Scene
@@ -39,6 +40,7 @@ class Quantity:
         self.hub = hub
         self.name = name
         self.formula = formula
+        self._told = False  # whether the user knows of a NaN
         if formula is None and name not in self.names(hub):
             close = nearest(name, self.names(hub))
             raise ScriptError(
@@ -86,7 +88,18 @@ class Quantity:
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int:
-        """The number now."""
+        """The number now; of the first that is none the user is told."""
+        number = self._number()
+        if math.isnan(number) and not self._told:
+            self._told = True
+            self.hub.warn(
+                f"{self.heading} is NaN, which is not a number, from step "
+                f"{self.hub.update.step} on",
+                hint="a quotient 0/0, the root of a number below 0, or the like",
+            )
+        return number
+
+    def _number(self) -> float | int:
         source = self._source()
         if isinstance(source, str):
             raise ScriptError(f"'{self.name}' is text, not a number")

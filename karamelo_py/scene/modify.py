@@ -109,6 +109,9 @@ class Fix:
     def refresh(self) -> None:
         """Bring published values up to date; called before the log or a dump is written."""
 
+    def defined(self) -> None:
+        """Called when the fix has its ID and belongs to the scene."""
+
     def hooks(self) -> dict[str, Any]:
         """The hooks this fix overrides: name to method or compiled hook."""
         found = {name: getattr(self, name) for name in STAGES if hasattr(self, name)}

@@ -100,11 +100,28 @@ class Solid:
                 hint="material(ID, linear, rho, E, nu, cp, kappa), or temperature(...) with "
                 "eos-strength",
             )
+        if can(self.material.law, initial_heat) and self.T0 is not None:
+            self._judge_temperature(hub, self.T0)
         kinds = law_kind(self.material.law)
         if self.T0 is None and any("initial_temperature" in kind._fields for kind in kinds):
             hub.warn(
                 "the solid starts at the temperature 0, since neither it nor its material says one",
                 hint="give T0 behind the cell size",
+            )
+
+    def _judge_temperature(self, hub: Scene, T0: float) -> None:
+        """Tell of a temperature at which the material does not exist."""
+        Tm = min((getattr(part, "Tm", math.inf) for part in self.material.law), default=math.inf)
+        if T0 < 0:
+            hub.warn(
+                f"T0 = {T0:g} is below absolute zero, unless it is counted from another point",
+                hint="temperatures in kelvin throughout: T0, Tr, Tm",
+            )
+        elif Tm <= T0:
+            hub.warn(
+                f"T0 = {T0:g} is not below the melting temperature {Tm:g}: "
+                "the solid has no strength from the start",
+                hint="all temperatures counted from the same point",
             )
 
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:

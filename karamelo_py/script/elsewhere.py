@@ -8,10 +8,31 @@ _COLUMNS = "log_modify(custom, step, time, ...) names the columns of the log"
 _DOMAIN = "dimension(2, xlo, xhi, ylo, yhi, h) makes the domain and its grid"
 _VELOCITY = "fix(ID, initial_velocity_particles, group, vx, vy, vz) sets velocities"
 _NEEDLESS = "leave it out"
+_FILLED = "region(box, {}, ...) and solid(ID, region, box, ppc, material, h, 0): a region is filled"
+_RESTART = f"{_NEEDLESS}: a run goes on only within its script, by a further run(n)"
+
+# Commands of Karamelo, whose names its scripts cannot use for variables. Others are free.
+KARAMELO_COMMANDS = frozenset((
+    "anti_volumetric_locking", "axisymmetric", "compute", "create_domain", "damage",
+    "delete_compute", "delete_dump", "delete_fix", "delete_particles", "dimension", "dt_factor",
+    "dump", "eos", "evaluate", "external_force", "fix", "group", "include", "internal_force", "log",
+    "log_modify", "material", "method", "partition_domain", "plot",
+    "populate_cylindrical_coordinates", "print", "quit", "read_restart", "region", "restart", "run",
+    "run_time", "run_until", "run_while", "save_plot", "scheme", "set_dt", "set_output", "solid",
+    "strength", "temperature", "translate_particles", "value", "write_restart", "xcm",
+))  # fmt: skip
 
 # By family and name.
 INSTEAD = {
     "command": {
+        "method_modify": "method(ulmpm, FLIP, linear, 0.99) says all of it in one line",
+        "restart": _RESTART,
+        "write_restart": _RESTART,
+        "read_restart": _RESTART,
+        "partition_domain": "method(ulmpm, FLIP, linear, 1): with linear weights no point acts "
+        "across a line of nodes",
+        "delete_atoms": "delete_particles(solid, region, regionID)",
+        "displace_atoms": "translate_particles(solid, region, regionID, dx, dy)",
         "timestep": "set_dt(dt) sets the time step",
         "dt": "set_dt(dt) sets the time step",
         "unfix": "delete_fix(ID) ends a fix",
@@ -56,7 +77,23 @@ INSTEAD = {
         "pe": "the style strain_energy",
         "temp": "the style average_temperature",
         "angmom": "the style angular_momentum",
+        "com": "the style center_of_mass",
+        "xcm": "the style center_of_mass, or xcm(group, x) in an expression",
+        "centre_of_mass": "the style center_of_mass",
+        "reduce": "compute(ID, average_stress, group) and the like; help compute lists them",
+        "stress/atom": "dump(ID, all, particle, every, file, s11, s22, ...) writes stresses",
     },
+    "solid": {
+        name: _FILLED.format(style)
+        for name, style in (
+            ("block", "block"),
+            ("box", "block"),
+            ("rectangle", "block"),
+            ("cylinder", "cylinder"),
+            ("sphere", "sphere"),
+        )
+    }
+    | {"file": "solid(ID, mesh, file, material, h) reads a mesh"},
     "region": {
         "box": "the style block",
         "rectangle": "the style block",
@@ -69,6 +106,7 @@ INSTEAD = {
         "plastic": "the style eos-strength, of an eos and a strength",
         "fluid": "the style eos-strength, of an eos and a strength",
     },
+    "strength": {"JC": "the style johnson_cook, with G, A, B, n, epsdot0, C, m, Tr, Tm"},
     "dump": {
         "atom": "the style particle",
         "custom": "the style particle",

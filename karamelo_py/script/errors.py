@@ -60,6 +60,10 @@ class ScriptError(Exception):
         self.hint = hint
         # Command or style that complains, put in front of the message.
         self.command: str | None = None
+        # Where scripts include the one that it is in, the nearest first.
+        self.included: list[Place] = []
+        # Further mistakes of the script, which do not follow from this one.
+        self.others: list[ScriptError] = []
         # Whether the statement it belongs to is known: nothing outside of it may add to it.
         self.complete = False
 
@@ -67,11 +71,17 @@ class ScriptError(Exception):
         return self.message
 
     def render(self) -> str:
-        """The whole message for the user: place, marked line, what was expected, remedy."""
+        """The whole message for the user: place, marked line, what was expected, remedy.
+
+        Further mistakes of the script follow.
+        """
         message = self.message
         if self.command and not message.startswith(self.command):
             message = f"{self.command}: {message}"
-        return render_message("error", message, self.place, self.expected, self.hint)
+        text = render_message("error", message, self.place, self.expected, self.hint)
+        for place in self.included:
+            text += f"\n{place.file}:{place.line}: the script above is included here"
+        return "\n\n".join([text, *(error.render() for error in self.others)])
 
 
 def render_message(

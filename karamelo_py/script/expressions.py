@@ -13,7 +13,7 @@ import numpy as np
 
 from karamelo_py.compiler.formula import Program
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.functions import FUNCTIONS, compute, compute_quietly
+from karamelo_py.script.functions import FUNCTIONS, TAIL, compute, compute_quietly
 from karamelo_py.script.syntax import Binary, Function, Name, Node, Number, Raw, Text, Unary
 from karamelo_py.script.values import Values
 
@@ -35,7 +35,33 @@ _REWRITTEN = {
     "degrees": lambda a: _term("*", a, _number(180 / math.pi)),
     "radians": lambda a: _term("*", a, _number(math.pi / 180)),
     "remainder": lambda a, b: _term("-", a, _term("*", b, _term("round", _term("/", a, b)))),
+    "inv_norm": lambda a: _inverse_normal(a),
 }
+
+# Numerators and denominators, from the highest power on, of Wichura's algorithm AS 241 (1988) for
+# the inverse of the normal distribution: around the middle, and towards the tails.
+_MIDDLE = (
+    (
+        2509.0809287301226727, 33430.575583588128105, 67265.770927008700853, 45921.953931549871457,
+        13731.693765509461125, 1971.5909503065514427, 133.14166789178437745, 3.3871328727963666080,
+    ),
+    (
+        5226.4952788528545610, 28729.085735721942674, 39307.895800092710610, 21213.794301586595867,
+        5394.1960214247511077, 687.18700749205790830, 42.313330701600911252, 1.0,
+    ),
+)  # fmt: skip
+_SIDES = (
+    (
+        7.74545014278341407640e-4, 2.27238449892691845833e-2, 2.41780725177450611770e-1,
+        1.27045825245236838258, 3.64784832476320460504, 5.76949722146069140550,
+        4.63033784615654529590, 1.42343711074968357734,
+    ),
+    (
+        1.05075007164441684324e-9, 5.47593808499534494600e-4, 1.51986665636164571966e-2,
+        1.48103976427480074590e-1, 6.89767334985100004550e-1, 1.67638483018380384940,
+        2.05319162663775882187, 1.0,
+    ),
+)  # fmt: skip
 
 _PRECEDENCE = {
     "||": 1,
@@ -85,6 +111,29 @@ def _term(operation: str, *operands: _Term) -> _Term:
     return _Term(operation, operands, None)
 
 
+def _quotient(polynomials: tuple[tuple[float, ...], ...], r: _Term) -> _Term:
+    """Two polynomials of `r`, the first over the second."""
+    terms = []
+    for coefficients in polynomials:
+        term = _number(coefficients[0])
+        for coefficient in coefficients[1:]:
+            term = _term("+", _term("*", term, r), _number(coefficient))
+        terms.append(term)
+    return _term("/", *terms)
+
+
+def _inverse_normal(p: _Term) -> _Term:
+    q = _term("-", p, _number(0.5))
+    middle = _quotient(_MIDDLE, _term("-", _number(0.180625), _term("*", q, q)))
+    tail = _term("min", p, _term("-", _number(1.0), p))
+    far = _term("sqrt", _term("neg", _term("log", tail)))
+    side = _quotient(_SIDES, _term("-", far, _number(1.6)))
+    within = _term(">=", tail, _number(TAIL))
+    side = _term("if", within, _term("*", _term("sign", q), side), _number(math.nan))
+    near = _term("<=", _term("abs", q), _number(0.425))
+    return _term("if", near, _term("*", q, middle), side)
+
+
 class Formula:
     """A formula of positions, time and published values.
 
@@ -108,6 +157,10 @@ class Formula:
     def seed(cls, name: str) -> Formula:
         """The formula that is nothing but a name."""
         return cls(_Term("name", (), name))
+
+    def minus(self, other: Formula) -> Formula:
+        """The formula of the difference."""
+        return Formula(_term("-", self._term, other._term))
 
     @property
     def names(self) -> frozenset[str]:
@@ -351,6 +404,9 @@ class Scope(Protocol):
     def command(self, node: Function, raw: Raw) -> Value:
         """The value of a call that is not a function."""
 
+    def hides(self, name: str) -> bool:
+        """Whether the script uses the name of a function for something else."""
+
 
 def evaluate(node: Node, raw: Raw, scope: Scope) -> Value:
     """What the tree of `raw` stands for: a number, a text or a formula.
@@ -374,7 +430,7 @@ def evaluate(node: Node, raw: Raw, scope: Scope) -> Value:
     if isinstance(node, Binary):
         return _binary(node, raw, scope)
     assert isinstance(node, Function)
-    if node.name not in FUNCTIONS:
+    if node.name not in FUNCTIONS or scope.hides(node.name):
         return scope.command(node, raw)
     return _function(node, raw, scope)
 
@@ -503,6 +559,7 @@ def _impossible(
         "acos": "a number between -1 and 1",
         "atanh": "a number between -1 and 1, both excluded",
         "acosh": "a number of at least 1",
+        "inv_norm": f"a number from {TAIL:g} to 1 - {TAIL:g}",
         "log1p": "a number above -1",
         "^": "a whole exponent for a negative base",
         "pow": "a whole exponent for a negative base",

@@ -6,12 +6,18 @@ The same functions for many points at once are in :mod:`karamelo_py.compiler.for
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Callable
 from typing import NamedTuple
 
-CONSTANTS = {"PI": math.pi}
+# Pi, the golden ratio, and Euler's constant.
+CONSTANTS = {"PI": math.pi, "PHI": (1 + math.sqrt(5)) / 2, "EGAMMA": 0.57721566490153286}
 # Words that look like names but mean something to particular commands only.
 WORDS = frozenset({"NULL", "INF", "EDGE"})
+# Functions whose names no variable may have; other names of functions were free in Karamelo.
+RESERVED = frozenset({"exp", "sqrt", "cos", "sin", "tan", "atan2", "log", "if"})
+# The tails of the normal distribution that inv_norm leaves out, on each side.
+TAIL = 1e-10
 
 
 class Signature(NamedTuple):
@@ -40,6 +46,12 @@ def _select(condition: float, a: float, b: float) -> float:
 
 def _cbrt(a: float) -> float:
     return math.copysign(abs(a) ** (1.0 / 3.0), a)
+
+
+def _inv_norm(a: float) -> float:
+    if not TAIL <= a <= 1 - TAIL:
+        raise ValueError("outside of the domain")
+    return statistics.NormalDist().inv_cdf(a)
 
 
 def _truth(compare: Callable[[float, float], bool]) -> Callable[[float, float], float]:
@@ -87,6 +99,7 @@ FUNCTIONS: dict[str, Signature] = {
     "atanh": Signature(1, 1, math.atanh),
     "erf": Signature(1, 1, math.erf),
     "erfc": Signature(1, 1, math.erfc),
+    "inv_norm": Signature(1, 1, _inv_norm),
     "gamma": Signature(1, 1, math.gamma),
     "tgamma": Signature(1, 1, math.gamma),
     "lgamma": Signature(1, 1, math.lgamma),

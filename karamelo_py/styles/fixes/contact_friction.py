@@ -37,6 +37,7 @@ class ContactFriction(Fix):
     contact/minimize_penetration, method ulmpm/contacts
     """
 
+    syntax = "solid1, solid2, mu|no-slip"
     published = ("x", "y", "z")
     for_method = True
 

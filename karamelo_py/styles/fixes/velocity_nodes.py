@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.language.signature import Argument
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, node_hook
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import per_direction
+from karamelo_py.styles.fixes.formulas import AXES, per_direction
 
 
 def prescribe(mass, v, v_star, force, value, before, dt, share):
@@ -19,6 +26,53 @@ def hold(mass, v, v_star, force, value, before, dt, share):
     return value, value, force, 0.0
 
 
+def prescribe_at_most(mass, v, v_star, force, value, before, dt, share):
+    """v* is not above the value; the total is the reaction, which pushes backwards."""
+    allowed = min(v_star, value)
+    return v, allowed, force, mass * (allowed - v_star) / dt
+
+
+def hold_at_most(mass, v, v_star, force, value, before, dt, share):
+    """Nor is the re-mapped velocity."""
+    allowed = min(v, value)
+    return allowed, allowed, force, 0.0
+
+
+def prescribe_at_least(mass, v, v_star, force, value, before, dt, share):
+    """v* is not below the value; the total is the reaction, which pushes forwards."""
+    allowed = max(v_star, value)
+    return v, allowed, force, mass * (allowed - v_star) / dt
+
+
+def hold_at_least(mass, v, v_star, force, value, before, dt, share):
+    """Nor is the re-mapped velocity."""
+    allowed = max(v, value)
+    return allowed, allowed, force, 0.0
+
+
+class Velocity(Expression):
+    """For signatures: a number or a formula, behind the word leq or geq where it is a bound.
+
+    Attributes
+    ----------
+    bound : str
+        ``leq``, ``geq``, or nothing.
+    """
+
+    script_kind = "a number or a formula"
+    bound = ""
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Velocity:
+        """The velocity or bound that a script's argument stands for."""
+        first = re.match(r"(leq|geq)\w*", argument.text)
+        if not first or argument.knows(first[0]):
+            return super().from_script(hub, argument)
+        velocity = super().from_script(hub, argument.behind(3))
+        velocity.bound = first[1]
+        return velocity
+
+
 class VelocityNodes(Fix):
     """Prescribe the velocity of nodes: walls, supports, grips, pistons.
 
@@ -28,21 +82,24 @@ class VelocityNodes(Fix):
         Group of nodes.
     velocity
         vx, vy, vz, as many as the domain has dimensions: numbers or formulas of x0, y0, z0, time
-        and published values. NULL leaves a component free.
+        and published values. NULL leaves a component free. With ``leq`` or ``geq`` in front of it
+        the velocity is an upper or a lower bound: nodes that keep within it are free.
 
     Example
     -------
     fix(base, velocity_nodes, bottom, 0, 0)
     fix(roller, velocity_nodes, left, 0, NULL)
     fix(piston, velocity_nodes, top, NULL, -0.1*sin(2*PI*time))
+    fix(floor, velocity_nodes, bottom, NULL, geq0)
 
     Notes
     -----
-    Publishes the reaction, the force that holds the nodes, as ID_x, ID_y, ID_z.
+    Publishes the reaction, the force that holds the nodes, as ID_x, ID_y, ID_z. Where two such
+    fixes hold a node in one direction, the later one decides, and has the rest of the reaction.
 
     See Also
     --------
-    velocity_particles, initial_velocity_nodes
+    velocity_particles, initial_velocity_nodes, compute reaction
     """
 
     syntax = "group, vx[, vy[, vz]]"
@@ -52,6 +109,62 @@ class VelocityNodes(Fix):
     post_update_grid_state = node_hook(prescribe, uses_before=True)
     post_velocities_to_grid = node_hook(hold, publishes=False)
 
-    def __init__(self, hub: Hub, group: NodeGroup, *velocity: Expression | None):
+    def __init__(self, hub: Hub, group: NodeGroup, *velocity: Velocity | None):
         super().__init__(hub, group)
-        self.formulas = per_direction(hub, "v", velocity)
+        self.formulas: tuple[Any, ...] = per_direction(hub, "v", velocity)
+        self.bound = self._one_bound()
+        if self.bound:
+            most = self.bound == "leq"
+            # Contact may move these nodes: they are held only as far as they come.
+            self.holds_nodes = False
+            self.post_update_grid_state = node_hook(
+                prescribe_at_most if most else prescribe_at_least
+            )
+            self.post_velocities_to_grid = node_hook(
+                hold_at_most if most else hold_at_least, publishes=False
+            )
+
+    def _one_bound(self) -> str:
+        """The bound that all components have.
+
+        Raises
+        ------
+        ScriptError
+            If they differ: a fix has one function for all components.
+        """
+        bounds = [velocity.bound for velocity in self.formulas if velocity is not None]
+        if len(set(bounds)) > 1:
+            shown = [
+                ["NULL" if v is None or v.bound != bound else bound + v.text for v in self.formulas]
+                for bound in dict.fromkeys(bounds)
+            ]
+            lines = [f"velocity_nodes, {self.group.id}, {', '.join(row)}" for row in shown]
+            raise ScriptError(
+                "a fix has bounds of one kind: leq, geq, or none",
+                argument="velocity",
+                hint="fixes with IDs of their own: "
+                + " and ".join(f"fix(ID{k}, {line})" for k, line in enumerate(lines, 1)),
+            )
+        return bounds[0] if bounds else ""
+
+    def defined(self) -> None:
+        """Warn where another fix gives the same nodes another velocity."""
+        if self.bound or self.hub.domain.h is None:
+            return
+        for other in self.hub.fixes.values():
+            if other is self or not isinstance(other, VelocityNodes) or other.bound:
+                continue
+            axes = [
+                axis
+                for axis, mine, its in zip(AXES, self.formulas, other.formulas, strict=False)
+                if mine is not None and its is not None and mine.text != its.text
+            ]
+            shared = np.intersect1d(self.group.members, other.group.members) if axes else ()
+            if len(shared):
+                names = " and ".join(f"v{axis}" for axis in axes)
+                count = f"{len(shared)} node{'s' if len(shared) > 1 else ''}"
+                self.hub.warn(
+                    f"fix '{other.id}' (line {other.place.line}) gives {count} of this group "
+                    f"another {names}: this fix decides there",
+                    hint="groups that have no nodes in common, or NULL for one of the components",
+                )

@@ -1,0 +1,221 @@
+"""Commands that change points of solids: delete_particles, translate_particles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal
+
+import numpy as np
+
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.group import ALL, ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.placement import Placement
+from karamelo_py.scene.region import Region
+from karamelo_py.scene.solid import Solid, warn_of_coinciding
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.formulas import evaluated, per_direction
+
+
+class Solids(tuple):
+    """For signatures: a solid, or all of them."""
+
+    script_kind = "the ID of a solid, or all"
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Solids:
+        """The solids that `argument` names."""
+        if ALL in (argument.text, argument.word()):
+            return cls(hub.solids.values())
+        return cls((Solid.from_script(hub, argument),))
+
+
+def delete_particles(hub: Hub, solids: Solids, by: Literal["region"], region: Region) -> None:
+    """Take points of a solid away: holes, notches, what a run has shown to be needless.
+
+    Parameters
+    ----------
+    solids
+        ID of the solid, or ``all``.
+    by
+        The word ``region``.
+    region
+        ID of the region: its points go. As for groups, where they were at first counts.
+
+    Example
+    -------
+    delete_particles(s1, region, hole)
+
+    Notes
+    -----
+    Before the first run the other points are numbered anew, so that it comes before the groups of
+    particles and the contact fixes of these solids. Between runs the others keep their numbers.
+    All points of a solid cannot be deleted before the first run.
+
+    See Also
+    --------
+    translate_particles, boundary, region
+    """
+    found = {solid: region.inside(solid.x0) for solid in solids}
+    if not any(inside.any() for inside in found.values()) and not region.unknown:
+        hub.warn(f"region '{region.id}' holds no points: nothing is deleted")
+        return
+    if has_run(hub):
+        _delete_later(hub, found)
+        return
+    for solid, inside in found.items():
+        if not inside.any():
+            continue
+        refuse_chosen(hub, solid, "delete_particles")
+        if inside.all():
+            raise ScriptError(
+                f"no point of solid '{solid.id}' would be left",
+                argument="region",
+                hint="leave out the solid, and delete_particles",
+            )
+    for solid, inside in found.items():
+        if inside.any():
+            replace_points(hub, solid, _chosen(solid, ~inside))
+
+
+def _delete_later(hub: Hub, found: dict[Solid, np.ndarray]) -> None:
+    for fix in hub.fixes.values():
+        if fix.needs_all_points:
+            raise ScriptError(
+                f"fix {fix.style} '{fix.id}' counts on all points of its solids",
+                argument="solids",
+                hint=f"delete_fix({fix.id}) before",
+            )
+    if hub.rehearsing:
+        return
+    simulation = hub.simulation
+    ids = np.concatenate([np.flatnonzero(i) + solid.first_id for solid, i in found.items()])
+    ids = ids[simulation.present[ids]]
+    if len(ids) == np.count_nonzero(simulation.present):
+        raise ScriptError("no point would be left", argument="region")
+    simulation.remove(ids)
+
+
+def translate_particles(
+    hub: Hub, solids: Solids, by: Literal["region"], region: Region, *shift: Expression | None
+) -> None:
+    """Move points of a solid before the first run.
+
+    Parameters
+    ----------
+    solids
+        ID of the solid, or ``all``.
+    by
+        The word ``region``.
+    region
+        ID of the region: its points move.
+    shift
+        dx, dy, dz, as many as the domain has dimensions: numbers or formulas of x, y and z. NULL
+        leaves a component alone.
+
+    Example
+    -------
+    translate_particles(s1, region, disk, 0.01*sin(2*PI*x), NULL)
+
+    Notes
+    -----
+    The points are there from the start: their reference positions move, and volumes stay (around
+    an axis they follow the radius). A grid of the solid's own covers the new places. The points
+    stay in the groups that they belong to.
+
+    See Also
+    --------
+    delete_particles, solid
+    """
+    formulas = per_direction(hub, "d", shift)
+    if has_run(hub):
+        raise ScriptError(
+            "the points have been in a run, which they would not have come out of",
+            argument="solids",
+            expected="translate_particles before the first run",
+            hint="fix(ID, velocity_particles, ...) moves points in a run",
+        )
+    for solid in solids:
+        inside = region.inside(solid.x0)
+        x = solid.x0[inside]
+        step = np.zeros_like(solid.x0)
+        for k, formula in enumerate(formulas):
+            if formula is not None:
+                step[inside, k] = evaluated(formula, hub, x, x)
+        _move(hub, solid, step)
+
+
+def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
+    """Put the points of `solid` elsewhere, `step` (n, d) from where they are."""
+    moved = _chosen(solid, np.ones(solid.count, np.bool_))
+    x0 = moved.x0 + step
+    if not hub.domain.contains(x0).all():
+        raise ScriptError(
+            f"points of solid '{solid.id}' would leave the domain",
+            argument="shift",
+            expected="a shift that keeps the points in the domain",
+        )
+    if len(step) and (step == step[0]).all():
+        lo, hi = moved.lo + step[0], moved.hi + step[0]
+    else:
+        lo = np.minimum(moved.lo, (x0 - moved.half_size).min(axis=0))
+        hi = np.maximum(moved.hi, (x0 + moved.half_size).max(axis=0))
+    corners = None if moved.corners is None else moved.corners + step[:, None, :]
+    replace_points(hub, solid, moved._replace(x0=x0, lo=lo, hi=hi, corners=corners))
+
+
+def _chosen(solid: Solid, kept: np.ndarray) -> Placement:
+    """The points of a solid that are `kept`, as they were placed."""
+    volume = solid.volume0 / solid.x0[:, 0] if solid.domain.axisymmetric else solid.volume0
+    return Placement(
+        x0=solid.x0[kept],
+        volume=volume[kept],
+        half_size=solid.half_size[kept],
+        lo=solid.lo,
+        hi=solid.hi,
+        shape=solid.shape,
+        corners=None if solid.corners is None else solid.corners[kept],
+    )
+
+
+# ---- what commands that replace points share ---------------------------------------------------
+
+
+def has_run(hub: Hub) -> bool:
+    """Whether the first run has begun, in fact or in the rehearsal of what follows it."""
+    return bool(hub.rehearsed or hub.update.step)
+
+
+def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
+    """Groups of points and contact know points by number, and the numbers from here on change."""
+    for kind, item, affected in _users(hub, solid):
+        if affected:
+            made = "made for" if kind == "fix" else "chosen from"
+            raise ScriptError(
+                f"{kind} '{item.id}' was {made} points that would be replaced or renumbered",
+                argument="solid",
+                expected=f"{kind}({item.id}, ...) after {command}",
+            )
+
+
+def _users(hub: Hub, solid: Solid) -> Iterable[tuple]:
+    """Fixes and groups, and whether they know points of `solid` or of later solids."""
+    for fix in hub.fixes.values():
+        yield "fix", fix, bool(fix.point_fields)
+    for group in hub.groups.values():
+        chosen = isinstance(group, ParticleGroup) and len(group)
+        yield "group", group, chosen and group.ids[-1] >= solid.first_id
+
+
+def replace_points(
+    hub: Hub, solid: Solid, placement: Placement, *, may_be_empty: bool = False
+) -> None:
+    """Give a solid other points, and the solids behind it their new numbers."""
+    before = solid.count
+    solid.put(hub, placement, may_be_empty=may_be_empty)
+    for other in hub.solids.values():
+        if other.index > solid.index:
+            other.first_id += solid.count - before
+    hub.forget_simulation()
+    warn_of_coinciding(hub, solid, solid.id)

@@ -1,0 +1,50 @@
+"""compute center_of_mass."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from karamelo_py.scene.group import AnyGroup, ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Compute
+
+
+class CenterOfMass(Compute):
+    """Measure the centre of mass, published as ID_x, ID_y, ID_z.
+
+    Parameters
+    ----------
+    group
+        Group of points or of nodes, or ``all`` points. Nodes have the mass that the points bring.
+
+    Example
+    -------
+    compute(middle, center_of_mass, ball)
+    log_modify(custom, time, middle_x, middle_y)
+
+    Notes
+    -----
+    0 for a group without mass.
+
+    See Also
+    --------
+    xcm, max_position, average_velocity
+    """
+
+    published = ("x", "y", "z")
+
+    def __init__(self, hub: Hub, group: AnyGroup):
+        super().__init__(hub, group)
+
+    def refresh(self) -> None:
+        """Measure and publish."""
+        fields = self.hub.fields
+        if isinstance(self.group, ParticleGroup):
+            members = fields.members(self.group)
+            mass, x = fields.mass[members].astype(float), fields.position[members]
+        else:
+            members = self.group.members
+            mass = fields.node("mass")[members]
+            x = np.column_stack([fields.node(axis)[members] for axis in "xyz"])
+        total = mass.sum()
+        self.publish_components(mass @ x / total if total > 0 else np.zeros(3))

@@ -1,0 +1,72 @@
+"""fix indent: a ball that pushes points away."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+
+from karamelo_py.language.signature import NonNegative
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.tools import Bodies, PointForceFix, place
+
+
+class Indent(PointForceFix):
+    """Push points out of a ball (in the plane a disk) with a force that grows as depth squared.
+
+    Parameters
+    ----------
+    group
+        Group of points, or ``all``.
+    kind
+        The word ``sphere``.
+    K
+        Acceleration per depth squared: a number or a formula of time.
+    R
+        Radius of the ball: a number or a formula of time.
+    x, y, z
+        Its centre: numbers or formulas of time; z is 0 in the plane.
+
+    Example
+    -------
+    fix(ball, indent, all, sphere, 1e4, 0.2, 0.5, 1.2 - 0.1*time, 0)
+
+    Notes
+    -----
+    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it, as
+    ``fix indent`` of LAMMPS has it, but per mass. Publishes the force on the points as ID_x, ID_y,
+    ID_z and the number of those that it pushes as ID_s.
+
+    See Also
+    --------
+    indent/minimize_penetration, impenetrablesurface
+    """
+
+    published = ("x", "y", "z", "s")
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        kind: Literal["sphere"],
+        K: Annotated[Expression, NonNegative],
+        R: Annotated[Expression, NonNegative],
+        x: Expression,
+        y: Expression,
+        z: Expression,
+    ):
+        super().__init__(hub, group)
+        self.K, self.R = K, R
+        self.centre = place(hub, x, y, z)
+
+    def push(self, bodies: Bodies) -> np.ndarray:
+        """See `PointForceFix.push`."""
+        K, R = self.now((self.K, self.R))
+        away = bodies.x - self.now(self.centre)
+        r = np.linalg.norm(away, axis=1)
+        depth = np.maximum(R - r, 0)
+        self.publish("s", np.count_nonzero(depth))
+        size = np.divide(bodies.mass * K * depth**2, r, out=np.zeros_like(r), where=r > 0)
+        return size[:, None] * away

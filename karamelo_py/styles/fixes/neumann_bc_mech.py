@@ -1,0 +1,53 @@
+"""fix neumann_bc_mech: a traction on points at a surface."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.formulas import evaluated, per_direction
+from karamelo_py.styles.fixes.tools import Bodies, PointForceFix
+
+
+class NeumannBcMech(PointForceFix):
+    """Load the surface of a body with a force per area.
+
+    Parameters
+    ----------
+    group
+        Group of points: one layer of them along the surface.
+    traction
+        tx, ty, tz, as many as the domain has dimensions: force per area, numbers or formulas of x,
+        y, z, x0, y0, z0, time and published values. NULL leaves a component alone.
+
+    Example
+    -------
+    fix(load, neumann_bc_mech, top, 0, -1e6*min(time/0.01, 1))
+
+    Notes
+    -----
+    A point shows one face to what is around it, the side of a cube of its present volume: V^(2/3)
+    in space, V^(1/2) in the plane, the whole section in one dimension; around an axis the face is
+    at the radius of the point, somewhat inside the surface. Points lie half a side inside of the
+    surface where the load acts in fact. Publishes the total force as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    force_nodes, body_force, heat_flux_particles
+    """
+
+    syntax = "group, tx[, ty[, tz]]"
+
+    def __init__(self, hub: Hub, group: ParticleGroup, *traction: Expression | None):
+        super().__init__(hub, group)
+        self.traction = per_direction(hub, "t", traction)
+
+    def push(self, bodies: Bodies) -> np.ndarray:
+        """See `PointForceFix.push`."""
+        force = np.zeros_like(bodies.x)
+        for k, formula in enumerate(self.traction):
+            if formula is not None:
+                force[:, k] = bodies.face * evaluated(formula, self.hub, bodies.x, bodies.x0)
+        return force

@@ -1,0 +1,81 @@
+"""leq and geq in velocity_nodes, and fixes that hold the same nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import SCHEMES, block
+
+MASS = 0.12  # 0.3 x 0.2 with rho 2
+EVERY = ["region(every, block, -INF, INF, -INF, INF)", "group(nodes, nodes, region, every, all)"]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(("bound", "sign"), [("leq0.02", 1), ("geq-0.02", -1)])
+def test_a_bound_acts_from_where_it_is_reached(run_interpreted, scheme, bound, sign):
+    """v = 10 t up to 0.02 at the end of the second step; then the reaction is the weight."""
+    log = run_interpreted(
+        block(
+            2, *EVERY, f"fix(wall, velocity_nodes, nodes, {bound}, NULL)",
+            f"fix(g, body_force, all, {10 * sign}, 0)", "compute(v, average_velocity, all)",
+            "log_modify(custom, step, v_x, wall_x)", "set_dt(0.001)", "run(6)",
+            scheme=scheme,
+        )
+    ).log  # fmt: skip
+    assert sign * log.v_x == pytest.approx([0, 0.01, 0.02, 0.02, 0.02, 0.02, 0.02], abs=1e-9)
+    reaction = -sign * np.array([0, 0, 0, 10, 10, 10, 10]) * MASS
+    assert log.wall_x == pytest.approx(reaction, rel=1e-8, abs=1e-9)
+
+
+def test_a_floor_lets_go_what_moves_up(run_interpreted):
+    """geq of a formula: nodes of the floor at rest are carried up by time, others go their way."""
+    log = run_interpreted(
+        block(
+            2, *EVERY, "v0 = 3", "fix(floor, velocity_nodes, nodes, NULL, geqv0 - time)",
+            "fix(v, initial_velocity_particles, all, 0, 5)", "compute(v, average_velocity, all)",
+            "log_modify(custom, step, v_y, floor_y)", "set_dt(0.001)", "run(3)",
+        )
+    ).log  # fmt: skip
+    assert log.v_y[1:] == pytest.approx(np.full(3, 5), rel=1e-12)
+    assert not log.floor_y.any()
+
+
+def test_a_variable_of_such_a_name_is_a_variable(run_interpreted):
+    log = run_interpreted(
+        block(
+            2, *EVERY, "leq1 = 7", "fix(f, velocity_nodes, nodes, leq1, 0)",
+            "compute(v, average_velocity, all)", "log_modify(custom, step, v_x)", "set_dt(1e-4)",
+            "run(2)", transfer="PIC",
+        )
+    ).log  # fmt: skip
+    assert log.v_x[-1] == pytest.approx(7, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("fix(f, velocity_nodes, nodes, 0, leq0)", "fix(ID1, velocity_nodes, nodes, 0, NULL)"),
+        ("fix(f, velocity_nodes, nodes, 0, leq0)", "fix(ID2, velocity_nodes, nodes, NULL, leq0)"),
+        ("fix(f, velocity_nodes, nodes, leqq, 0)", "unknown name 'q'"),
+        ("fix(f, velocity_nodes, nodes, leq, 0)", "there is nothing here"),
+        ("a = leq0", "fix velocity_nodes"),
+    ],
+)  # fmt: skip
+def test_bounds_that_cannot_be(run_interpreted, line, says):
+    assert says in run_interpreted(block(2, *EVERY, line), status=1).err
+
+
+@pytest.mark.parametrize(
+    ("second", "warns"),
+    [("1, NULL", True), ("NULL, 0", False), ("0, NULL", False), ("leq1, NULL", False)],
+)
+def test_fixes_that_do_not_agree(run_interpreted, second, warns):
+    """Of the block, 4 x 3 nodes have mass; all 13 x 13 belong to both groups."""
+    err = run_interpreted(
+        block(
+            2, *EVERY, "fix(one, velocity_nodes, nodes, 0, NULL)",
+            f"fix(two, velocity_nodes, all, {second})",
+        )
+    ).err  # fmt: skip
+    assert ("gives 169 nodes of this group another vx: this fix decides there" in err) == warns
+    assert ("another vx" in err) == warns

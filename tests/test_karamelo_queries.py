@@ -1,0 +1,114 @@
+"""Centre of mass, forces of groups, mean stress and reactions, against sums by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import block
+
+# 2D block of 0.3 x 0.2 at 0.3 with rho 2 and 24 points: mass 0.12, centre (0.45, 0.4).
+MASS = 0.12
+
+
+def test_centre_of_mass_falls_as_a_point_does(run_interpreted):
+    """Positions of the scheme sum to dt^2 b n(n+1)/2; nodes have the centre of the points."""
+    log = run_interpreted(
+        block(
+            2, "fix(g, body_force, all, 0, -3)", "group(nodes, nodes, region, box, all)",
+            "region(half, block, 0.3, 0.45, 0.3, 0.5)", "group(part, particles, region, half, all)",
+            "compute(c, center_of_mass, all)", "height = xcm(all, y)",
+            "log_modify(custom, step, c_x, c_y, height,"
+            " xcm(part, x), 2*xcm(nodes, x), xcm(all, z))",
+            "set_dt(0.001)", "run(10)",
+        )
+    ).log  # fmt: skip
+    step, c_x, c_y, height, part, twice_nodes, z = log.values()
+    fall = 3e-6 * step * (step + 1) / 2
+    assert c_x == pytest.approx(np.full(11, 0.45), rel=1e-12)
+    assert c_y == pytest.approx(0.4 - fall, rel=1e-12)
+    assert height == pytest.approx(c_y, rel=1e-15)
+    assert part == pytest.approx(np.full(11, 0.375), rel=1e-12)
+    assert twice_nodes[0] == pytest.approx(0.9, rel=1e-12)
+    assert not z.any()
+
+
+def test_external_force_of_nodes_and_rate_of_momentum(run_interpreted):
+    """A free body: no internal force in all, the weight outside, and m a = the weight."""
+    log = run_interpreted(
+        block(
+            2, "region(every, block, -INF, INF, -INF, INF)",
+            "group(nodes, nodes, region, every, all)", "fix(g, body_force, all, 5, -3)",
+            "fix(v, initial_velocity_particles, all, 0, 0.1*(y0 - 0.4))",
+            "log_modify(custom, step, external_force(nodes, x), external_force(nodes, y),"
+            " internal_force(nodes, y), internal_force(all, x), internal_force(all, y))",
+            "set_dt(0.001)", "run(5)",
+        )
+    ).log  # fmt: skip
+    _, outer_x, outer_y, inner_y, rate_x, rate_y = (column[1:] for column in log.values())
+    assert outer_x == pytest.approx(np.full(5, 5 * MASS), rel=1e-9)
+    assert outer_y == pytest.approx(np.full(5, -3 * MASS), rel=1e-9)
+    assert inner_y == pytest.approx(np.zeros(5), abs=1e-12)
+    assert rate_x == pytest.approx(np.full(5, 5 * MASS), rel=1e-9)
+    assert rate_y == pytest.approx(np.full(5, -3 * MASS), rel=1e-9)
+
+
+def test_reaction_and_internal_force_of_a_support(run_interpreted):
+    """All nodes held against gravity: the reaction is the weight, shared or conflicting or not.
+
+    A third fix on nodes that are held already takes over and the sum stays.
+    """
+    log = run_interpreted(
+        block(
+            2, "region(every, block, -INF, INF, -INF, INF)",
+            "region(low, block, INF, INF, INF, 0.41)",
+            "group(nodes, nodes, region, every, all)", "group(foot, nodes, region, low, all)",
+            "fix(hold, velocity_nodes, nodes, 0, 0)", "fix(more, velocity_nodes, foot, 0, 0)",
+            "fix(g, body_force, all, NULL, -9)", "compute(R, reaction, nodes)",
+            "compute(Rall, reaction, all)",
+            "log_modify(custom, step, R_y, Rall_y, external_force(nodes, y), hold_y)",
+            "set_dt(0.001)", "run(4)",
+        )
+    ).log  # fmt: skip
+    assert log.R_y[1:] == pytest.approx(np.full(4, 9 * MASS), rel=1e-9)
+    assert (log.Rall_y == log.R_y).all()
+
+
+def test_reaction_of_a_part_of_a_fix_is_refused(run_interpreted):
+    """A fix on nodes of the group and others has one reaction, which is not that of the group."""
+    err = run_interpreted(
+        block(
+            2, "region(low, block, INF, INF, INF, 0.41)", "group(foot, nodes, region, low, all)",
+            "fix(hold, velocity_nodes, all, 0, 0)", "compute(R, reaction, foot)",
+            "log_modify(custom, step, R_y)", "run(1)",
+        ),
+        status=1,
+    ).err  # fmt: skip
+    assert "fix 'hold' holds nodes of group 'foot' and others" in err
+
+
+def test_mean_stress_of_a_given_state(run_interpreted):
+    """Half of the body at s11 = 4, all at s12 = -1: the mean over equal volumes is 2 and -1."""
+    log = run_interpreted(
+        block(
+            2, "region(half, block, 0.3, 0.5, 0.3, 0.4)", "region(rest, block, 0.3, 0.6, 0.3, 0.5)",
+            "group(part, particles, region, half, all)",
+            "fix(s0, initial_stress, all, if(y0 < 0.4, 4, 0), NULL, NULL, NULL, NULL, -1)",
+            "compute(s, average_stress, all)", "compute(p, average_stress, part)",
+            "log_modify(custom, step, s_11, s_12, s_23, p_11)", "set_dt(1e-9)", "run(1)",
+        )
+    ).log  # fmt: skip
+    assert log.s_11 == pytest.approx([2, 2], rel=1e-6)
+    assert log.s_12 == pytest.approx([-1, -1], rel=1e-6)
+    assert log.p_11 == pytest.approx([4, 4], rel=1e-6)
+    assert not log.s_23.any()
+
+
+def test_forces_of_groups_in_conditions(run_interpreted):
+    """run_until follows the centre: v = 1 covers 0.01 in ten steps of 0.001."""
+    log = run_interpreted(
+        block(
+            2, "fix(v, initial_velocity_particles, all, 1, 0)", "set_dt(0.001)",
+            "log_modify(custom, step)", "run_until(xcm(all, x) > 0.4595)",
+        )
+    ).log  # fmt: skip
+    assert log.Step[-1] == 10

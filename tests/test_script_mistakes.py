@@ -1,0 +1,83 @@
+"""Several mistakes of a script in one go, and mistakes in scripts that others include."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from scenes import block
+
+
+def places(err: str) -> list[tuple[int, str]]:
+    """Line and first words of each error."""
+    return [(int(line), text) for line, text in re.findall(r":(\d+):\d+: error: (.*)", err)]
+
+
+HEAD = 6  # lines that block() writes before those of the test
+
+
+def test_all_mistakes_that_do_not_follow_from_each_other(run_interpreted):
+    lines = [
+        "a = sqroot(2)",  # 1: wrong
+        "b = 2*a",  # follows from the first
+        "fix(g, body_forc, all, 0, -9)",  # 3: wrong
+        "fix(h, body_force, all, 0)",  # 4: wrong
+        "c = g_x + 1",  # follows from the third
+        "log_modify(custom, step, c)",  # and this from that
+        "log_modify(custom, step, tim)",  # 7: wrong
+        "e = wrong_name",  # 8: wrong
+        "f = wrong_name*2",  # the same again
+        "run(10)",
+    ]
+    err = run_interpreted(block(2, *lines), status=1).err
+    assert [line - HEAD for line, _ in places(err)] == [1, 3, 4, 7, 8]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "others"),
+    [
+        ("region(b, blok, 0, 1, 0, 1)", ["unknown solid 'nobody'"]),
+        ("dimension(2, 0, 1, 0)", []),  # nothing goes without a domain
+    ],
+)
+def test_what_follows_from_a_missing_part_is_not_told(run_interpreted, wrong, others):
+    script = f"""\
+        method(ulmpm, FLIP, linear, 1)
+        {"dimension(2, 0, 1, 0, 1, 0.1)" if "region" in wrong else ""}
+        {wrong}
+        material(m, linear, 1, 100, 0.3)
+        solid(s, region, b, 2, m, 0.1)
+        group(g, particles, region, b, solid, s)
+        fix(v, initial_velocity_particles, g, 1, 0)
+        delete_fix(v)
+        delete_particles(nobody, region, b)
+        region(other, block, 0, 1, 0, 1)
+        delete_particles(nobody, region, other)
+        run(10)
+        """
+    found = places(run_interpreted(script, status=1).err)
+    assert [text.split(": ")[-1] for _, text in found[1:]] == others
+
+
+def test_mistakes_behind_the_first_run_are_found_before_it(run_interpreted):
+    lines = ["run(1)", "a = 1 + nothing", "run(abc)", "dump(d, all, partikle, 1, d.*)"]
+    result = run_interpreted(block(2, *lines), status=1)
+    assert [line - HEAD for line, _ in places(result.err)] == [2, 3, 4]
+    assert not (result.folder / "log.mpm").exists()
+
+
+def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, tmp_path):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "outer.in").write_text("b = 1\ninclude(inner.in)\n")
+    (folder / "inner.in").write_text("c = 2\nd = nothing\n")
+    (folder / "broken.in").write_text("c = (2\n")
+    script = "a = 1\ninclude(outer.in)\ne = nobody\ninclude(broken.in)\n"
+    err = run_interpreted(script, status=1).err
+    inner = err.index("inner.in:2:5: error: unknown name 'nothing'")
+    outer = err.index("outer.in:2: the script above is included here")
+    main = err.index("in.script:2: the script above is included here")
+    then = err.index("in.script:3:5: error: unknown name 'nobody'")
+    broken = err.index("broken.in:1:")
+    last = err.index("in.script:4: the script above is included here")
+    assert inner < outer < main < then < broken < last
