@@ -7,7 +7,11 @@ import gzip
 import numpy as np
 import pytest
 from fakes import FakeHub
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
+from karamelo_py.kernels import text
 from karamelo_py.output import files
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.dumps import lammps
@@ -108,18 +112,46 @@ def test_positions_are_always_written(plane):
     assert Particle(plane, 1, "p", "id", "vx", "z", "y", "x", "vx").columns == ("vx", "z", "y", "x")
 
 
+def as_python(*columns):
+    """The rows of a table as Python writes them."""
+    line = " ".join("%d" if column.dtype.kind == "i" else "%.9g" for column in columns) + "\n"
+    lists = [column.tolist() for column in columns]
+    return "".join(line % row for row in zip(*lists, strict=True)).encode()
+
+
 def test_rows_keep_integers_and_nine_digits():
-    count = lammps.ROWS + 3
+    count = text.ROWS + 3
     integers = np.arange(count) * 10_000_000_000
     numbers = np.linspace(-1e-7, 1, count) / 3
-    text = b"".join(lammps.rows([integers, numbers])).decode().splitlines()
-    assert len(text) == count
-    assert [int(line.split()[0]) for line in text] == list(integers)
-    np.testing.assert_allclose([float(line.split()[1]) for line in text], numbers, rtol=1e-8)
+    assert b"".join(text.rows([integers, numbers])) == as_python(integers, numbers)
+
+
+@given(
+    arrays(float, 7, elements=st.floats(allow_subnormal=True)),
+    arrays(np.int64, 7, elements=st.integers(-(2**63), 2**63 - 1)),
+    st.integers(-30, 30),
+)
+def test_rows_are_as_python_writes_them(numbers, integers, power):
+    """Any double, any integer, what lies around a tie, and what has few digits."""
+    few = np.round(integers / 2.0**50, 3) * 10.0**power
+    halves = (integers // 2**25 + 0.5) * 10.0**power
+    close = np.nextafter(halves, np.inf)
+    columns = [integers, numbers, few, halves, close]
+    assert b"".join(text.rows(columns)) == as_python(*columns)
+
+
+def test_rows_of_all_kinds_of_doubles():
+    """Half of them of random bits, the others with as many bits as make exact ties."""
+    rng = np.random.default_rng(5)
+    bits = rng.integers(-(2**63), 2**63, 100_000).view(float)
+    ties = rng.integers(-(2**33), 2**33, 100_000) / 2.0 ** rng.integers(0, 40, 100_000)
+    powers = 10.0 ** rng.integers(-320, 308, 100_000)
+    columns = [bits, ties, powers, -np.nextafter(powers, 0)]
+    assert b"".join(text.rows(columns)) == as_python(*columns)
 
 
 def test_rows_of_nothing():
-    assert b"".join(lammps.rows([np.zeros(0, int), np.zeros(0)])) == b""
+    assert b"".join(text.rows([np.zeros(0, int), np.zeros(0)])) == b""
 
 
 def test_rhythm(plane):
