@@ -10,6 +10,7 @@ import numpy as np
 
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import ABSENT_AT_NODES, ABSENT_AT_POINTS
+from karamelo_py.scene.lattice import Lattice
 
 
 class FakeValues(dict):
@@ -42,6 +43,7 @@ class FakeFields:
         self.nodes["mass"] = np.where(nodes[:, 0] > 0, 1.0, 0.0)
         self.nodes["type"] = np.ones(len(nodes), np.int64)
         self.node_count = len(nodes)
+        hub.lattices = [Lattice(dimension, hub.domain.lo, hub.domain.hi, hub.domain.h)]
 
     def absent_at_points(self):
         return list(ABSENT_AT_POINTS)

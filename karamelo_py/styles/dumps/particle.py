@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
-from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.dumps.lammps import LammpsDump
+from karamelo_py.styles.dumps.table import OfPoints
 
 
-class Particle(LammpsDump):
+class Particle(OfPoints, LammpsDump):
     """Write the material points in LAMMPS text format, which OVITO opens.
 
     Each row begins with the point's number (``id``, the same through the whole run) and the number
@@ -33,26 +29,3 @@ class Particle(LammpsDump):
     -------
     dump(d1, all, particle, 100, dump_p.*.LAMMPS, x, y, z, vx, vy, vz, s11, s22, s12)
     """
-
-    @staticmethod
-    def names(hub: Hub) -> Sequence[str]:
-        """Names of the columns that can be written."""
-        return hub.fields.particle_names()
-
-    @property
-    def absent(self) -> Sequence[str]:
-        """Columns that are 0 because no point keeps them."""
-        return self.hub.fields.absent_at_points()
-
-    def ids(self) -> tuple[np.ndarray, np.ndarray]:
-        """Number and solid of each point."""
-        fields = self.hub.fields
-        return _integers(fields.particle("id")), _integers(fields.particle("type"))
-
-    def field(self, name: str) -> np.ndarray:
-        """(N,) values of a particle field."""
-        return self.hub.fields.particle(name)
-
-
-def _integers(values: np.ndarray) -> np.ndarray:
-    return values.astype(np.int64, copy=False)
