@@ -73,7 +73,11 @@ class FakeHub:
         used = np.arange(3) < dimension
         self.folder = Path(folder)
         self.domain = SimpleNamespace(
-            dimension=dimension, lo=np.where(used, -0.5, 0.0), hi=np.where(used, 0.5, 0.0), h=0.25
+            dimension=dimension,
+            lo=np.where(used, -0.5, 0.0),
+            hi=np.where(used, 0.5, 0.0),
+            h=0.25,
+            axisymmetric=False,
         )
         self.update = SimpleNamespace(step=0, time=0.0, dt=0.1)
         self.values = FakeValues(Ek=1.0, Ek_s=1.0, Es_s=0.0)
@@ -84,6 +88,8 @@ class FakeHub:
         self.fields = FakeFields(self, count)
         self.dumps = {}
         self.fixes = {}
+        self.computes = {}
+        self.solids = {"left": None, "right": None}
         self.refreshed = []
         self.output = Output(self)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import shutil
 
 import numpy as np
 import pytest
@@ -13,10 +14,12 @@ from hypothesis.extra.numpy import arrays
 
 from karamelo_py.kernels import text
 from karamelo_py.output import files
+from karamelo_py.output.units import Units
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.dumps import lammps
 from karamelo_py.styles.dumps.grid import Grid
 from karamelo_py.styles.dumps.grid_gz import GridGz
+from karamelo_py.styles.dumps.movie import Movie
 from karamelo_py.styles.dumps.particle import Particle
 from karamelo_py.styles.dumps.particle_gz import ParticleGz
 from karamelo_py.styles.dumps.pyplot import PyPlot
@@ -280,7 +283,8 @@ def test_pictures_of_a_run_do_not_jump(hub):
         hub.fields.points["seq"] *= factor
         dump.write()
         labels = [label.get_text() for label in picture.scale.get_ticklabels()]
-        assert {len(label.partition(".")[2]) for label in labels} == {2}
+        numbers = [float(label.replace("\N{MINUS SIGN}", "-")) for label in labels]
+        assert numbers == pytest.approx(picture.scale.get_ticklocs())
         np.testing.assert_allclose(places(), before, atol=1e-9)
 
 
@@ -290,6 +294,128 @@ def test_numbers_that_hardly_differ_are_told_apart(plane):
     dump.write()
     labels = [label.get_text() for label in dump._picture.scale.get_ticklabels()]
     assert len(set(labels)) == len(labels) > 2
+
+
+def test_colours_of_components_lie_about_zero(plane):
+    dump = PyPlot(plane, 1, "p.png", 4, 3, "vx")
+    dump.write()
+    lo, hi = dump._picture.limits
+    assert lo == -hi < plane.fields.points["vx"].min()
+    assert (dump.cmap, PyPlot(plane, 1, "q.png", 4, 3, "seq").cmap) == ("coolwarm", "viridis")
+
+
+def test_limits_that_are_given_stay(plane):
+    dump = PyPlot(plane, 1, "p.png", 4, 3, "vx", vmin=0.0, vmax=2e-3, cmap="magma")
+    for factor in (1, 1000):
+        plane.fields.points["vx"] *= factor
+        dump.write()
+        assert dump._picture.limits == (0, 2e-3)
+    half = PyPlot(plane, 1, "p.png", 4, 3, "vx", vmin=-9.0)
+    half.write()
+    assert half._picture.limits[0] == -9 and half._picture.limits[1] > 1
+
+
+def test_pyplot_refuses_limits_and_maps(plane):
+    with pytest.raises(ScriptError, match="from 2 to 1") as caught:
+        PyPlot(plane, 1, "p.png", 4, 3, "vx", vmin=2.0, vmax=1.0)
+    assert caught.value.argument == "vmax"
+    with pytest.raises(ScriptError, match="viridi") as caught:
+        PyPlot(plane, 1, "p.png", 4, 3, "vx", cmap="viridi")
+    assert caught.value.argument == "cmap"
+
+
+def test_a_view_from_above_is_the_plane(tmp_path):
+    """Elevation 90 and azimuth -90: x to the right, y upwards."""
+    hub = FakeHub(tmp_path, dimension=3)
+    dump = PyPlot(hub, 1, "p.png", 4, 4, azimuth=-90.0, elevation=90.0, axes=False, title="above")
+    dump.write()
+    drawn = np.asarray(dump._picture.artist.get_offsets())
+    order = np.argsort(hub.fields.points["z"], kind="stable")
+    for axis, name in enumerate("xy"):
+        np.testing.assert_allclose(drawn[:, axis], hub.fields.points[name][order], atol=1e-12)
+    assert dump._picture.title.get_text() == "above: step 0, time 0"
+
+
+def test_a_ball_is_lit_where_it_faces_the_light(tmp_path):
+    """Brighter at the top left than at the bottom right of the picture."""
+    hub = FakeHub(tmp_path, dimension=3)
+    axis = np.linspace(-0.4, 0.4, 21)
+    x = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
+    x = x[np.linalg.norm(x, axis=1) < 0.4]
+    hub.fields.points = dict(zip("xyz", x.T, strict=True))
+    hub.fields.points |= {"type": np.ones(len(x), int), "volume": np.full(len(x), 0.04**3)}
+    dump = PyPlot(hub, 1, "p.png", 4, 4)
+    dump.write()
+    seen = np.asarray(dump._picture.artist.get_offsets())
+    front = np.arange(len(seen)) > 0.9 * len(seen)  # the nearest are drawn last
+    light = dump._picture.artist.get_facecolors()[:, 2]
+    towards = seen @ [-0.35, 0.6]
+    low, high = (light[front & s].mean() for s in (towards < -0.1, towards > 0.1))
+    assert high > 1.3 * low
+
+
+def test_points_have_the_size_of_what_they_stand_for(plane):
+    """Rings of an axisymmetric scene, too, whose volume is that per radian."""
+    side = PyPlot(plane, 1, "p.png", 4, 3)._side(plane.fields.points["x"])
+    assert side == pytest.approx(np.sqrt(0.5 / 40))
+    plane.domain.axisymmetric = True
+    x = np.linspace(1e-4, 1e-2, 40)
+    plane.fields.points["volume"] = x * 0.05**2
+    assert PyPlot(plane, 1, "p.png", 4, 3)._side(x) == pytest.approx(0.05)
+
+
+def test_legend_of_solids_and_units(plane):
+    plane.output.units = Units("mm", "g", "ms")
+    dump = PyPlot(plane, 1, "p.svg", 4, 3)
+    dump.write()
+    svg = (plane.folder / "p.svg").read_text()
+    for word in ("left", "right", "x [mm]", "y [mm]", "step 0, time 0 ms"):
+        assert f"<!-- {word} -->" in svg
+    PyPlot(plane, 1, "q.svg", 4, 3, "seq").write()
+    assert "<!-- seq [MPa] -->" in (plane.folder / "q.svg").read_text()
+
+
+def test_units_are_in_the_header_and_ovito_reads_on(plane):
+    io = pytest.importorskip("ovito.io", exc_type=ImportError)
+    plane.output.units = Units("mm", "g", "ms")
+    Particle(plane, 1, "p.dump").write()
+    assert (plane.folder / "p.dump").read_text().startswith("ITEM: UNITS\nmm g ms K\nITEM: TIME")
+    assert io.import_file(str(plane.folder / "p.dump")).compute().particles.count == 40
+
+
+def test_movie_has_a_frame_for_each_state(hub):
+    image = pytest.importorskip("PIL.Image")
+    hub.dumps["d"] = Movie(hub, 2, "m.gif", 3, 2)
+    hub.run(4)
+    assert image.open(hub.folder / "m.gif").n_frames == 3
+    hub.fields.points["x"] *= 0.5
+    hub.run(2)
+    movie = image.open(hub.folder / "m.gif")
+    assert movie.n_frames == 4 and movie.size == (300, 200)
+    assert movie.info["duration"] == 40
+
+
+def test_movie_of_a_run_that_breaks_off(plane):
+    plane.dumps["d"] = Movie(plane, 2, "m.gif", 3, 2)
+    plane.output.begin()
+    plane.output.abort()
+    assert (plane.folder / "m.gif").exists()
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
+def test_movie_through_ffmpeg(plane):
+    plane.dumps["d"] = Movie(plane, 2, "m.mp4", 3.01, 2)
+    plane.run(4)
+    assert (plane.folder / "m.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_mp4_without_ffmpeg_is_refused(plane, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(ScriptError, match="ffmpeg") as caught:
+        Movie(plane, 2, "m.mp4", 3, 2)
+    assert caught.value.hint == "m.gif"
+    with pytest.raises(ScriptError, match="no name for a movie"):
+        Movie(plane, 2, "m.*.gif", 3, 2)
 
 
 def test_pyplot_survives_fields_without_range(plane):

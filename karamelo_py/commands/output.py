@@ -12,6 +12,7 @@ from karamelo_py.language.signature import Argument, OutputFile, Positive
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import Curve
 from karamelo_py.output.quantity import Quantity
+from karamelo_py.output.units import LENGTHS, MASSES, TIMES, Units
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -193,7 +194,16 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Quantity) -
     hub.output.log.columns = list(keys)
 
 
-def plot(hub: Hub, ID: str, every: Annotated[int, Positive], x: Quantity, y: Quantity) -> None:
+def plot(
+    hub: Hub,
+    ID: str,
+    every: Annotated[int, Positive],
+    x: Quantity,
+    y: Quantity,
+    *,
+    axis: Literal["left", "right"] = "left",
+    scale: Literal["linear", "log"] = "linear",
+) -> None:
     """Plot one quantity against another, in the picture that save_plot names.
 
     Curves over the same x share one diagram, with a legend of their IDs.
@@ -206,10 +216,15 @@ def plot(hub: Hub, ID: str, every: Annotated[int, Positive], x: Quantity, y: Qua
         Steps between two points of the curve.
     x, y
         ``step``, ``dt``, ``time``, a variable, a value of a fix or compute, or a formula of these.
+    axis
+        The side of the axis of y: ``right`` for a second one, with limits of its own.
+    scale
+        ``log`` for a logarithmic axis of y; numbers that are not positive are left out.
 
     Example
     -------
     plot(kinetic, 10, time, Ek_s)
+    plot(force, 10, time, piston_y, axis=right)
 
     See Also
     --------
@@ -218,7 +233,7 @@ def plot(hub: Hub, ID: str, every: Annotated[int, Positive], x: Quantity, y: Qua
     plots = hub.output.plots
     if ID in plots.ids():
         raise ScriptError(f"plot ID '{ID}' is already used", argument="ID")
-    plots.add(ID, Curve(every, x, y))
+    plots.add(ID, Curve(every, x, y, axis, scale))
 
 
 def save_plot(hub: Hub, file: OutputFile) -> None:
@@ -250,4 +265,32 @@ def save_plot(hub: Hub, file: OutputFile) -> None:
     plots = hub.output.plots
     plots.file, plots.place = file, hub.place
     if not hub.rehearsing:
-        plots.save()
+        plots.finish()
+
+
+def units(
+    hub: Hub,
+    length: Literal[*LENGTHS],
+    mass: Literal[*MASSES],
+    time: Literal[*TIMES],
+    temperature: Literal["K", "C"] = "K",
+) -> None:
+    """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.
+
+    No number changes by it: a scene in mm, g, ms has forces in N, stresses in MPa and energies in
+    mJ, whether it says so or not.
+
+    Parameters
+    ----------
+    length, mass, time, temperature
+        The units that the numbers of the script are in.
+
+    Example
+    -------
+    units(mm, g, ms)
+
+    See Also
+    --------
+    dump, plot
+    """
+    hub.output.units = Units(length, mass, time, temperature)

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.log import FILE, Log
 from karamelo_py.output.plots import Plots
+from karamelo_py.output.units import Units
 from karamelo_py.script.errors import ScriptError
 
 
@@ -38,6 +39,7 @@ class Output:
         self.hub = hub
         self.log = Log(hub)
         self.plots = Plots(hub)
+        self.units: Units | None = None
         # Which dump a file belongs to.
         self.files: dict[Path, str] = {}
 
@@ -94,33 +96,39 @@ class Output:
             item.last_step = step
 
     def end(self, last: bool = True) -> None:
-        """Write the last state of a run (unless `last` is false) and draw the plots."""
+        """Write the last state of a run (unless `last` is false), and complete plots and dumps."""
         if self.hub.rehearsing:
             return
         if last:
             self.write(last=True)
-        self._save_plots()
+        for item in self._to_finish():
+            self._finish(item)
 
     def abort(self) -> None:
-        """Draw the plots and close the log of a run that breaks off.
+        """Draw the plots, complete dumps and close the log of a run that breaks off.
 
         No further state is written: a caller that holds a sound one calls ``write(last=True)``
-        before. What prevents the plots is told as a warning, as another error is on its way.
+        before. What prevents them is told as a warning, as another error is on its way.
         """
         if self.hub.rehearsing:
             return
         try:
-            self._save_plots()
-        except ScriptError as error:
-            self.hub.console.warn(error.render())
+            for item in self._to_finish():
+                try:
+                    self._finish(item)
+                except ScriptError as error:
+                    self.hub.console.warn(error.render())
         finally:
             self.log.close()
 
-    def _save_plots(self) -> None:
+    def _to_finish(self) -> list:
+        return [self.plots, *self.hub.dumps.values()]
+
+    def _finish(self, item: Any) -> None:
         try:
-            self.plots.save()
+            item.finish()
         except ScriptError as error:
-            raise _located(error, self.plots) from error.__cause__
+            raise _located(error, item) from error.__cause__
 
     def _items(self) -> list[Periodic]:
         return [self.log, *self.hub.dumps.values(), *self.plots]

@@ -54,6 +54,9 @@ class Dump:
         """Write the present state."""
         raise NotImplementedError
 
+    def finish(self) -> None:
+        """Complete what is written; called at the end of each run, also of one that breaks off."""
+
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
         """Warn of columns that are 0 because no point or node (`what`) keeps them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]

@@ -103,7 +103,9 @@ def header(hub: Hub, count: int, names: Sequence[str]) -> bytes:
             # slice of unit width.
             lo, hi = -0.5 * domain.h, 0.5 * domain.h
         bounds.append(f"{lo:.10g} {hi:.10g}")
+    units = hub.output.units
     lines = [
+        *(["ITEM: UNITS", str(units)] if units else []),
         "ITEM: TIMESTEP",
         str(hub.update.step),
         "ITEM: TIME",
