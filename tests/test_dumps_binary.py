@@ -12,6 +12,7 @@ import meshio
 import numpy as np
 import pytest
 from fakes import FakeHub
+from PIL import Image
 
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.grid_hdf5 import GridHdf5
@@ -107,6 +108,7 @@ import os, sys
 sys.path.insert(0, sys.argv[1])
 import h5py
 from fakes import FakeHub
+from PIL import Image
 from karamelo_py.styles.dumps.hdf5 import Hdf5
 hub = FakeHub(sys.argv[2])
 dump = Hdf5(hub, 1, "p.h5", "seq")
@@ -188,3 +190,49 @@ def test_a_series_needs_a_name_for_a_series(plane, name):
     with pytest.raises(ScriptError) as caught:
         Vtk(plane, 1, name)
     assert caught.value.hint == "p.*.vtu"
+
+
+@pytest.mark.parametrize("method", ["ulmpm", "tlmpm", "ulmpm/contacts"])
+def test_all_styles_on_a_scene(run_interpreted, method):
+    """An axisymmetric scene of two solids, of one grid or several, in every form."""
+    run = run_interpreted(
+        f"""
+        units(mm, g, ms)
+        method({method}, FLIP, linear, 1)
+        dimension(2, 0, 1, 0, 1, 0.1)
+        axisymmetric(true)
+        region(a, block, 0.2, 0.5, 0.1, 0.4)
+        region(b, block, 0.2, 0.5, 0.6, 0.9)
+        material(m, linear, 1, 100, 0.3)
+        solid(lower, region, a, 2, m, 0.1)
+        solid(upper, region, b, 2, m, 0.1)
+        dump(h, all, hdf5, 1, p.h5, mass, seq)
+        dump(v, all, vtk, 1, p.*.vtu, mass, seq)
+        dump(gh, all, grid/hdf5, 1, g.h5, mass, occupied=true)
+        dump(gv, all, grid/vtk, 1, g.*.vtu, mass, occupied=true)
+        dump(g, all, grid, 1, g.dump, mass, occupied=true)
+        dump(p, all, pyplot, 1, p.png, 300, 300)
+        dump(m, all, movie, 1, p.gif, 300, 300, vy)
+        run(2)
+        """
+    )
+    assert "mm g ms K" in run.out
+    mass = run.dump("g.dump").mass
+    with h5py.File(run.folder / "g.h5") as file:
+        assert file["mass"].attrs["units"] == "g"
+        stored = file["mass"][-1]
+        assert stored[np.isfinite(stored)] == pytest.approx(mass)
+    grid = meshio.read(run.folder / "g.2.vtu")
+    assert grid.point_data["mass"] == pytest.approx(mass)
+    # The cells with points in them: 3 x 3 in each solid, whatever grid they belong to.
+    assert len(grid.cells[0].data) == 18
+    points = meshio.read(run.folder / "p.2.vtu")
+    with h5py.File(run.folder / "p.h5") as file:
+        assert file["step"][:].tolist() == [0, 1, 2]
+        np.testing.assert_array_equal(file["mass"][-1], points.point_data["mass"])
+    assert points.point_data["mass"].sum() == pytest.approx(mass.sum())
+    # The points fill the solids in the picture: 0.18 of the domain, whose height they take 0.8 of.
+    image = np.asarray(Image.open(run.folder / "p.png").convert("RGB")).astype(int)
+    inked = np.ptp(image[:, :200], axis=2) > 60  # the legend is at the right
+    frame = (np.ptp(np.nonzero(inked)[0]) / 0.8) ** 2
+    assert inked.sum() / frame == pytest.approx(0.18, rel=0.2)
