@@ -14,6 +14,7 @@ from hypothesis.extra.numpy import arrays
 
 from karamelo_py.kernels import text
 from karamelo_py.output import files
+from karamelo_py.output.rhythm import ByTime, is_due, next_step
 from karamelo_py.output.units import Units
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.dumps import lammps
@@ -473,3 +474,30 @@ def test_the_nodes_of_several_grids(run_interpreted):
     assert both["type"].tolist() == [1] * 11 + [2] * 11
     assert (both.x[:11] == both.x[11:]).all()
     assert both.mass.reshape(2, 11).sum(axis=1) == pytest.approx([0.2, 0.3])
+
+
+@pytest.mark.parametrize("fixed", [0.1, None])
+def test_rhythm_of_time(plane, fixed):
+    """The first step at or after each multiple of 0.25, with steps of 0.1: of 3, 5, 8, 10, 13."""
+    plane.update.fixed_dt = fixed
+    plane.dumps["d"] = Particle(plane, ByTime(0.25), "all.dump")
+    plane.output.log.every = 1000
+    plane.run(4)
+    plane.run(10)
+    steps = steps_of((plane.folder / "all.dump").read_text())
+    assert steps == [0, 3, 4, 5, 8, 10, 13, 14]
+
+
+def test_rhythm_of_time_with_growing_steps():
+    """Whatever the steps become, none that is due is missed by more than the last of them."""
+    every, time, dt, step = ByTime(1.0), 0.0, 1e-3, 0
+    every.passed = 0
+    written = []
+    while time < 5:
+        for _ in range(next_step(every, step, time, dt, fixed=False) - step):
+            time, dt, step = time + dt, dt * 1.001, step + 1
+        if is_due(every, step, time):
+            every.passed = every.now(time)
+            written.append((time, dt))
+    assert [int(time) for time, _ in written] == [1, 2, 3, 4, 5]
+    assert all(time - int(time) < dt for time, dt in written)

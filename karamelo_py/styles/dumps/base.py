@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
 
-from karamelo_py.language.signature import OutputFile, Positive
+from karamelo_py.language.signature import OutputFile
+from karamelo_py.output.rhythm import Every
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import puts_force_on_points
 from karamelo_py.script.errors import ScriptError, nearest
@@ -30,7 +30,7 @@ class Dump:
     def __init__(
         self,
         hub: Hub,
-        every: Annotated[int, Positive],
+        every: Every,
         file: OutputFile,
         *columns: str,
     ):

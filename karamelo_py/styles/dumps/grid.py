@@ -20,7 +20,8 @@ class Grid(OfNodes, LammpsDump):
     Parameters
     ----------
     every
-        Steps between two snapshots. The first and the last state of a run are always written.
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
     file
         File name. The first ``*`` becomes the step number; without ``*`` all snapshots follow each
         other in one file.

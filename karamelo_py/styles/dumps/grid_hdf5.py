@@ -12,7 +12,8 @@ class GridHdf5(OfNodes, Hdf5Dump):
     Parameters
     ----------
     every
-        Steps between two snapshots. The first and the last state of a run are always written.
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
     file
         File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
     columns

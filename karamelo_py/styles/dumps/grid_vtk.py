@@ -21,7 +21,8 @@ class GridVtk(OfNodes, VtkDump):
     Parameters
     ----------
     every
-        Steps between two snapshots. The first and the last state of a run are always written.
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
     file
         File name with a ``*``, which becomes the step number, and the ending ``.vtu``.
     columns

@@ -106,7 +106,8 @@ class Hdf5(OfPoints, Hdf5Dump):
     Parameters
     ----------
     every
-        Steps between two snapshots. The first and the last state of a run are always written.
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
     file
         File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
     columns

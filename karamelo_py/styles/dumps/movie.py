@@ -19,7 +19,8 @@ class Movie(PyPlot):
     Parameters
     ----------
     every
-        Steps between two frames. The first and the last state of a run are always drawn.
+        Steps between two frames, or ``time(T)``. The first and the last state of a run are
+        always drawn.
     file
         File name ending in .gif or, where the program ffmpeg is installed, .mp4.
     width, height

@@ -10,6 +10,7 @@ import numpy as np
 from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
+from karamelo_py.output.rhythm import Every
 from karamelo_py.output.units import labelled
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -36,7 +37,8 @@ class PyPlot(Dump):
     Parameters
     ----------
     every
-        Steps between two pictures. The first and the last state of a run are always drawn.
+        Steps between two pictures, or ``time(T)``. The first and the last state of a run are
+        always drawn.
     file
         File name ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without
         ``*`` each picture takes the place of the one before.
@@ -69,7 +71,7 @@ class PyPlot(Dump):
     def __init__(
         self,
         hub: Hub,
-        every: Annotated[int, Positive],
+        every: Every,
         file: OutputFile,
         width: Annotated[float, Positive],
         height: Annotated[float, Positive],

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
 
-from karamelo_py.language.signature import OutputFile, Positive
+from karamelo_py.language.signature import OutputFile
+from karamelo_py.output.rhythm import Every
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.base import Dump
@@ -38,7 +38,7 @@ class TableDump(Dump):
     def __init__(
         self,
         hub: Hub,
-        every: Annotated[int, Positive],
+        every: Every,
         file: OutputFile,
         *columns: str,
     ):
@@ -102,7 +102,7 @@ class OfNodes:
     def __init__(
         self,
         hub: Hub,
-        every: Annotated[int, Positive],
+        every: Every,
         file: OutputFile,
         *columns: str,
         occupied: bool = False,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from karamelo_py.language.signature import OutputFile, Positive
+from karamelo_py.language.signature import OutputFile
 from karamelo_py.output.files import whole
+from karamelo_py.output.rhythm import Every
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.table import POSITIONS, OfPoints, TableDump
@@ -21,7 +22,7 @@ class VtkDump(TableDump):
     def __init__(
         self,
         hub: Hub,
-        every: Annotated[int, Positive],
+        every: Every,
         file: OutputFile,
         *columns: str,
     ):
@@ -77,7 +78,8 @@ class Vtk(OfPoints, VtkDump):
     Parameters
     ----------
     every
-        Steps between two snapshots. The first and the last state of a run are always written.
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
     file
         File name with a ``*``, which becomes the step number, and the ending ``.vtu``.
     columns
