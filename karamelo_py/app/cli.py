@@ -6,9 +6,11 @@ import argparse
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 
 from karamelo_py import __version__
+from karamelo_py.app.outputs import add_output_options, direct
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, nearest, render_message
 
@@ -21,11 +23,15 @@ karamelo-py check SCRIPT [options]     read and build a scene, print what it nee
 karamelo-py styles [FAMILY]            list commands and styles, and where they come from
 karamelo-py help [FAMILY] STYLE        explain a command or style
 karamelo-py bench [WORKLOAD ...]       measure the speed of this machine on known scenes
+karamelo-py view FILE ... [options]    draw pictures or a movie of dumps
+karamelo-py plot LOG [Y ...]           draw columns of a log
 """
 OPTIONS = """
 options:
   -var NAME VALUE    (or -v) set a variable; the script's own assignment of it then yields
   --threads N        threads to use (default: all cores where the scene is large enough)
+  -log FILE          where the log goes; with the ending .csv it has commas
+  -out FOLDER        where all files go; it is made if need be
   --quiet            write warnings and errors only
   --debug            show the traceback of an error
 """
@@ -107,6 +113,8 @@ def _dispatch(arguments: list[str]) -> int:
         "styles": _styles,
         "help": _help,
         "bench": _bench,
+        "view": lambda words: _sub("view", words),
+        "plot": lambda words: _sub("plot", words),
     }
     if arguments[0] in commands:
         if any(word in ("-h", "--help") for word in arguments[1:]):
@@ -125,6 +133,9 @@ def _dispatch(arguments: list[str]) -> int:
 
 def _explanation(subcommand: str) -> str:
     """What a subcommand does, and how it is called."""
+    if subcommand in ("view", "plot"):
+        module = import_module(f"karamelo_py.app.{subcommand}")
+        return module.add_parser(CommandLine(prog="karamelo-py").add_subparsers()).format_help()
     if subcommand == "help":
         from karamelo_py.app.catalogue import HELP
 
@@ -151,6 +162,7 @@ def _script_parser() -> CommandLine:
     parser.add_argument("--threads", type=threads_option)
     parser.add_argument("--quiet", action="store_true")
     parser.add_argument("--debug", action="store_true")
+    add_output_options(parser)
     parser.add_argument("--version", action="store_true")
     parser.add_argument("-h", "--help", action="store_true")
     return parser
@@ -181,6 +193,7 @@ def _run(arguments: list[str], *, checking: bool = False) -> int:
     hub.settings.threads = options.threads
     hub.settings.debug = options.debug
     hub.checking = checking
+    direct(hub, options)
     interpreter = Interpreter(hub, presets=dict(options.var))
     hub.interpreter = interpreter
     try:
@@ -224,6 +237,12 @@ def _help(arguments: list[str]) -> int:
     from karamelo_py.app.catalogue import print_help
 
     return print_help(arguments)
+
+
+def _sub(name: str, arguments: list[str]) -> int:
+    module = import_module(f"karamelo_py.app.{name}")
+    options = module.add_parser(CommandLine().add_subparsers()).parse_args(arguments)
+    return module.run(options)
 
 
 def _bench(arguments: list[str]) -> int:

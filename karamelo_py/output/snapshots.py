@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gzip
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -18,7 +20,7 @@ class Snapshot(NamedTuple):
     Attributes
     ----------
     step, time
-        When.
+        When; NaN where the file does not say.
     columns
         (n,) arrays by name, with x, y and z among them.
     lo, hi
@@ -40,11 +42,12 @@ def read(path: Path) -> Iterator[Snapshot]:
     ScriptError
         If the file cannot be read, or is no dump.
     """
-    readers = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu}
+    readers = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}
     reader = readers.get(path.suffix, _lammps)
     try:
         yield from reader(path)
-    except (OSError, ValueError, KeyError, StopIteration, RuntimeError, SystemExit) as error:
+    # meshio ends the program over a file that it cannot read.
+    except (OSError, ValueError, KeyError, ElementTree.ParseError, SystemExit) as error:
         reason = getattr(error, "strerror", None)
         raise ScriptError(
             f"{path} cannot be read: {reason}" if reason else f"{path} is not a dump of points",
@@ -90,11 +93,16 @@ def _hdf5(path: Path) -> Iterator[Snapshot]:
             yield Snapshot(int(step), float(time), columns, *root.attrs["domain"])
 
 
-def _vtu(path: Path) -> Iterator[Snapshot]:
+def _pvd(path: Path) -> Iterator[Snapshot]:
+    for entry in ElementTree.parse(path).iter("DataSet"):
+        yield from _vtu(path.parent / entry.attrib["file"], float(entry.attrib["timestep"]))
+
+
+def _vtu(path: Path, time: float = np.nan) -> Iterator[Snapshot]:
     import meshio
 
     mesh = meshio.read(path)
-    step = int(path.stem.rpartition(".")[2]) if path.stem.rpartition(".")[2].isdigit() else 0
+    number = re.search(r"(\d+)\D*$", path.stem)
     columns = dict(zip("xyz", mesh.points.T, strict=True)) | mesh.point_data
-    times = [float(t) for t in mesh.field_data.get("TimeValue", [np.nan])]
-    yield Snapshot(step, times[0], columns, mesh.points.min(axis=0), mesh.points.max(axis=0))
+    lo, hi = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    yield Snapshot(int(number[1]) if number else 0, time, columns, lo, hi)
