@@ -23,7 +23,7 @@ class Probe(Compute):
     ----------
     group
         Group of points, or ``all``.
-    columns
+    column, columns
         Columns of dump particle. Their mean over the group counts points by their volume.
     point
         The id of a point, as dumps show it: its own values instead of the mean.
