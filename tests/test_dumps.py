@@ -299,9 +299,12 @@ def test_numbers_that_hardly_differ_are_told_apart(plane):
 
 def test_colours_of_components_lie_about_zero(plane):
     dump = PyPlot(plane, 1, "p.png", 4, 3, "vx")
-    dump.write()
-    lo, hi = dump._picture.limits
-    assert lo == -hi < plane.fields.points["vx"].min()
+    for factor in (0, -1e-9, 1e9):
+        plane.fields.points["vx"] = factor * plane.fields.points["s11"]
+        dump.write()
+        lo, hi = dump._picture.limits
+        assert lo == -hi
+    assert lo < plane.fields.points["vx"].min()
     assert (dump.cmap, PyPlot(plane, 1, "q.png", 4, 3, "seq").cmap) == ("coolwarm", "viridis")
 
 

@@ -86,7 +86,7 @@ def _number(path: Path) -> int:
 def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
     """The empty picture that suits the first snapshot."""
     from karamelo_py.styles.dumps import picture
-    from karamelo_py.styles.dumps.pyplot import MAP, SIGNED, SIGNED_MAP
+    from karamelo_py.styles.dumps.pyplot import colours_of
 
     if options.column is not None and options.column not in first.columns:
         close = nearest(options.column, first.columns)
@@ -95,20 +95,16 @@ def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
             expected="one of " + " ".join(first.columns),
             hint=f"did you mean '{close}'?" if close else None,
         )
-    if options.cmap is not None and not picture.known_map(options.cmap):
-        raise ScriptError(f"Matplotlib has no colour map '{options.cmap}'")
     # A dump holds zeros where the scene has no direction.
     dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
     column = options.column or ("type" if dimension > 1 else "x")
-    signed = SIGNED.fullmatch(column) is not None
     limits = (options.vmin, options.vmax)
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
     look = picture.Options(
         column,
         tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1)),
         limits,
-        signed and limits == (None, None),
-        options.cmap or (SIGNED_MAP if signed else MAP),
+        *colours_of(column, limits, options.cmap),
         azimuth=options.azimuth,
         elevation=options.elevation,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 from typing import TextIO
 
@@ -94,7 +95,15 @@ class Log:
         path = self.path
         try:
             # Line buffering: each line is in the file at once, also when the run is killed.
-            self._file = path.open("w", buffering=1, encoding="utf-8", newline="\n")
+            self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
+            _claim(self._file)
+            self._file.truncate(0)
+        except BlockingIOError as error:
+            raise ScriptError(
+                f"another run is writing to {path}",
+                expected="a folder of its own for each run",
+                hint="-out FOLDER sends all files there",
+            ) from error
         except OSError as error:
             raise ScriptError(
                 f"cannot write the log file {path}: {error.strerror or error}"
@@ -112,6 +121,23 @@ class Log:
             raise ScriptError(
                 f"cannot write the log file {self.path}: {error.strerror or error}"
             ) from error
+
+
+def _claim(file: TextIO) -> None:
+    """Keep other programs from writing to `file` (BlockingIOError where one does).
+
+    The claim ends with the program, however it ends. Windows has none that lets others read.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in (errno.EACCES, errno.EAGAIN):
+            raise BlockingIOError from error
+        # File systems without locks are none of our business.
 
 
 def _row(cells: list[str], widths: list[int]) -> str:

@@ -66,11 +66,6 @@ def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> 
     return kind(domain, size, dpi, options)
 
 
-def known_map(name: str) -> bool:
-    """Whether Matplotlib has such a colour map."""
-    return name in colormaps
-
-
 def _number(value: float, _: Any = None) -> str:
     return f"{value:.8g}"
 
@@ -137,9 +132,10 @@ class Picture:
         self._place(x, values, size)
 
     def _limits(self, values: np.ndarray) -> tuple[float, float]:
-        if self.options.symmetric:
-            values = np.concatenate([values, -values])
         grown_to = grown(self.limits, values)
+        if self.options.symmetric:
+            furthest = max(-grown_to[0], grown_to[1])
+            grown_to = -furthest, furthest
         lo, hi = (
             own if fixed is None else fixed
             for own, fixed in zip(grown_to, self.options.limits, strict=True)

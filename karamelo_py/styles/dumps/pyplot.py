@@ -13,7 +13,7 @@ from karamelo_py.output.files import picture_format, savefig, unwarned, whole
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.units import labelled
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.styles.dumps.base import Dump
 
 DPI = 100
@@ -102,19 +102,7 @@ class PyPlot(Dump):
         self.limits = (vmin, vmax)
         self.title = title
         self.look = {"azimuth": azimuth, "elevation": elevation, "axes": axes}
-        signed = SIGNED.fullmatch(field or "vx") is not None
-        # Colours that the user has ordered about another middle are not symmetric about 0.
-        self.symmetric = signed and self.limits == (None, None)
-        self.cmap = cmap or (SIGNED_MAP if signed else MAP)
-        if cmap is not None:
-            from karamelo_py.styles.dumps.picture import known_map
-
-            if not known_map(cmap):
-                raise ScriptError(
-                    f"Matplotlib has no colour map '{cmap}'",
-                    argument="cmap",
-                    expected="viridis, coolwarm, magma, gray, jet ...",
-                )
+        self.symmetric, self.cmap = colours_of(field or "vx", self.limits, cmap)
         self._picture: Any = None
 
     def check_format(self) -> str:
@@ -174,6 +162,32 @@ class PyPlot(Dump):
         if self.field is not None:
             return self.field
         return "vx" if self.hub.domain.dimension == 1 else "type"
+
+
+def colours_of(
+    column: str, limits: tuple[float | None, float | None], cmap: str | None
+) -> tuple[bool, str]:
+    """Whether limits that grow lie about 0, and the colour map, for a column.
+
+    Raises
+    ------
+    ScriptError
+        If Matplotlib does not have the map that is asked for.
+    """
+    signed = SIGNED.fullmatch(column) is not None
+    if cmap is not None:
+        from matplotlib import colormaps
+
+        if cmap not in colormaps:
+            close = nearest(cmap, list(colormaps))
+            raise ScriptError(
+                f"Matplotlib has no colour map '{cmap}'",
+                argument="cmap",
+                expected="viridis, coolwarm, magma, gray, jet ...",
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+    # Where the user says about what the colours lie, they do not lie about 0.
+    return signed and limits == (None, None), cmap or (SIGNED_MAP if signed else MAP)
 
 
 def _inches(argument: str, value: float) -> float:
