@@ -85,8 +85,9 @@ class Hdf5Dump(TableDump):
                 root[name].resize((count,))
             root["id"][:] = np.arange(first, first + count)
         known = root["type"][:]
-        known[at] = types
-        root["type"][:] = known
+        if (known[at] != types).any():
+            known[at] = types
+            root["type"][:] = known
         for name, number in (("time", self.hub.update.time), ("step", self.hub.update.step)):
             root[name].resize((k + 1,))
             root[name][k] = number
