@@ -10,6 +10,7 @@ import numpy as np
 
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import ABSENT_AT_NODES, ABSENT_AT_POINTS
+from karamelo_py.scene.lattice import Lattice
 
 
 class FakeValues(dict):
@@ -42,6 +43,7 @@ class FakeFields:
         self.nodes["mass"] = np.where(nodes[:, 0] > 0, 1.0, 0.0)
         self.nodes["type"] = np.ones(len(nodes), np.int64)
         self.node_count = len(nodes)
+        hub.lattices = [Lattice(dimension, hub.domain.lo, hub.domain.hi, hub.domain.h)]
 
     def absent_at_points(self):
         return list(ABSENT_AT_POINTS)
@@ -71,9 +73,13 @@ class FakeHub:
         used = np.arange(3) < dimension
         self.folder = Path(folder)
         self.domain = SimpleNamespace(
-            dimension=dimension, lo=np.where(used, -0.5, 0.0), hi=np.where(used, 0.5, 0.0), h=0.25
+            dimension=dimension,
+            lo=np.where(used, -0.5, 0.0),
+            hi=np.where(used, 0.5, 0.0),
+            h=0.25,
+            axisymmetric=False,
         )
-        self.update = SimpleNamespace(step=0, time=0.0, dt=0.1)
+        self.update = SimpleNamespace(step=0, time=0.0, dt=0.1, fixed_dt=0.1)
         self.values = FakeValues(Ek=1.0, Ek_s=1.0, Es_s=0.0)
         self.interpreter = SimpleNamespace(variables={"E": 1000.0, "name": "text"})
         self.rehearsing = self.checking = False
@@ -82,6 +88,8 @@ class FakeHub:
         self.fields = FakeFields(self, count)
         self.dumps = {}
         self.fixes = {}
+        self.computes = {}
+        self.solids = {"left": None, "right": None}
         self.refreshed = []
         self.output = Output(self)
 

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import gzip
+import shutil
 
 import numpy as np
 import pytest
 from fakes import FakeHub
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
+from karamelo_py.kernels import text
 from karamelo_py.output import files
+from karamelo_py.output.rhythm import ByTime, is_due, next_step
+from karamelo_py.output.units import Units
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.dumps import lammps
 from karamelo_py.styles.dumps.grid import Grid
 from karamelo_py.styles.dumps.grid_gz import GridGz
+from karamelo_py.styles.dumps.movie import Movie
 from karamelo_py.styles.dumps.particle import Particle
 from karamelo_py.styles.dumps.particle_gz import ParticleGz
 from karamelo_py.styles.dumps.pyplot import PyPlot
@@ -108,18 +116,46 @@ def test_positions_are_always_written(plane):
     assert Particle(plane, 1, "p", "id", "vx", "z", "y", "x", "vx").columns == ("vx", "z", "y", "x")
 
 
+def as_python(*columns):
+    """The rows of a table as Python writes them."""
+    line = " ".join("%d" if column.dtype.kind == "i" else "%.9g" for column in columns) + "\n"
+    lists = [column.tolist() for column in columns]
+    return "".join(line % row for row in zip(*lists, strict=True)).encode()
+
+
 def test_rows_keep_integers_and_nine_digits():
-    count = lammps.ROWS + 3
+    count = text.ROWS + 3
     integers = np.arange(count) * 10_000_000_000
     numbers = np.linspace(-1e-7, 1, count) / 3
-    text = b"".join(lammps.rows([integers, numbers])).decode().splitlines()
-    assert len(text) == count
-    assert [int(line.split()[0]) for line in text] == list(integers)
-    np.testing.assert_allclose([float(line.split()[1]) for line in text], numbers, rtol=1e-8)
+    assert b"".join(text.rows([integers, numbers])) == as_python(integers, numbers)
+
+
+@given(
+    arrays(float, 7, elements=st.floats(allow_subnormal=True)),
+    arrays(np.int64, 7, elements=st.integers(-(2**63), 2**63 - 1)),
+    st.integers(-30, 30),
+)
+def test_rows_are_as_python_writes_them(numbers, integers, power):
+    """Any double, any integer, what lies around a tie, and what has few digits."""
+    few = np.round(integers / 2.0**50, 3) * 10.0**power
+    halves = (integers // 2**25 + 0.5) * 10.0**power
+    close = np.nextafter(halves, np.inf)
+    columns = [integers, numbers, few, halves, close]
+    assert b"".join(text.rows(columns)) == as_python(*columns)
+
+
+def test_rows_of_all_kinds_of_doubles():
+    """Half of them of random bits, the others with as many bits as make exact ties."""
+    rng = np.random.default_rng(5)
+    bits = rng.integers(-(2**63), 2**63, 100_000).view(float)
+    ties = rng.integers(-(2**33), 2**33, 100_000) / 2.0 ** rng.integers(0, 40, 100_000)
+    powers = 10.0 ** rng.integers(-320, 308, 100_000)
+    columns = [bits, ties, powers, -np.nextafter(powers, 0)]
+    assert b"".join(text.rows(columns)) == as_python(*columns)
 
 
 def test_rows_of_nothing():
-    assert b"".join(lammps.rows([np.zeros(0, int), np.zeros(0)])) == b""
+    assert b"".join(text.rows([np.zeros(0, int), np.zeros(0)])) == b""
 
 
 def test_rhythm(plane):
@@ -248,7 +284,8 @@ def test_pictures_of_a_run_do_not_jump(hub):
         hub.fields.points["seq"] *= factor
         dump.write()
         labels = [label.get_text() for label in picture.scale.get_ticklabels()]
-        assert {len(label.partition(".")[2]) for label in labels} == {2}
+        numbers = [float(label.replace("\N{MINUS SIGN}", "-")) for label in labels]
+        assert numbers == pytest.approx(picture.scale.get_ticklocs())
         np.testing.assert_allclose(places(), before, atol=1e-9)
 
 
@@ -258,6 +295,131 @@ def test_numbers_that_hardly_differ_are_told_apart(plane):
     dump.write()
     labels = [label.get_text() for label in dump._picture.scale.get_ticklabels()]
     assert len(set(labels)) == len(labels) > 2
+
+
+def test_colours_of_components_lie_about_zero(plane):
+    dump = PyPlot(plane, 1, "p.png", 4, 3, "vx")
+    for factor in (0, -1e-9, 1e9):
+        plane.fields.points["vx"] = factor * plane.fields.points["s11"]
+        dump.write()
+        lo, hi = dump._picture.limits
+        assert lo == -hi
+    assert lo < plane.fields.points["vx"].min()
+    assert (dump.cmap, PyPlot(plane, 1, "q.png", 4, 3, "seq").cmap) == ("coolwarm", "viridis")
+
+
+def test_limits_that_are_given_stay(plane):
+    dump = PyPlot(plane, 1, "p.png", 4, 3, "vx", vmin=0.0, vmax=2e-3, cmap="magma")
+    for factor in (1, 1000):
+        plane.fields.points["vx"] *= factor
+        dump.write()
+        assert dump._picture.limits == (0, 2e-3)
+    half = PyPlot(plane, 1, "p.png", 4, 3, "vx", vmin=-9.0)
+    half.write()
+    assert half._picture.limits[0] == -9 and half._picture.limits[1] > 1
+
+
+def test_pyplot_refuses_limits_and_maps(plane):
+    with pytest.raises(ScriptError, match="from 2 to 1") as caught:
+        PyPlot(plane, 1, "p.png", 4, 3, "vx", vmin=2.0, vmax=1.0)
+    assert caught.value.argument == "vmax"
+    with pytest.raises(ScriptError, match="viridi") as caught:
+        PyPlot(plane, 1, "p.png", 4, 3, "vx", cmap="viridi")
+    assert caught.value.argument == "cmap"
+
+
+def test_a_view_from_above_is_the_plane(tmp_path):
+    """Elevation 90 and azimuth -90: x to the right, y upwards."""
+    hub = FakeHub(tmp_path, dimension=3)
+    dump = PyPlot(hub, 1, "p.png", 4, 4, azimuth=-90.0, elevation=90.0, axes=False, title="above")
+    dump.write()
+    drawn = np.asarray(dump._picture.artist.get_offsets())
+    order = np.argsort(hub.fields.points["z"], kind="stable")
+    for axis, name in enumerate("xy"):
+        np.testing.assert_allclose(drawn[:, axis], hub.fields.points[name][order], atol=1e-12)
+    assert dump._picture.title.get_text() == "above: step 0, time 0"
+
+
+def test_a_ball_is_lit_where_it_faces_the_light(tmp_path):
+    """Brighter at the top left than at the bottom right of the picture."""
+    hub = FakeHub(tmp_path, dimension=3)
+    axis = np.linspace(-0.4, 0.4, 21)
+    x = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
+    x = x[np.linalg.norm(x, axis=1) < 0.4]
+    hub.fields.points = dict(zip("xyz", x.T, strict=True))
+    hub.fields.points |= {"type": np.ones(len(x), int), "volume": np.full(len(x), 0.04**3)}
+    dump = PyPlot(hub, 1, "p.png", 4, 4)
+    dump.write()
+    seen = np.asarray(dump._picture.artist.get_offsets())
+    front = np.arange(len(seen)) > 0.9 * len(seen)  # the nearest are drawn last
+    light = dump._picture.artist.get_facecolors()[:, 2]
+    towards = seen @ [-0.35, 0.6]
+    low, high = (light[front & s].mean() for s in (towards < -0.1, towards > 0.1))
+    assert high > 1.3 * low
+
+
+def test_points_have_the_size_of_what_they_stand_for(plane):
+    """Rings of an axisymmetric scene, too, whose volume is that per radian."""
+    side = PyPlot(plane, 1, "p.png", 4, 3)._side(plane.fields.points["x"])
+    assert side == pytest.approx(np.sqrt(0.5 / 40))
+    plane.domain.axisymmetric = True
+    x = np.linspace(1e-4, 1e-2, 40)
+    plane.fields.points["volume"] = x * 0.05**2
+    assert PyPlot(plane, 1, "p.png", 4, 3)._side(x) == pytest.approx(0.05)
+
+
+def test_legend_of_solids_and_units(plane):
+    plane.output.units = Units("mm", "g", "ms")
+    dump = PyPlot(plane, 1, "p.svg", 4, 3)
+    dump.write()
+    svg = (plane.folder / "p.svg").read_text()
+    for word in ("left", "right", "x [mm]", "y [mm]", "step 0, time 0 ms"):
+        assert f"<!-- {word} -->" in svg
+    PyPlot(plane, 1, "q.svg", 4, 3, "seq").write()
+    assert "<!-- seq [MPa] -->" in (plane.folder / "q.svg").read_text()
+
+
+def test_units_are_in_the_header_and_ovito_reads_on(plane):
+    io = pytest.importorskip("ovito.io", exc_type=ImportError)
+    plane.output.units = Units("mm", "g", "ms")
+    Particle(plane, 1, "p.dump").write()
+    assert (plane.folder / "p.dump").read_text().startswith("ITEM: UNITS\nmm g ms K\nITEM: TIME")
+    assert io.import_file(str(plane.folder / "p.dump")).compute().particles.count == 40
+
+
+def test_movie_has_a_frame_for_each_state(hub):
+    image = pytest.importorskip("PIL.Image")
+    hub.dumps["d"] = Movie(hub, 2, "m.gif", 3, 2)
+    hub.run(4)
+    assert image.open(hub.folder / "m.gif").n_frames == 3
+    hub.fields.points["x"] *= 0.5
+    hub.run(2)
+    movie = image.open(hub.folder / "m.gif")
+    assert movie.n_frames == 4 and movie.size == (300, 200)
+    assert movie.info["duration"] == 40
+
+
+def test_movie_of_a_run_that_breaks_off(plane):
+    plane.dumps["d"] = Movie(plane, 2, "m.gif", 3, 2)
+    plane.output.begin()
+    plane.output.abort()
+    assert (plane.folder / "m.gif").exists()
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
+def test_movie_through_ffmpeg(plane):
+    plane.dumps["d"] = Movie(plane, 2, "m.mp4", 3.01, 2)
+    plane.run(4)
+    assert (plane.folder / "m.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_mp4_without_ffmpeg_is_refused(plane, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(ScriptError, match="ffmpeg") as caught:
+        Movie(plane, 2, "m.mp4", 3, 2)
+    assert caught.value.hint == "m.gif"
+    with pytest.raises(ScriptError, match="no name for a movie"):
+        Movie(plane, 2, "m.*.gif", 3, 2)
 
 
 def test_pyplot_survives_fields_without_range(plane):
@@ -315,3 +477,30 @@ def test_the_nodes_of_several_grids(run_interpreted):
     assert both["type"].tolist() == [1] * 11 + [2] * 11
     assert (both.x[:11] == both.x[11:]).all()
     assert both.mass.reshape(2, 11).sum(axis=1) == pytest.approx([0.2, 0.3])
+
+
+@pytest.mark.parametrize("fixed", [0.1, None])
+def test_rhythm_of_time(plane, fixed):
+    """The first step at or after each multiple of 0.25, with steps of 0.1: of 3, 5, 8, 10, 13."""
+    plane.update.fixed_dt = fixed
+    plane.dumps["d"] = Particle(plane, ByTime(0.25), "all.dump")
+    plane.output.log.every = 1000
+    plane.run(4)
+    plane.run(10)
+    steps = steps_of((plane.folder / "all.dump").read_text())
+    assert steps == [0, 3, 4, 5, 8, 10, 13, 14]
+
+
+def test_rhythm_of_time_with_growing_steps():
+    """Whatever the steps become, none that is due is missed by more than the last of them."""
+    every, time, dt, step = ByTime(1.0), 0.0, 1e-3, 0
+    every.passed = 0
+    written = []
+    while time < 5:
+        for _ in range(next_step(every, step, time, dt, fixed=False) - step):
+            time, dt, step = time + dt, dt * 1.001, step + 1
+        if is_due(every, step, time):
+            every.passed = every.now(time)
+            written.append((time, dt))
+    assert [int(time) for time, _ in written] == [1, 2, 3, 4, 5]
+    assert all(time - int(time) < dt for time, dt in written)

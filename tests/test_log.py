@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -190,3 +193,22 @@ def test_words_for_values():
     assert show(0.001) == "0.001"
     assert show("x") == "x"
     assert [duration(s) for s in (4.2, 200, 7500)] == ["4 s", "3 min 20 s", "2 h 5 min"]
+
+
+def test_two_runs_in_one_folder_are_noticed(hub):
+    """The second one stops, and leaves the log of the first one as it is."""
+    pytest.importorskip("fcntl")
+    hub.run(1)
+    # Opening it here and closing it again would end the claim.
+    size = (hub.folder / "log.mpm").stat().st_size
+    program = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from fakes import FakeHub\n"
+        "FakeHub(sys.argv[2]).run(1)"
+    )
+    arguments = [sys.executable, "-c", program, str(Path(__file__).parent), str(hub.folder)]
+    second = subprocess.run(arguments, capture_output=True, text=True)
+    assert second.returncode == 1 and "another run is writing to" in second.stderr
+    assert (hub.folder / "log.mpm").stat().st_size == size
+    hub.output.log.close()
+    assert subprocess.run(arguments).returncode == 0

@@ -81,6 +81,10 @@ def test_dumps_are_made_as_said(hub):
         ("dump(d, all, particle, f, 10)", "f", "argument 1 'every' must be a whole number"),
         ("delete_dump(d)", "d", "no dump"),
         ("set_output(0)", "0", "above 0"),
+        ("set_output(time(0))", "0", "above 0"),
+        ("set_output(time(E*x))", "E*x", "a formula of x"),
+        ("dump(d, all, particle, time(-1), f)", "-1", "above 0"),
+        ("set_output(1, cvs)", "cvs", "csv"),
         ("log(0)", "0", "above 0"),
         ("log_modify(custom, step, Ek_ss)", "Ek_ss", "'Ek_s'"),
         ("log_modify(custom, step, Ek_s + foo)", "foo", "unknown name"),
@@ -90,6 +94,13 @@ def test_dumps_are_made_as_said(hub):
         ("log_modify(default, step)", "step", "takes no columns"),
         ("log_modify(other)", "other", "custom"),
         ("plot(p, 1, time)", "", "plot("),
+        ("plot(p, 1, time, Ek_s, axis=top)", "top", "left, right"),
+        ("plot(p, 1, time, Ek_s, scale=logarithmic)", "logarithmic", "linear, log"),
+        ("units(mm, g, sec)", "sec", "ms"),
+        ("dump(d, all, movie, 1, f.png, 3, 3)", "f.png", ".gif"),
+        ("dump(d, all, vtk, 1, f, seq)", "f", "f.*.vtu"),
+        ("dump(d, all, pyplot, 1, f.png, 3, 3, seq, cmap=rainbows)", "rainbows", "viridis"),
+        ("dump(d, all, pyplot, 1, f.png, 3, 3, vmin=2, vmax=1)", "1", "above vmin"),
         ("plot(p, 1, tme, Ek_s)", "tme", "'time'"),
         ("save_plot(plot.txt)", "plot.txt", ".pdf"),
         ("save_plot(gone/plot.pdf)", "gone/plot.pdf", "mkdir gone"),
@@ -166,6 +177,21 @@ def test_quantities(hub):
     assert share.x.read() == pytest.approx(0.002)
     say(hub, "log_modify(default)")
     assert hub.output.log.columns == []
+
+
+def test_output_by_time(hub):
+    say(hub, "T = 2\nset_output(time(1/T))\ndump(d, all, particle, time( 0.25 ), f)")
+    say(hub, "plot(p, time(T), time, Ek_s)")
+    assert hub.output.log.every.span == 0.5
+    assert hub.dumps["d"].every.span == 0.25
+    assert next(iter(hub.output.plots)).every.span == 2
+
+
+def test_the_log_as_csv(hub, tmp_path):
+    say(hub, "set_output(10, csv)\nlog_modify(custom, step, time, Ek_s)")
+    hub.output.log.begin()
+    hub.output.log.write()
+    assert (tmp_path / "log.csv").read_text() == "Step,Time,Ek_s\n0,0,0\n"
 
 
 def test_log_is_an_older_name_of_set_output(hub):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from fakes import FakeHub
 
 from karamelo_py.output.plots import Curve
 from karamelo_py.output.quantity import Quantity
+from karamelo_py.output.units import Units
 
 
 @pytest.fixture
@@ -52,6 +55,21 @@ def test_is_drawn_at_the_end_of_a_run(hub, ending):
             assert word.encode() in first
     hub.run(5)
     assert (hub.folder / f"energies.{ending}").read_bytes() != first
+
+
+def test_two_axes_and_units(hub):
+    """A curve over a logarithmic axis at the right, and units of what a compute publishes."""
+    hub.output.plots.file = Path("energies.svg")
+    hub.output.units = Units("mm", "g", "ms")
+    hub.computes["Ek"] = SimpleNamespace(style="kinetic_energy", published=("s",))
+    quantities = Quantity(hub, "time"), Quantity(hub, "Es_s")
+    hub.output.plots.add("stored", Curve(1, *quantities, side="right", scale="log"))
+    hub.run(5)
+    svg = (hub.folder / "energies.svg").read_text()
+    for word in ("time [ms]", "Ek_s [mJ]", "Es_s", "Ek", "stored (right)"):
+        assert f"<!-- {word} -->" in svg
+    # Powers of ten are written as formulas.
+    assert re.search(r"<!-- \$\\mathdefault\{10\^\{", svg)
 
 
 def test_is_drawn_when_a_run_breaks_off(hub):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from karamelo_py import __version__
+from karamelo_py.app.outputs import add_output_options, direct
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, nearest, render_message
 
@@ -73,6 +74,8 @@ def _complain(text: str) -> None:
 # add_parser(subparsers) adds a parser whose default `act` takes the options.
 ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
+    "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
+    "plot": ("karamelo_py.app.plot", "Draw columns of a log."),
 }
 COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
 
@@ -137,6 +140,7 @@ def _parser(command: str) -> CommandLine:
             "--threads", type=threads_option, metavar="N",
             help="threads to use (default: all cores where the scene is large enough)",
         )  # fmt: skip
+        add_output_options(script)
         script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
     styles = add("styles", _styles, "List commands and styles, and where they come from.")
     styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
@@ -180,6 +184,7 @@ def _run(options: argparse.Namespace) -> int:
     hub.settings.threads = options.threads
     hub.settings.debug = options.debug
     hub.checking = options.checking
+    direct(hub, options)
     interpreter = Interpreter(hub, presets=dict(options.var))
     hub.interpreter = interpreter
     try:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal
+from typing import Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.arguments import NUMBER
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.signature import Argument, OutputFile, Positive
+from karamelo_py.language.signature import Argument, OutputFile
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import Curve
 from karamelo_py.output.quantity import Quantity
+from karamelo_py.output.rhythm import Every
+from karamelo_py.output.units import LENGTHS, MASSES, TIMES, Units
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -30,8 +32,9 @@ def dump(
     style
         What is written, and in which form.
     arguments
-        What the style asks for, beginning with the steps between two snapshots and the file name;
-        see the page of the style.
+        What the style asks for, beginning with the rhythm and the file name; see the page of the
+        style. The rhythm is a number of steps, or ``time(T)``: the first step at or after each
+        multiple of the time T.
 
     Notes
     -----
@@ -110,8 +113,8 @@ def delete_dump(hub: Hub, ID: str) -> None:
         hub.output.files.pop(old.file, None)
 
 
-def set_output(hub: Hub, every: Annotated[int, Positive]) -> None:
-    """Set how often a line is logged.
+def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> None:
+    """Set how often a line is logged, and in which form.
 
     The log goes to the terminal and to log.mpm in the current folder, every line at once. The
     first and the last state of each run are always logged. Without this command every step is.
@@ -119,20 +122,32 @@ def set_output(hub: Hub, every: Annotated[int, Positive]) -> None:
     Parameters
     ----------
     every
-        Steps between two lines, counted over all runs.
+        Steps between two lines, counted over all runs, or ``time(T)``: a line at the first step at
+        or after each multiple of the time T.
+    form
+        ``csv``: the file is log.csv, with commas between the columns.
 
     Example
     -------
     set_output(100)
+    set_output(time(1e-3), csv)
 
     See Also
     --------
     log_modify
     """
     hub.output.log.every = every
+    if form == "csv" and hub.output.log.file.suffix != ".csv":
+        if hub.output.log.is_open:
+            raise ScriptError(
+                f"the log is already written to {hub.output.log.file}",
+                argument="form",
+                expected="set_output(..., csv) in front of the first run",
+            )
+        hub.output.log.file = hub.output.log.file.with_suffix(".csv")
 
 
-def log(hub: Hub, every: Annotated[int, Positive]) -> None:
+def log(hub: Hub, every: Every) -> None:
     """Set how often a line is logged: the older form of set_output.
 
     Only where it stands alone on a line; inside an expression log(x) is the natural logarithm.
@@ -140,7 +155,7 @@ def log(hub: Hub, every: Annotated[int, Positive]) -> None:
     Parameters
     ----------
     every
-        Steps between two lines, counted over all runs.
+        Steps between two lines, counted over all runs, or ``time(T)``.
 
     Example
     -------
@@ -193,7 +208,16 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Quantity) -
     hub.output.log.columns = list(keys)
 
 
-def plot(hub: Hub, ID: str, every: Annotated[int, Positive], x: Quantity, y: Quantity) -> None:
+def plot(
+    hub: Hub,
+    ID: str,
+    every: Every,
+    x: Quantity,
+    y: Quantity,
+    *,
+    axis: Literal["left", "right"] = "left",
+    scale: Literal["linear", "log"] = "linear",
+) -> None:
     """Plot one quantity against another, in the picture that save_plot names.
 
     Curves over the same x share one diagram, with a legend of their IDs.
@@ -203,13 +227,18 @@ def plot(hub: Hub, ID: str, every: Annotated[int, Positive], x: Quantity, y: Qua
     ID
         Name of the curve, shown in the legend.
     every
-        Steps between two points of the curve.
+        Steps between two points of the curve, or ``time(T)``.
     x, y
         ``step``, ``dt``, ``time``, a variable, a value of a fix or compute, or a formula of these.
+    axis
+        The side of the axis of y: ``right`` for a second one, with limits of its own.
+    scale
+        ``log`` for a logarithmic axis of y; numbers that are not positive are left out.
 
     Example
     -------
     plot(kinetic, 10, time, Ek_s)
+    plot(force, 10, time, piston_y, axis=right)
 
     See Also
     --------
@@ -218,7 +247,7 @@ def plot(hub: Hub, ID: str, every: Annotated[int, Positive], x: Quantity, y: Qua
     plots = hub.output.plots
     if ID in plots.ids():
         raise ScriptError(f"plot ID '{ID}' is already used", argument="ID")
-    plots.add(ID, Curve(every, x, y))
+    plots.add(ID, Curve(every, x, y, axis, scale))
 
 
 def save_plot(hub: Hub, file: OutputFile) -> None:
@@ -250,4 +279,32 @@ def save_plot(hub: Hub, file: OutputFile) -> None:
     plots = hub.output.plots
     plots.file, plots.place = file, hub.place
     if not hub.rehearsing:
-        plots.save()
+        plots.finish()
+
+
+def units(
+    hub: Hub,
+    length: Literal[*LENGTHS],
+    mass: Literal[*MASSES],
+    time: Literal[*TIMES],
+    temperature: Literal["K", "C"] = "K",
+) -> None:
+    """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.
+
+    No number changes by it: a scene in mm, g, ms has forces in N, stresses in MPa and energies in
+    mJ, whether it says so or not.
+
+    Parameters
+    ----------
+    length, mass, time, temperature
+        The units that the numbers of the script are in.
+
+    Example
+    -------
+    units(mm, g, ms)
+
+    See Also
+    --------
+    dump, plot
+    """
+    hub.output.units = Units(length, mass, time, temperature)

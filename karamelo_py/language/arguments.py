@@ -123,6 +123,12 @@ class Argument:
         """Whether a name means something where the argument stands."""
         return self._interpreter.knows(name)
 
+    def part(self, text: str) -> Argument:
+        """The last place of `text` in it, as an argument of its own."""
+        source = self._raw.source
+        start = source.text.rindex(text, self._raw.start, self._raw.end)
+        return Argument(Raw(source, start, start + len(text)), self._interpreter)
+
     def keyword(self) -> tuple[str, Argument] | None:
         """Name and value if it is written ``name = value``."""
         match = _KEYWORD.match(self.text)

@@ -67,7 +67,7 @@ class InputFile:
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
         """The path of the file."""
         name = _file_name(argument)
-        folders = [getattr(hub, "folder", Path()), argument._interpreter.folder]
+        folders = [getattr(hub, "folder", Path()), Path(), argument._interpreter.folder]
         for folder in folders:
             path = folder / name
             if path.is_file():

@@ -27,7 +27,7 @@ def whole(path: Path) -> Iterator[BinaryIO]:
         If the file cannot be written, with the system's reason.
     """
     temporary = path.with_name(f"{path.name}.part")
-    with _reported(path):
+    with reported(path):
         try:
             with temporary.open("wb") as file:
                 yield file
@@ -48,7 +48,7 @@ def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
     ScriptError
         If the file cannot be written, with the system's reason.
     """
-    with _reported(path), path.open("r+b" if start else "wb") as file:
+    with reported(path), path.open("r+b" if start else "wb") as file:
         try:
             file.seek(start)
             file.truncate()
@@ -100,7 +100,8 @@ def unwarned() -> Iterator[None]:
 
 
 @contextmanager
-def _reported(path: Path) -> Iterator[None]:
+def reported(path: Path) -> Iterator[None]:
+    """Turn what the system says against writing `path` into a ScriptError."""
     try:
         yield
     except OSError as error:

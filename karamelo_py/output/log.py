@@ -1,11 +1,14 @@
-"""The log: one line of numbers per output, in log.mpm and on the terminal."""
+"""The log: one line of numbers per output, in log.mpm (or log.csv) and on the terminal."""
 
 from __future__ import annotations
 
+import errno
+from pathlib import Path
 from typing import TextIO
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.quantity import Quantity
+from karamelo_py.output.rhythm import ByTime
 from karamelo_py.script.errors import ScriptError
 
 FILE = "log.mpm"
@@ -19,18 +22,30 @@ class Log:
 
     The file has one header line and one row per output. Columns are separated by spaces and begin
     at the margin, so that ``numpy.loadtxt("log.mpm", skiprows=1)`` and
-    ``pandas.read_csv("log.mpm", sep=r"\\s+")`` both read it. A further run goes on in the same
-    table; if the columns have changed, a comment line starting with ``#`` names the new ones.
+    ``pandas.read_csv("log.mpm", sep=r"\\s+")`` both read it. In a file with the ending .csv
+    commas separate them. A further run goes on in the same table; if the columns have changed, a
+    comment line starting with ``#`` names the new ones.
     """
 
     def __init__(self, hub: Scene):
         self.hub = hub
-        self.every = 1
+        self.every: int | ByTime = 1
+        self.file = Path(FILE)
         self.columns: list[Quantity] = []
         self.last_step: int | None = None
         self._file: TextIO | None = None
         self._header: str | None = None
         self._widths: list[int] = []
+
+    @property
+    def path(self) -> Path:
+        """Where it is written."""
+        return self.hub.folder / self.file
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it has been begun."""
+        return self._file is not None
 
     def default(self) -> None:
         """Log step, dt and time."""
@@ -49,9 +64,9 @@ class Log:
         if header != self._header:
             if self._file is None:
                 self._open()
-                self._put(header)
+                self._put(headings)
             else:
-                self._put("# " + header)
+                self._put(["# " + headings[0], *headings[1:]])
             self._header = header
             self.last_step = None
         self.hub.console.log_line(header, header=True)
@@ -67,9 +82,8 @@ class Log:
                 # A blank keeps the place of the minus sign; the first column starts at the margin
                 # for pandas' sake.
                 cells.append(f"{number: .10g}" if cells else f"{number:.10g}")
-        line = _row(cells, self._widths)
-        self._put(line)
-        self.hub.console.log_line(line)
+        self._put(cells)
+        self.hub.console.log_line(_row(cells, self._widths))
 
     def close(self) -> None:
         """Close the file; a later `begin` would start a new one."""
@@ -78,23 +92,52 @@ class Log:
             self._file = None
 
     def _open(self) -> None:
-        path = self.hub.folder / FILE
+        path = self.path
         try:
             # Line buffering: each line is in the file at once, also when the run is killed.
-            self._file = path.open("w", buffering=1, encoding="utf-8", newline="\n")
+            self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
+            _claim(self._file)
+            self._file.truncate(0)
+        except BlockingIOError as error:
+            raise ScriptError(
+                f"another run is writing to {path}",
+                expected="a folder of its own for each run",
+                hint="-out FOLDER sends all files there",
+            ) from error
         except OSError as error:
             raise ScriptError(
                 f"cannot write the log file {path}: {error.strerror or error}"
             ) from error
 
-    def _put(self, line: str) -> None:
+    def _put(self, cells: list[str]) -> None:
         assert self._file is not None
+        if self.file.suffix == ".csv":
+            line = ",".join(f'"{c}"' if "," in c else c.strip() for c in cells)
+        else:
+            line = _row(cells, self._widths)
         try:
             self._file.write(line + "\n")
         except OSError as error:
             raise ScriptError(
-                f"cannot write the log file {FILE}: {error.strerror or error}"
+                f"cannot write the log file {self.path}: {error.strerror or error}"
             ) from error
+
+
+def _claim(file: TextIO) -> None:
+    """Keep other programs from writing to `file` (BlockingIOError where one does).
+
+    The claim ends with the program, however it ends. Windows has none that lets others read.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in (errno.EACCES, errno.EAGAIN):
+            raise BlockingIOError from error
+        # File systems without locks are none of our business.
 
 
 def _row(cells: list[str], widths: list[int]) -> str:

@@ -8,15 +8,17 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.log import FILE, Log
+from karamelo_py.output.log import Log
 from karamelo_py.output.plots import Plots
+from karamelo_py.output.rhythm import ByTime, is_due, next_step
+from karamelo_py.output.units import Units
 from karamelo_py.script.errors import ScriptError
 
 
 class Periodic(Protocol):
-    """Something written every so many steps; `last_step` is the step it last wrote."""
+    """Something written again and again; `last_step` is the step it last wrote."""
 
-    every: int
+    every: int | ByTime
     last_step: int | None
 
     def write(self) -> None:
@@ -27,8 +29,8 @@ class Output:
     """Writes log, dumps and plots when they are due.
 
     Each of them is due at the first and the last state of every run and at the multiples of its
-    `every`, counted in absolute steps, so that a further run goes on in the same rhythm. No state
-    is written twice to the same file. In a rehearsal nothing is written.
+    `every`, counted in absolute steps or time, so that a further run goes on in the same rhythm.
+    No state is written twice to the same file. In a rehearsal nothing is written.
 
     A run calls ``begin``, then again and again ``next_step`` and ``write``, then ``end``;
     ``abort`` stands in for ``end`` when the run breaks off.
@@ -38,6 +40,7 @@ class Output:
         self.hub = hub
         self.log = Log(hub)
         self.plots = Plots(hub)
+        self.units: Units | None = None
         # Which dump a file belongs to.
         self.files: dict[Path, str] = {}
 
@@ -51,7 +54,7 @@ class Output:
         """
         path = self.hub.folder / file
         scripts = getattr(self.hub.interpreter, "files", ())
-        if _may_be(path, self.hub.folder / FILE):
+        if _may_be(path, self.log.path):
             what = f"{file} is the log"
         elif any(_may_be(path, script) for script in scripts):
             what = f"{file} is the script itself"
@@ -78,14 +81,22 @@ class Output:
 
     def next_step(self, step: int) -> int:
         """The first step after `step` at which something is due."""
-        return min((step // item.every + 1) * item.every for item in self._items())
+        update = self.hub.update
+        fixed = update.fixed_dt is not None
+        return min(
+            next_step(item.every, step, update.time, update.dt, fixed) for item in self._items()
+        )
 
     def write(self, last: bool = False) -> None:
         """Write what is due at the present step; with `last`, everything not yet written."""
         if self.hub.rehearsing:
             return
-        step = self.hub.update.step
-        due = [i for i in self._items() if i.last_step != step and (last or step % i.every == 0)]
+        step, time = self.hub.update.step, self.hub.update.time
+        due = [
+            i
+            for i in self._items()
+            if i.last_step != step and (last or is_due(i.every, step, time))
+        ]
         if any(item is self.log or item in self.plots for item in due):
             # Computes and energy fixes only work when somebody looks.
             self.hub.refresh_values()
@@ -98,35 +109,43 @@ class Output:
                 what = f"cannot write {error.filename or 'a file'}: {error.strerror or error}"
                 raise _located(ScriptError(what), item) from error
             item.last_step = step
+            if isinstance(item.every, ByTime):
+                item.every.passed = item.every.now(time)
 
     def end(self, last: bool = True) -> None:
-        """Write the last state of a run (unless `last` is false) and draw the plots."""
+        """Write the last state of a run (unless `last` is false), and complete plots and dumps."""
         if self.hub.rehearsing:
             return
         if last:
             self.write(last=True)
-        self._save_plots()
+        for item in self._to_finish():
+            self._finish(item)
 
     def abort(self) -> None:
-        """Draw the plots and close the log of a run that breaks off.
+        """Draw the plots, complete dumps and close the log of a run that breaks off.
 
         No further state is written: a caller that holds a sound one calls ``write(last=True)``
-        before. What prevents the plots is told as a warning, as another error is on its way.
+        before. What prevents them is told as a warning, as another error is on its way.
         """
         if self.hub.rehearsing:
             return
         try:
-            self._save_plots()
-        except ScriptError as error:
-            self.hub.console.warn(error.render())
+            for item in self._to_finish():
+                try:
+                    self._finish(item)
+                except ScriptError as error:
+                    self.hub.console.warn(error.render())
         finally:
             self.log.close()
 
-    def _save_plots(self) -> None:
+    def _to_finish(self) -> list:
+        return [self.plots, *self.hub.dumps.values()]
+
+    def _finish(self, item: Any) -> None:
         try:
-            self.plots.save()
+            item.finish()
         except ScriptError as error:
-            raise _located(error, self.plots) from error.__cause__
+            raise _located(error, item) from error.__cause__
 
     def _items(self) -> list[Periodic]:
         return [self.log, *self.hub.dumps.values(), *self.plots]

@@ -4,23 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.figures import blank_figure, tidy
 from karamelo_py.output.files import FORMATS, savefig
 from karamelo_py.output.quantity import Quantity
+from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import Place
 
 __all__ = ["FORMATS", "Curve", "Plots"]
 
 
 class Curve:
-    """One curve: `y` against `x`, a point at every `every` steps."""
+    """One curve: `y` against `x`, a point at every `every` steps.
 
-    def __init__(self, every: int, x: Quantity, y: Quantity):
+    `side` is that of the axis of y, left or right; `scale` is linear or log.
+    """
+
+    def __init__(
+        self, every: int, x: Quantity, y: Quantity, side: str = "left", scale: str = "linear"
+    ):
         self.every = every
         self.x = x
         self.y = y
+        self.side = side
+        self.scale = scale
         self.points: list[tuple[float, float]] = []
         self.last_step: int | None = None
         self.id = y.name
@@ -61,7 +70,7 @@ class Plots:
         """IDs of the curves."""
         return list(self._curves)
 
-    def save(self) -> None:
+    def finish(self) -> None:
         """Draw every curve that has points to the file; without file or points do nothing."""
         if self.file is None or not any(curve.points for curve in self):
             return
@@ -72,12 +81,42 @@ class Plots:
         figure = blank_figure(6.4, 3.8 * len(by_x))
         all_axes = figure.subplots(len(by_x), 1, squeeze=False)[:, 0]
         for axes, (x_name, curves) in zip(all_axes, by_x.items(), strict=True):
-            for curve in curves:
-                x, y = zip(*curve.points, strict=True)
-                axes.plot(x, y, label=curve.id, linewidth=1.4, marker="o" if len(x) < 3 else None)
-            axes.set_xlabel(x_name)
-            axes.set_ylabel(", ".join(dict.fromkeys(curve.y.name for curve in curves)))
-            axes.margins(x=0.01)
-            tidy(axes)
-            axes.legend(frameon=False)
+            axes.set_xlabel(self._labelled(x_name))
+            lines = []
+            for side in ("left", "right"):
+                chosen = [curve for curve in curves if curve.side == side]
+                # Colours go on from one side to the other.
+                lines += self._draw(axes, side, chosen, first=len(lines)) if chosen else []
+            # Above the curves, where it hides none.
+            axes.legend(
+                handles=lines,
+                loc="lower left",
+                bbox_to_anchor=(0, 1),
+                ncols=4,
+                frameon=False,
+                fontsize="small",
+            )
         savefig(figure, self.hub.folder / self.file)
+
+    def _draw(self, axes: Any, side: str, curves: list[Curve], first: int) -> list:
+        """Draw curves over one axis of y; return their lines."""
+        tidy(axes)
+        if side == "right":
+            axes = axes.twinx()
+            axes.spines[["top", "left"]].set_visible(False)
+        lines = []
+        for k, curve in enumerate(curves, first):
+            x, y = zip(*curve.points, strict=True)
+            marker = "o" if len(x) < 3 else None
+            label = f"{curve.id} (right)" if side == "right" else curve.id
+            lines += axes.plot(x, y, color=f"C{k}", label=label, linewidth=1.4, marker=marker)
+        axes.set_ylabel(", ".join(dict.fromkeys(self._labelled(curve.y.name) for curve in curves)))
+        axes.margins(x=0.01)
+        if any(curve.scale == "log" for curve in curves):
+            axes.set_yscale("log", nonpositive="mask")
+        return lines
+
+    def _labelled(self, name: str) -> str:
+        units = self.hub.output.units
+        parts = {**self.hub.fixes, **self.hub.computes}
+        return labelled(name, units.of_value(name, parts)) if units else name

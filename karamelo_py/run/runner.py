@@ -253,6 +253,7 @@ class Runner:
                 "stable dt": simulation.limit,
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,
+                **({"units": str(hub.output.units)} if hub.output.units else {}),
             },
         )
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
 
-from karamelo_py.language.signature import OutputFile, Positive
+from karamelo_py.language.signature import OutputFile
+from karamelo_py.output.rhythm import Every
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, nearest
 
@@ -27,7 +27,7 @@ class Dump:
     def __init__(
         self,
         hub: Hub,
-        every: Annotated[int, Positive],
+        every: Every,
         file: OutputFile,
         *columns: str,
     ):
@@ -50,6 +50,9 @@ class Dump:
     def write(self) -> None:
         """Write the present state."""
         raise NotImplementedError
+
+    def finish(self) -> None:
+        """Complete what is written; called at the end of each run, also of one that breaks off."""
 
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
         """Warn of columns that are 0 because no point or node (`what`) keeps them."""

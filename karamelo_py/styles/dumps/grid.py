@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated
-
-import numpy as np
-
-from karamelo_py.language.signature import OutputFile, Positive
-from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.dumps.lammps import LammpsDump
+from karamelo_py.styles.dumps.table import OfNodes
 
 
-class Grid(LammpsDump):
+class Grid(OfNodes, LammpsDump):
     """Write the nodes of the background grids in LAMMPS text format, which OVITO opens.
 
     Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the
@@ -26,7 +20,8 @@ class Grid(LammpsDump):
     Parameters
     ----------
     every
-        Steps between two snapshots. The first and the last state of a run are always written.
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
     file
         File name. The first ``*`` becomes the step number; without ``*`` all snapshots follow each
         other in one file.
@@ -42,39 +37,3 @@ class Grid(LammpsDump):
     -------
     dump(d2, all, grid, 100, dump_g.*.LAMMPS, x, y, z, vx, vy, mass)
     """
-
-    rows_are = "nodes"
-
-    def __init__(
-        self,
-        hub: Hub,
-        every: Annotated[int, Positive],
-        file: OutputFile,
-        *columns: str,
-        occupied: bool = False,
-    ):
-        super().__init__(hub, every, file, *columns)
-        self.occupied = occupied
-        self._rows: np.ndarray | slice = slice(None)
-
-    @property
-    def absent(self) -> Sequence[str]:
-        """Columns that are 0 in this scene."""
-        return self.hub.fields.absent_at_nodes()
-
-    @staticmethod
-    def names(hub: Hub) -> Sequence[str]:
-        """Names of the columns that can be written."""
-        return hub.fields.node_names()
-
-    def ids(self) -> tuple[np.ndarray, np.ndarray]:
-        """Number and grid of each node."""
-        ids = np.arange(self.hub.fields.node_count)
-        if self.occupied:
-            self._rows = np.flatnonzero(self.hub.fields.node("mass") > 0)
-            ids = ids[self._rows]
-        return ids, self.field("type")
-
-    def field(self, name: str) -> np.ndarray:
-        """Values of a node field, of the nodes that are written."""
-        return self.hub.fields.node(name)[self._rows]

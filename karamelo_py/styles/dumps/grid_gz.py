@@ -12,7 +12,8 @@ class GridGz(Gzipped, Grid):
     Parameters
     ----------
     every
-        Steps between two snapshots. The first and the last state of a run are always written.
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
     file
         File name, best with the ending ``.gz``. The first ``*`` becomes the step number; without
         ``*`` all snapshots follow each other in one file.

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
-from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.dumps.lammps import LammpsDump
+from karamelo_py.styles.dumps.table import OfPoints
 
 
-class Particle(LammpsDump):
+class Particle(OfPoints, LammpsDump):
     """Write the material points in LAMMPS text format, which OVITO opens.
 
     Each row begins with the point's number (``id``, the same through the whole run) and the number
@@ -20,7 +16,8 @@ class Particle(LammpsDump):
     Parameters
     ----------
     every
-        Steps between two snapshots. The first and the last state of a run are always written.
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
     file
         File name. The first ``*`` becomes the step number; without ``*`` all snapshots follow each
         other in one file.
@@ -33,26 +30,3 @@ class Particle(LammpsDump):
     -------
     dump(d1, all, particle, 100, dump_p.*.LAMMPS, x, y, z, vx, vy, vz, s11, s22, s12)
     """
-
-    @staticmethod
-    def names(hub: Hub) -> Sequence[str]:
-        """Names of the columns that can be written."""
-        return hub.fields.particle_names()
-
-    @property
-    def absent(self) -> Sequence[str]:
-        """Columns that are 0 because no point keeps them."""
-        return self.hub.fields.absent_at_points()
-
-    def ids(self) -> tuple[np.ndarray, np.ndarray]:
-        """Number and solid of each point."""
-        fields = self.hub.fields
-        return _integers(fields.particle("id")), _integers(fields.particle("type"))
-
-    def field(self, name: str) -> np.ndarray:
-        """(N,) values of a particle field."""
-        return self.hub.fields.particle(name)
-
-
-def _integers(values: np.ndarray) -> np.ndarray:
-    return values.astype(np.int64, copy=False)

@@ -2,51 +2,72 @@
 
 from __future__ import annotations
 
-from typing import Any, BinaryIO
+from itertools import product
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize, to_rgba_array
 from matplotlib.figure import Figure
-from matplotlib.ticker import Formatter
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 from PIL import Image
 
 # Colour-blind safe (Okabe and Ito 2008); solids take them in turn.
 SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
-MAP = "viridis"
-# Angles of view in 3D, as in Matplotlib's own 3D axes.
-AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(30.0)
+MOST_IN_LEGEND = 16
+STEPS = (1, 2, 2.5, 5, 10)  # between ticks
+# Towards the light, in a frame of right, up and towards the eye.
+LIGHT = np.array([-0.35, 0.6, 0.72])
+AMBIENT = 0.5  # light from all sides
+# A circle of this diameter has the area of a unit square.
+ROUND = np.sqrt(4 / np.pi)
 
 
-class Numbers(Formatter):
-    """Numbers with two decimals (more where they hardly differ); their power of ten stands apart.
+class Options(NamedTuple):
+    """What a picture shows and how.
 
-    So they keep their width while the limits grow.
+    Attributes
+    ----------
+    label
+        Text beside the colours (or, in 1D, at the ordinate).
+    solids
+        Names of the solids that colour the points, if a field does not.
+    limits
+        Ends of the colours; None for ends that grow with what has been seen.
+    symmetric
+        Whether limits that grow lie about 0.
+    cmap
+        A colour map of Matplotlib.
+    azimuth, elevation
+        Angles of view in 3D, in degrees.
+    axes
+        Whether axes are drawn.
+    lengths
+        Text behind the names of the axes: the unit.
     """
 
-    order, decimals = 0, 2
-
-    def set_locs(self, locs: Any) -> None:
-        """Find the power of ten of the limits."""
-        limits = np.asarray(self.axis.get_view_interval(), float)
-        largest, span = abs(limits).max(), np.ptp(limits)
-        self.order = int(np.floor(np.log10(largest))) if largest > 0 else 0
-        share = span / largest if largest > 0 else 1.0
-        self.decimals = 2 + max(0, int(np.ceil(-np.log10(max(share, 1e-9)))) - 1)
-
-    def __call__(self, value: float, pos: int | None = None) -> str:
-        """The text of one number."""
-        return self.fix_minus(f"{value / 10.0**self.order:.{self.decimals}f}")
-
-    def get_offset(self) -> str:
-        """The power of ten."""
-        return self.fix_minus(f"1e{self.order}") if self.order else ""
+    label: str
+    solids: tuple[str, ...] = ()
+    limits: tuple[float | None, float | None] = (None, None)
+    symmetric: bool = False
+    cmap: str = "viridis"
+    azimuth: float = -60.0
+    elevation: float = 30.0
+    axes: bool = True
+    lengths: str = ""
 
 
-def make(domain: Any, size: tuple[float, float], dpi: int, label: str) -> Picture:
-    """The picture that suits the domain's dimension; `label` names the field shown."""
+def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> Picture:
+    """The picture that suits the domain's dimension."""
     kind = {1: Line, 2: Plane, 3: Space}[domain.dimension]
-    return kind(domain, size, dpi, label)
+    return kind(domain, size, dpi, options)
+
+
+def _number(value: float, _: Any = None) -> str:
+    return f"{value:.8g}"
 
 
 class Picture:
@@ -56,12 +77,12 @@ class Picture:
     of the field do, so their pixels are kept, and a new state costs the points and the title.
     """
 
-    def __init__(self, domain: Any, size: tuple[float, float], dpi: int, label: str):
+    def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
         self.domain = domain
+        self.options = options
         self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
         self.canvas = FigureCanvasAgg(self.figure)
         self.axes = self.figure.add_subplot()
-        self.label = label
         self.limits: tuple[float, float] | None = None
         # The axis whose labels change with the limits of the field.
         self.scale: Any = None
@@ -70,6 +91,9 @@ class Picture:
         self.axes.tick_params(labelsize=8)
         self.title = self.axes.set_title("step 0, time 0", fontsize=9)
         self.artist = self._prepare()
+        if not options.axes:
+            self.axes.set_axis_off()
+        self._add_legend()
 
     def _prepare(self) -> Any:
         """Set up axes; return the artist that shows the points."""
@@ -83,18 +107,40 @@ class Picture:
         """Take new limits of the field."""
         raise NotImplementedError
 
+    def _add_legend(self) -> None:
+        """Names of the solids, beside the picture."""
+        names = self.options.solids[:MOST_IN_LEGEND]
+        if len(names) < 2:
+            return
+        dots = [
+            Line2D([], [], marker="o", linestyle="", color=SOLIDS[k % len(SOLIDS)], label=name)
+            for k, name in enumerate(names)
+        ]
+        self.figure.legend(handles=dots, loc="outside right upper", frameon=False, fontsize=8)
+
     def show(self, x: np.ndarray, values: np.ndarray, size: float, title: str) -> None:
         """Set positions (n, 3), values (n,), side length of a point, and title to draw."""
         if not self._laid_out:
             self._lay_out()
-        if self.label != "type":
-            limits = grown(self.limits, values)
+        if not self.options.solids:
+            limits = self._limits(values)
             if limits != self.limits:
                 self.limits = limits
                 self._apply_limits(*limits)
                 self._background = None
         self.title.set_text(title)
         self._place(x, values, size)
+
+    def _limits(self, values: np.ndarray) -> tuple[float, float]:
+        grown_to = grown(self.limits, values)
+        if self.options.symmetric:
+            furthest = max(-grown_to[0], grown_to[1])
+            grown_to = -furthest, furthest
+        lo, hi = (
+            own if fixed is None else fixed
+            for own, fixed in zip(grown_to, self.options.limits, strict=True)
+        )
+        return (lo, hi) if hi > lo else (min(lo, hi), min(lo, hi) + (abs(lo) or 1.0))
 
     def save_png(self, file: BinaryIO, compression: int) -> None:
         """Draw the state over the kept background and write it as PNG."""
@@ -114,8 +160,9 @@ class Picture:
     def _lay_out(self) -> None:
         """Find room for the widest labels, once: nothing moves between the pictures of a run."""
         if self.scale is not None:
-            self._apply_limits(-1e-4, 1e-4)
-        self.figure.draw_without_rendering()
+            self._apply_limits(-2.5e-5, 2.5e-5)
+        for _ in range(2):  # a second time where the aspect of the axes has moved them
+            self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
         if self.scale is not None:
             axes = self.scale.axes
@@ -138,70 +185,62 @@ class Plane(Picture):
         self.axes.set_xlim(lo[0], hi[0])
         self.axes.set_ylim(lo[1], hi[1])
         self.axes.set_aspect("equal")
-        self.axes.set_xlabel("x", fontsize=9)
-        self.axes.set_ylabel("y", fontsize=9)
+        self.axes.set_xlabel("x" + self.options.lengths, fontsize=9)
+        self.axes.set_ylabel("y" + self.options.lengths, fontsize=9)
         return self._scatter()
 
     def _scatter(self) -> Any:
-        if self.label == "type":
-            norm = Normalize(-0.5, len(SOLIDS) - 0.5)
-            return self.axes.scatter([], [], c=[], cmap=ListedColormap(SOLIDS), norm=norm, lw=0)
+        self.colours = to_rgba_array(SOLIDS)
         self.norm = Normalize(0.0, 1.0)
-        artist = self.axes.scatter([], [], c=[], cmap=MAP, norm=self.norm, lw=0)
-        bar = self.figure.colorbar(
-            artist, ax=self.axes, shrink=0.8, label=self.label, format=Numbers()
-        )
-        bar.ax.tick_params(labelsize=8)
-        self.scale = bar.ax.yaxis
-        self.scale.get_offset_text().set_size(8)
-        return artist
+        if not self.options.solids:
+            shown = ScalarMappable(self.norm, self.options.cmap)
+            bar = self.figure.colorbar(
+                shown,
+                ax=self.axes,
+                shrink=0.8,
+                label=self.options.label,
+                ticks=MaxNLocator(7, steps=STEPS),
+                format=FuncFormatter(_number),
+            )
+            bar.ax.tick_params(labelsize=8)
+            self.scale = bar.ax.yaxis
+        return self.axes.scatter([], [], lw=0)
 
     def _apply_limits(self, lo: float, hi: float) -> None:
         self.norm.vmin, self.norm.vmax = lo, hi
 
     def _place(self, x: np.ndarray, values: np.ndarray, size: float) -> None:
-        self._set(x[:, :2], values, size)
+        self._set(x[:, :2], self._colours_of(values), size)
 
-    def _set(self, xy: np.ndarray, values: np.ndarray, size: float) -> None:
+    def _colours_of(self, values: np.ndarray) -> np.ndarray:
+        """(n, 4) colours."""
+        if self.options.solids:
+            return self.colours[(values.astype(int) - 1) % len(SOLIDS)]
+        return colormaps[self.options.cmap](self.norm(values))
+
+    def _set(self, xy: np.ndarray, colours: np.ndarray, size: float) -> None:
         self.artist.set_offsets(xy)
-        if self.label == "type":
-            values = (values - 1) % len(SOLIDS)
-        self.artist.set_array(values)
-        # As large as the material it stands for, and never invisible.
-        self.artist.set_sizes([max(size * self._pixels_per_unit(), 0.8) ** 2])
+        self.artist.set_facecolors(colours)
+        # As large as the material it stands for, and never invisible: least where they are few.
+        least = 0.8 + 4 / np.sqrt(max(len(xy), 1))
+        self.artist.set_sizes([max(ROUND * size * self._pixels_per_unit(), least) ** 2])
 
 
 class Space(Plane):
-    """3D: the points seen from above and aside, the farthest first, in the frame of the domain."""
+    """3D: the points seen from outside, the farthest first, in the frame of the domain."""
 
     def _prepare(self) -> Any:
-        lo, hi = self.domain.lo, self.domain.hi
-        ca, sa, ce, se = np.cos(AZIMUTH), np.sin(AZIMUTH), np.cos(ELEVATION), np.sin(ELEVATION)
+        self.lo, self.hi = np.asarray(self.domain.lo, float), np.asarray(self.domain.hi, float)
+        a, e = np.radians([self.options.azimuth, self.options.elevation])
+        ca, sa, ce, se = np.cos(a), np.sin(a), np.cos(e), np.sin(e)
         # Rows: right, up and towards the eye.
         self.view = np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
-        self.middle = 0.5 * (np.asarray(lo) + np.asarray(hi))
-        corners = np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
-        seen = self._project(lo + corners * (np.asarray(hi) - lo))
-        for i in range(8):
-            for j in range(i):
-                if abs(corners[i] - corners[j]).sum() == 1:
-                    self.axes.plot(*seen[[i, j], :2].T, color="0.75", linewidth=0.7)
-        for name, axis in zip("xyz", np.eye(3, dtype=int), strict=True):
-            # Written at the edges that meet in the corner nearest to the reader, z at the left end.
-            start = np.array([1, 0, 0]) if name == "y" else np.zeros(3, dtype=int)
-            at = seen[[int(np.dot(c, (4, 2, 1))) for c in (start, start + axis)], :2].mean(axis=0)
-            low, high = (float(b[int(np.argmax(axis))]) for b in (lo, hi))
-            self.axes.annotate(
-                f"{name}: {low:g} .. {high:g}",
-                at,
-                xytext=(0, -9) if name != "z" else (-9, 0),
-                textcoords="offset points",
-                ha="center" if name == "z" else ("right" if name == "x" else "left"),
-                va="center",
-                rotation=90 if name == "z" else 0,
-                fontsize=8,
-            )
-        reach = abs(seen[:, :2]).max(axis=0) * 1.08
+        self.middle = 0.5 * (self.lo + self.hi)
+        seen = self._project(np.array(list(product(*zip(self.lo, self.hi, strict=True)))))[:, :2]
+        if self.options.axes:
+            for axis in range(3):
+                self._draw_edges(axis, abs(seen).max())
+        reach = abs(seen).max(axis=0) * 1.04
         self.axes.set_xlim(-reach[0], reach[0])
         self.axes.set_ylim(-reach[1], reach[1])
         self.axes.set_aspect("equal")
@@ -211,10 +250,69 @@ class Space(Plane):
     def _project(self, x: np.ndarray) -> np.ndarray:
         return (x - self.middle) @ self.view.T
 
+    def _draw_edges(self, axis: int, reach: float) -> None:
+        """The four edges along an axis; ticks at the lowest one, of z at the leftmost."""
+        others = [k for k in range(3) if k != axis]
+        edges = []
+        for low_high in product(*((self.lo[k], self.hi[k]) for k in others)):
+            ends = np.array([self.lo, self.hi])
+            ends[:, others] = low_high
+            edges.append((ends, self._project(ends)[:, :2]))
+            self.axes.plot(*edges[-1][1].T, color="0.75", linewidth=0.7)
+        ends, seen = min(edges, key=lambda edge: edge[1][:, 0 if axis == 2 else 1].sum())
+        along = seen[1] - seen[0]
+        if np.hypot(*along) < 0.1 * reach:
+            return  # seen from its end
+        outward = np.array([along[1], -along[0]]) / np.hypot(*along)
+        outward *= np.sign(outward @ seen.mean(axis=0)) or 1.0
+        aligned = {
+            "ha": "right" if outward[0] < -0.4 else "left" if outward[0] > 0.4 else "center",
+            "va": "top" if outward[1] < -0.4 else "bottom" if outward[1] > 0.4 else "center",
+            "textcoords": "offset points",
+            "fontsize": 8,
+        }
+        lo, hi = self.lo[axis], self.hi[axis]
+        ticks = MaxNLocator(4, steps=STEPS).tick_values(lo, hi)
+        # Those of two edges would cover each other at their common end.
+        for tick in ticks[abs(ticks - 0.5 * (lo + hi)) < 0.48 * (hi - lo)]:
+            at = seen[0] + along * (tick - lo) / (hi - lo)
+            self.axes.plot(*np.array([at, at + 0.02 * reach * outward]).T, color="0.5", lw=0.7)
+            self.axes.annotate(_number(tick), at, xytext=tuple(6 * outward), **aligned)
+        self.axes.annotate(
+            "xyz"[axis] + self.options.lengths,
+            seen.mean(axis=0),
+            xytext=tuple(28 * outward),
+            **aligned,
+            rotation=90 if axis == 2 else 0,
+        )
+
     def _place(self, x: np.ndarray, values: np.ndarray, size: float) -> None:
         seen = self._project(x)
         order = np.argsort(seen[:, 2], kind="stable")
-        self._set(seen[order, :2], values[order], size)
+        colours = self._colours_of(values)
+        colours[:, :3] *= self._light(x, size)[:, None]
+        self._set(seen[order, :2], colours[order], size)
+
+    def _light(self, x: np.ndarray, size: float) -> np.ndarray:
+        """How much light falls on each point: its surface looks where there are fewer points."""
+        if len(x) < 8:
+            return np.ones(len(x))
+        lo, extent = x.min(axis=0), np.ptp(x, axis=0)
+        cell = max(1.5 * size, extent.max() / 120, np.finfo(float).tiny)
+        shape = (extent / cell).astype(int) + 5
+        at = tuple(((x - lo) / cell).astype(int).T + 2)
+        density = np.bincount(np.ravel_multi_index(at, shape), minlength=shape.prod())
+        density = density.reshape(shape).astype(float)
+        for axis in range(3):
+            for _ in range(2):
+                density = 0.5 * density + 0.25 * (
+                    np.roll(density, 1, axis) + np.roll(density, -1, axis)
+                )
+        normal = -np.column_stack([slope[at] for slope in np.gradient(density)])
+        length = np.linalg.norm(normal, axis=1)
+        facing = (normal @ self.view.T) @ (LIGHT / np.linalg.norm(LIGHT))
+        facing = np.divide(facing, length, out=np.ones(len(x)), where=length > 0)
+        return AMBIENT + (1 - AMBIENT) * np.clip(facing, 0, 1)
 
 
 class Line(Picture):
@@ -222,11 +320,10 @@ class Line(Picture):
 
     def _prepare(self) -> Any:
         self.axes.set_xlim(self.domain.lo[0], self.domain.hi[0])
-        self.axes.set_xlabel("x", fontsize=9)
-        self.axes.set_ylabel(self.label, fontsize=9)
+        self.axes.set_xlabel("x" + self.options.lengths, fontsize=9)
+        self.axes.set_ylabel(self.options.label, fontsize=9)
         self.scale = self.axes.yaxis
-        self.scale.set_major_formatter(Numbers())
-        self.scale.get_offset_text().set_size(8)
+        self.scale.set_major_formatter(FuncFormatter(_number))
         self.axes.grid(True, color="0.9", linewidth=0.7)
         (artist,) = self.axes.plot([], [], ".", color=SOLIDS[0], markersize=3)
         return artist

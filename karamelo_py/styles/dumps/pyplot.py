@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
 import numpy as np
 
+from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
+from karamelo_py.output.rhythm import Every
+from karamelo_py.output.units import labelled
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.styles.dumps.base import Dump
 
 DPI = 100
@@ -18,19 +22,23 @@ MOST_INCHES = 50
 LEAST_PIXELS, MOST_PIXELS = 20, 20000
 # Fast and nearly as small as the best for pictures of few colours.
 PNG_COMPRESSION = 1
+# Components have either sign: their colours are of two kinds, with grey at 0.
+SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
+MAP, SIGNED_MAP = "viridis", "coolwarm"
 
 
 class PyPlot(Dump):
     """Draw a picture of the points, coloured by a field or by their solid.
 
     In 2D and 3D the points are drawn where they are, in 1D the field is drawn over x. The limits
-    of the colours grow with what has been seen, so that the pictures of a run can be compared. The
-    figure is made once and only its points are drawn anew.
+    of the colours grow with what has been seen, so that the pictures of a run can be compared,
+    unless they are given. The figure is made once and only its points are drawn anew.
 
     Parameters
     ----------
     every
-        Steps between two pictures. The first and the last state of a run are always drawn.
+        Steps between two pictures, or ``time(T)``. The first and the last state of a run are
+        always drawn.
     file
         File name ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without
         ``*`` each picture takes the place of the one before.
@@ -40,59 +48,146 @@ class PyPlot(Dump):
     field
         What colours the points: any column of dump particle. Without it the solid does (in 1D: vx
         is drawn).
+    vmin, vmax
+        Ends of the colours.
+    cmap
+        A colour map of Matplotlib; viridis, or coolwarm for components, which have either sign.
+    azimuth, elevation
+        In 3D, from where it is seen, in degrees: around z from x on, and above the horizon.
+    axes
+        false: without axes and numbers.
+    title
+        What is written above, in front of step and time.
 
     Example
     -------
-    dump(d3, all, pyplot, 100, picture.*.png, 500, 500, seq)
+    dump(d3, all, pyplot, 100, picture.*.png, 500, 500, seq, vmin=0, vmax=2e5)
+
+    See Also
+    --------
+    dump movie
     """
 
     def __init__(
         self,
         hub: Hub,
-        every: Annotated[int, Positive],
+        every: Every,
         file: OutputFile,
         width: Annotated[float, Positive],
         height: Annotated[float, Positive],
         field: str | None = None,
+        *,
+        vmin: float | None = None,
+        vmax: float | None = None,
+        cmap: str | None = None,
+        azimuth: float = -60.0,
+        elevation: Annotated[float, In(-90, 90)] = 30.0,
+        axes: bool = True,
+        title: str | None = None,
     ):
         if field is not None:
             self.check_columns([field], hub.fields.particle_names(), first=4)
         super().__init__(hub, every, file)
-        self.format = picture_format(self.file)
+        self.format = self.check_format()
         self.size = (_inches("width", width), _inches("height", height))
         if field is not None:
             self.warn_of_absent([field], hub.fields.absent_at_points(), "points")
+        if vmin is not None and vmax is not None and vmin >= vmax:
+            raise ScriptError(
+                f"the colours cannot go from {vmin:g} to {vmax:g}",
+                argument="vmax",
+                expected="a number above vmin",
+            )
         self.field = field
+        self.limits = (vmin, vmax)
+        self.title = title
+        self.look = {"azimuth": azimuth, "elevation": elevation, "axes": axes}
+        self.symmetric, self.cmap = colours_of(field or "vx", self.limits, cmap)
         self._picture: Any = None
+
+    def check_format(self) -> str:
+        """The format that the file name asks for."""
+        return picture_format(self.file)
 
     def write(self) -> None:
         """Draw the present state."""
+        with unwarned():
+            self._draw()
+            if self.format == "png":
+                with whole(self.path()) as file:
+                    self._picture.save_png(file, PNG_COMPRESSION)
+            else:
+                savefig(self._picture.figure, self.path())
+
+    def _draw(self) -> None:
+        fields, update = self.hub.fields, self.hub.update
+        if self._picture is None:
+            self._picture = self._make()
+        x = np.column_stack([fields.particle(name) for name in "xyz"])
+        values = fields.particle(self._label())
+        title = f"step {update.step}, time {update.time:.6g}"
+        if self.hub.output.units is not None:
+            title += f" {self.hub.output.units.time}"
+        if self.title:
+            title = f"{self.title}: {title}"
+        self._picture.show(x, values, self._side(x[:, 0]), title)
+
+    def _make(self) -> Any:
         # Matplotlib takes a third of a second to import: only scenes with pictures pay it.
         from karamelo_py.styles.dumps import picture
 
-        with unwarned():
-            self._draw(picture)
+        units = self.hub.output.units
+        label = self._label()
+        options = picture.Options(
+            labelled(label, units.of_column(label)) if units else label,
+            tuple(self.hub.solids) if label == "type" else (),
+            self.limits,
+            self.symmetric,
+            self.cmap,
+            lengths=f" [{units.length}]" if units else "",
+            **self.look,
+        )
+        return picture.make(self.hub.domain, self.size, DPI, options)
 
-    def _draw(self, picture: Any) -> None:
-        if self._picture is None:
-            self._picture = picture.make(self.hub.domain, self.size, DPI, self._label())
-        fields, update = self.hub.fields, self.hub.update
-        x = np.column_stack([fields.particle(name) for name in "xyz"])
-        values = fields.particle(self._label())
-        size = float(np.median(fields.particle("volume"))) ** (1 / self.hub.domain.dimension)
-        title = f"step {update.step}, time {update.time:.6g}"
-        self._picture.show(x, values, size, title)
-        path = self.path()
-        if self.format == "png":
-            with whole(path) as file:
-                self._picture.save_png(file, PNG_COMPRESSION)
-        else:
-            savefig(self._picture.figure, path)
+    def _side(self, x: np.ndarray) -> float:
+        """Side length of a typical point."""
+        volume, dimension = self.hub.fields.particle("volume"), self.hub.domain.dimension
+        if not len(volume):
+            return 0.0
+        if self.hub.domain.axisymmetric:
+            volume = volume / np.maximum(x, 1e-3 * x.max())  # of a ring, per radian
+        return float(np.median(volume)) ** (1 / dimension)
 
     def _label(self) -> str:
         if self.field is not None:
             return self.field
         return "vx" if self.hub.domain.dimension == 1 else "type"
+
+
+def colours_of(
+    column: str, limits: tuple[float | None, float | None], cmap: str | None
+) -> tuple[bool, str]:
+    """Whether limits that grow lie about 0, and the colour map, for a column.
+
+    Raises
+    ------
+    ScriptError
+        If Matplotlib does not have the map that is asked for.
+    """
+    signed = SIGNED.fullmatch(column) is not None
+    if cmap is not None:
+        from matplotlib import colormaps
+
+        if cmap not in colormaps:
+            close = nearest(cmap, list(colormaps))
+            raise ScriptError(
+                f"Matplotlib has no colour map '{cmap}'",
+                argument="cmap",
+                expected="viridis, coolwarm, magma, gray, jet ...",
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+    # Where the user says about what the colours lie, they do not lie about 0.
+    return signed and limits == (None, None), cmap or (SIGNED_MAP if signed else MAP)
 
 
 def _inches(argument: str, value: float) -> float:

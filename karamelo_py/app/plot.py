@@ -1,0 +1,99 @@
+"""karamelo-py plot: columns of the log of an earlier run against each other."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from karamelo_py.output.files import picture_format
+from karamelo_py.output.plots import Curve, Plots
+from karamelo_py.script.errors import ScriptError, nearest
+
+SUMMARY = "Draw columns of a log."
+TEXT = "The log is log.mpm or log.csv. Without columns, lists those that there are."
+
+
+def add_parser(subparsers: Any) -> argparse.ArgumentParser:
+    """Add the subcommand to the command line."""
+    parser = subparsers.add_parser("plot", help=SUMMARY, description=f"{SUMMARY}\n{TEXT}")
+    parser.add_argument("log", metavar="LOG", type=Path)
+    parser.add_argument("columns", metavar="Y", nargs="*", help="columns to draw")
+    parser.add_argument("-x", default="Time", help="column to draw over (default: Time)")
+    parser.add_argument(
+        "--right", nargs="+", default=[], metavar="Y", help="on an axis at the right"
+    )
+    parser.add_argument("--log-scale", action="store_true", help="logarithmic axes of y")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("log.png"), metavar="FILE",
+        help="ending in .png, .pdf or .svg (default: log.png)",
+    )  # fmt: skip
+    parser.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
+    parser.set_defaults(act=run)
+    return parser
+
+
+def run(options: argparse.Namespace) -> int:
+    """Draw what the command line asks for; returns the exit status."""
+    rows = read(options.log)
+    known = list(dict.fromkeys(name for row in rows for name in row))
+    if not options.columns and not options.right:
+        print(" ".join(known))
+        return 0
+    picture_format(options.output)
+    for name in (options.x, *options.columns, *options.right):
+        if name not in known:
+            close = nearest(name, known)
+            raise ScriptError(
+                f"{options.log} has no column '{name}'",
+                expected="one of " + " ".join(known),
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+    no_units = SimpleNamespace(units=None)
+    plots = Plots(SimpleNamespace(output=no_units, fixes={}, computes={}, folder=Path()))
+    scale = "log" if options.log_scale else "linear"
+    for side, names in (("left", options.columns), ("right", options.right)):
+        for name in names:
+            curve = Curve(
+                1, SimpleNamespace(name=options.x), SimpleNamespace(name=name), side, scale
+            )
+            curve.points = [
+                (row[options.x], row[name]) for row in rows if name in row and options.x in row
+            ]
+            plots.add(name, curve)
+    plots.file = options.output
+    plots.finish()
+    print(options.output)
+    return 0
+
+
+def read(path: Path) -> list[dict[str, float]]:
+    """The rows of a log; a line that begins with # names the columns anew.
+
+    Raises
+    ------
+    ScriptError
+        If the file cannot be read, or is no log.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            if path.suffix == ".csv":
+                lines = list(csv.reader(file))
+            else:
+                lines = [line.split() for line in file]
+        names, *lines = lines
+        rows = []
+        for cells in lines:
+            if cells[0].startswith("#"):
+                first = [cells[0].removeprefix("#").strip()]
+                names = [name for name in (*first, *cells[1:]) if name]
+            else:
+                numbers = [float(cell) for cell in cells]
+                rows.append(dict(zip(names, numbers, strict=True)))
+        return rows
+    except OSError as error:
+        raise ScriptError(f"cannot read {path}: {error.strerror or error}") from error
+    except (ValueError, IndexError) as error:
+        raise ScriptError(f"{path} is not a log", expected="log.mpm or log.csv of a run") from error

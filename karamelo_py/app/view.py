@@ -1,0 +1,135 @@
+"""karamelo-py view: pictures or a movie from the dumps of an earlier run."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.output.files import picture_format, unwarned, whole
+from karamelo_py.output.movies import Frames, movie_format
+from karamelo_py.output.snapshots import Snapshot, read
+from karamelo_py.script.errors import ScriptError, nearest
+
+SUMMARY = "Draw pictures or a movie of dumps of points."
+TEXT = """\
+Files are those of dump particle, particle/gz, hdf5 and vtk (its .pvd). The pictures are those of
+dump pyplot."""
+DPI = 100
+SAMPLE = 400  # points whose nearest neighbours are looked for
+
+
+def add_parser(subparsers: Any) -> argparse.ArgumentParser:
+    """Add the subcommand to the command line."""
+    parser = subparsers.add_parser("view", help=SUMMARY, description=f"{SUMMARY}\n{TEXT}")
+    parser.add_argument("files", metavar="FILE", nargs="+", type=Path)
+    parser.add_argument("-c", "--column", help="what colours the points (default: their solid)")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path,
+        help="picture.*.png, where * becomes the step, or a movie: .gif, or .mp4 where ffmpeg is "
+        "installed (default: view.*.png)", default=Path("view.*.png"),
+    )  # fmt: skip
+    parser.add_argument(
+        "--size", nargs=2, type=int, default=[600, 500], metavar=("WIDTH", "HEIGHT")
+    )
+    parser.add_argument("--vmin", type=float, help="lower end of the colours")
+    parser.add_argument("--vmax", type=float, help="upper end of the colours")
+    parser.add_argument("--cmap", help="a colour map of Matplotlib")
+    parser.add_argument("--azimuth", type=float, default=-60.0, help="in 3D, degrees from x")
+    parser.add_argument("--elevation", type=float, default=30.0, help="in 3D, degrees")
+    parser.add_argument("--fps", type=float, default=25.0, help="frames a second of a movie")
+    parser.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
+    parser.set_defaults(act=run)
+    return parser
+
+
+def run(options: argparse.Namespace) -> int:
+    """Draw what the command line asks for; returns the exit status."""
+    movie = options.output.suffix.lower() in (".gif", ".mp4")
+    if movie:
+        movie_format(options.output)
+    elif picture_format(options.output) != "png":
+        raise ScriptError("view draws .png", expected="a file name ending in .png, .gif or .mp4")
+    frames = Frames(options.fps)
+    # Named by number, 1000 comes after 999.
+    files = sorted(options.files, key=lambda path: (_number(path), path.name))
+    drawn = 0
+    with unwarned():
+        picture = None
+        for snapshot in (snapshot for file in files for snapshot in read(file)):
+            picture = picture or _picture(snapshot, options)
+            _show(picture, snapshot, options.column)
+            drawn += 1
+            if movie:
+                frames.add(lambda file, picture=picture: picture.save_png(file, 1))
+                continue
+            name = options.output.name.replace("*", str(snapshot.step), 1)
+            with whole(options.output.with_name(name)) as file:
+                picture.save_png(file, 1)
+    if not drawn:
+        raise ScriptError("there is no snapshot in these files")
+    if movie:
+        frames.save(options.output)
+    print(f"{options.output}: {drawn} {'frame' if movie else 'picture'}{'s' * (drawn > 1)}")
+    return 0
+
+
+def _number(path: Path) -> int:
+    digits = "".join(c if c.isdigit() else " " for c in path.name).split()
+    return int(digits[-1]) if digits else -1
+
+
+def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
+    """The empty picture that suits the first snapshot."""
+    from karamelo_py.styles.dumps import picture
+    from karamelo_py.styles.dumps.pyplot import colours_of
+
+    if options.column is not None and options.column not in first.columns:
+        close = nearest(options.column, first.columns)
+        raise ScriptError(
+            f"the dump has no column '{options.column}'",
+            expected="one of " + " ".join(first.columns),
+            hint=f"did you mean '{close}'?" if close else None,
+        )
+    # A dump holds zeros where the scene has no direction.
+    dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
+    column = options.column or ("type" if dimension > 1 else "x")
+    limits = (options.vmin, options.vmax)
+    types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
+    look = picture.Options(
+        column,
+        tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1)),
+        limits,
+        *colours_of(column, limits, options.cmap),
+        azimuth=options.azimuth,
+        elevation=options.elevation,
+    )
+    domain = SimpleNamespace(dimension=dimension, lo=first.lo, hi=first.hi)
+    size = tuple(pixels / DPI for pixels in options.size)
+    made = picture.make(domain, size, DPI, look)
+    made.side = _side(np.column_stack([first.columns[name] for name in "xyz"]))
+    return made
+
+
+def _show(picture: Any, snapshot: Snapshot, column: str | None) -> None:
+    x = np.column_stack([snapshot.columns[name] for name in "xyz"])
+    values = snapshot.columns[column or ("type" if picture.domain.dimension > 1 else "x")]
+    time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g}"
+    picture.show(x, values, picture.side, f"step {snapshot.step}{time}")
+
+
+def _side(x: np.ndarray) -> float:
+    """The distance of points from their nearest neighbours."""
+    if len(x) < 2:
+        return 0.0
+    chosen: Iterable[int] = np.linspace(0, len(x) - 1, min(SAMPLE, len(x))).astype(int)
+    nearest_ones = []
+    for k in chosen:
+        square = ((x - x[k]) ** 2).sum(axis=1)
+        square[k] = np.inf
+        nearest_ones.append(square.min())
+    return float(np.sqrt(np.median(nearest_ones)))

@@ -1,0 +1,232 @@
+"""Tables of numbers as text, the same bytes as ``"%.9g" % x`` and ``"%d" % n``, compiled.
+
+The nine digits of x are those of x 10^k, rounded. The product is taken with twice the digits of a
+double: it is exact where 10^k is (0 <= k <= 22), and elsewhere so close that only what lies within
+`DOUBT` of a tie cannot be told. Such a number is left to Python, and so are those near the ends of
+the range of doubles. Where nothing is compiled, or bytes are in the other order, all are.
+
+Digits are written eight at a time, with what stands behind them overwritten later: branches that
+cannot be foreseen cost more than bytes.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+
+import numpy as np
+from llvmlite import ir
+from numba import config, types
+from numba.extending import intrinsic
+
+from karamelo_py.compiler.compile import fma, index, kernel, shared
+
+ROWS = 1024  # written at a time
+# The longest: -1.23456789e-308 and -4611686018427387903, a blank, and what is overwritten.
+NUMBER_BYTES = 32
+SEPARATORS = b" \n"
+
+DIGITS = 9
+DOUBT = 1e-12
+EXACT = 22  # the largest power of ten that a double holds
+SMALLEST, LARGEST = 1e-280, 1e280
+LARGEST_INTEGER = 2**62
+FIRST = -280  # of the powers in POWERS
+
+
+def _power(k: int) -> tuple[float, float]:
+    """10^k as a sum of two doubles."""
+    exact = Fraction(10) ** k
+    high = float(exact)
+    return high, float(exact - Fraction(high))
+
+
+POWERS = np.array([_power(k) for k in range(FIRST, 300)])
+MINUS, PLUS, POINT, ZERO, BLANK, NEWLINE, E = b"-+.0 \ne"
+ZEROS = int.from_bytes(b"00000000", "little")
+NAN, INF, NOUGHT = (int.from_bytes(w, "little") for w in (b"nan", b"inf", b"0.000000"))
+BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"
+
+
+def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
+    """The rows of a table as text, block by block.
+
+    Integers are written as integers, the rest with nine significant digits.
+    """
+    is_integer = np.array([np.issubdtype(column.dtype, np.integer) for column in columns])
+    width = len(columns)
+    numbers = np.empty((ROWS, width))
+    integers = numbers.view(np.int64)
+    text = np.empty(numbers.size * NUMBER_BYTES, np.uint8)
+    for start in range(0, len(columns[0]), ROWS):
+        count = len(columns[0][start : start + ROWS])
+        for k, column in enumerate(columns):
+            (integers if is_integer[k] else numbers)[:count, k] = column[start : start + count]
+        at, done, total = 0, 0, count * width
+        while done < total:
+            if not BYTEWISE:
+                done, at = write_rows(numbers[:count], integers, is_integer, done, text, at)
+                if done == total:
+                    break
+            i, k = divmod(done, width)
+            own = b"%d" % integers[i, k] if is_integer[k] else b"%.9g" % numbers[i, k]
+            own += b"\n" if k == width - 1 else b" "
+            text[at : at + len(own)] = np.frombuffer(own, np.uint8)
+            done, at = done + 1, at + len(own)
+        yield text[:at].tobytes()
+
+
+@kernel
+def write_rows(numbers, integers, is_integer, start, text, at):
+    """Write numbers, row after row, until the end or one that is left to Python.
+
+    Parameters
+    ----------
+    numbers, integers : (rows, columns) float64, int64
+        The same memory, seen as numbers and as integers.
+    is_integer : (columns,) bool
+        Which of the two a column holds.
+    start
+        Index of the first number to write, counted along the rows.
+    text : bytes
+        Has at least `NUMBER_BYTES` for each number; the text goes on at `at`.
+
+    Returns
+    -------
+    Index of the number that is left to Python (or how many numbers there are), and where the text
+    ends.
+    """
+    rows, columns = numbers.shape
+    first = start % columns
+    for i in range(start // columns, rows):
+        for k in range(first, columns):
+            if is_integer[k]:
+                end = _put_integer(text, at, integers[i, k])
+            else:
+                end = _put_number(text, at, numbers[i, k], integers[i, k])
+            if end == at:
+                return i * columns + k, at
+            text[index(end)] = BLANK
+            at = end + 1
+        text[index(at - 1)] = NEWLINE
+        first = 0
+    return rows * columns, at
+
+
+@shared
+def _put_integer(text, at, n):
+    """Write an integer; return where it ends, or `at` if it is too large."""
+    if not -LARGEST_INTEGER < n < LARGEST_INTEGER:
+        return at
+    text[index(at)] = MINUS
+    at += n < 0
+    n = abs(n)
+    length, rest = 1, n // 10
+    while rest > 0:
+        length, rest = length + 1, rest // 10
+    for k in range(at + length - 1, at - 1, -1):
+        text[index(k)] = ZERO + n % 10
+        n //= 10
+    return at + length
+
+
+@shared
+def _put_number(text, at, x, bits):
+    """Write a number with nine significant digits; return where it ends, or `at` if in doubt."""
+    begin = at
+    text[index(at)] = MINUS
+    at += (bits < 0) & (x == x)
+    x = abs(x)
+    if not SMALLEST < x < LARGEST:
+        if SMALLEST >= x > 0 or LARGEST <= x < np.inf:
+            return begin
+        _put_eight(text, at, ZEROS if x == 0 else INF if x == x else NAN)
+        return at + (1 if x == 0 else 3)
+    digits, exponent = _decimal(x, (bits >> 52 & 2047) - 1023)
+    if digits == 0:
+        return begin
+    first = (digits * 1441151881) >> 57  # digits // 10^8
+    others = _eight(digits - 100_000_000 * first)
+    kept = DIGITS
+    if others >> 56 == ZERO:
+        kept = 1 + _without_zeros(others)
+    if -5 < exponent < 0:
+        _put_eight(text, at, NOUGHT)
+        at += 1 - exponent
+        text[index(at)] = ZERO + first
+        _put_eight(text, at + 1, others)
+        return at + kept
+    fixed = 0 <= exponent < DIGITS
+    before = exponent + 1 if fixed else 1
+    text[index(at)] = ZERO + first
+    _put_eight(text, at + 1, others)
+    _put_eight(text, at + 1 + before, others >> (8 * (before - 1) & 63))
+    text[index(at + before)] = POINT
+    at += kept + 1 if kept > before else before
+    if fixed:
+        return at
+    text[index(at)], text[index(at + 1)] = E, MINUS if exponent < 0 else PLUS
+    exponent = abs(exponent)
+    if exponent >= 100:
+        text[index(at + 2)] = ZERO + exponent // 100
+        at += 1
+    two = exponent % 100
+    text[index(at + 2)], text[index(at + 3)] = ZERO + two // 10, ZERO + two % 10
+    return at + 4
+
+
+@shared
+def _decimal(x, binary):
+    """The nine digits of x > 0 as an integer, 0 if in doubt, and the power of ten of the first.
+
+    `binary` is the power of two of x.
+    """
+    exponent = binary * 315653 >> 20  # log10(2) * 2^20
+    exponent += x >= POWERS[index(exponent + 1 - FIRST), 0]
+    k = DIGITS - 1 - exponent
+    high, low = POWERS[index(k - FIRST), 0], POWERS[index(k - FIRST), 1]
+    product = x * high
+    digits = int(product)
+    above_tie = (product - digits - 0.5) + (fma(x, high, -product) + x * low)
+    if abs(above_tie) < DOUBT and not 0 <= k <= EXACT:
+        return 0, exponent
+    digits += (above_tie > 0) | ((above_tie == 0) & (digits & 1))
+    if digits == 1_000_000_000:
+        return 100_000_000, exponent + 1
+    return digits, exponent
+
+
+@shared
+def _eight(n):
+    """The eight digits of n < 10^8 as the bytes of their text: halves, quarters, eighths."""
+    four = n * 109951163 >> 40  # n // 10^4
+    word = four | (n - 10_000 * four) << 32
+    two = (word * 5243 >> 19) & 0x7F0000007F  # // 100
+    word = two | (word - 100 * two) << 16
+    one = (word * 103 >> 10) & 0xF000F000F000F  # // 10
+    return (one | (word - 10 * one) << 8) + ZEROS
+
+
+@shared
+def _without_zeros(word):
+    """How many of eight digits are left without the zeros at their end."""
+    kept = 8
+    while kept > 0 and word >> 8 * (kept - 1) & 255 == ZERO:
+        kept -= 1
+    return kept
+
+
+@intrinsic
+def _put_eight(typing_context, text, at, word):
+    """Write the bytes of an integer, wherever they begin."""
+
+    def codegen(context, builder, signature, arguments):
+        array = context.make_array(text)(context, builder, arguments[0])
+        place = builder.bitcast(
+            builder.gep(array.data, [arguments[1]]), ir.IntType(64).as_pointer()
+        )
+        builder.store(arguments[2], place, align=1)
+        return context.get_dummy_value()
+
+    return types.void(text, types.int64, types.int64), codegen

@@ -1,0 +1,108 @@
+"""Dumps of points read back: LAMMPS text (gzipped or not), HDF5, VTU."""
+
+from __future__ import annotations
+
+import gzip
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from karamelo_py.script.errors import ScriptError
+
+
+class Snapshot(NamedTuple):
+    """The points at one moment.
+
+    Attributes
+    ----------
+    step, time
+        When; NaN where the file does not say.
+    columns
+        (n,) arrays by name, with x, y and z among them.
+    lo, hi
+        (3,) corners of the domain, or of the points where the file does not say.
+    """
+
+    step: int
+    time: float
+    columns: dict[str, np.ndarray]
+    lo: np.ndarray
+    hi: np.ndarray
+
+
+def read(path: Path) -> Iterator[Snapshot]:
+    """The snapshots in a file, in their order.
+
+    Raises
+    ------
+    ScriptError
+        If the file cannot be read, or is no dump.
+    """
+    readers = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}
+    reader = readers.get(path.suffix, _lammps)
+    try:
+        yield from reader(path)
+    # meshio ends the program over a file that it cannot read.
+    except (OSError, ValueError, KeyError, ElementTree.ParseError, SystemExit) as error:
+        reason = getattr(error, "strerror", None)
+        raise ScriptError(
+            f"{path} cannot be read: {reason}" if reason else f"{path} is not a dump of points",
+            expected="a file that dump particle, hdf5 or vtk has written",
+        ) from error
+
+
+def _lammps(path: Path) -> Iterator[Snapshot]:
+    opener = gzip.open if path.suffix == ".gz" else open
+    with opener(path, "rt", encoding="ascii") as file:
+        step, time, count, box = 0, 0.0, 0, np.zeros((3, 2))
+        while line := file.readline():
+            if not line.startswith("ITEM: "):
+                raise ValueError(line)
+            item = line.removeprefix("ITEM: ").split()
+            if item[0] == "TIMESTEP":
+                step = int(file.readline())
+            elif item[0] == "TIME":
+                time = float(file.readline())
+            elif item[0] == "NUMBER":
+                count = int(file.readline())
+            elif item[0] == "BOX":
+                box = np.array([file.readline().split()[:2] for _ in range(3)], float)
+            elif item[0] == "ATOMS":
+                table = np.loadtxt(file, max_rows=count, ndmin=2) if count else np.empty((0, 99))
+                columns = dict(zip(item[1:], table.T, strict=count > 0))
+                yield Snapshot(step, time, columns, *box.T)
+            else:
+                file.readline()
+
+
+def _hdf5(path: Path) -> Iterator[Snapshot]:
+    import h5py
+
+    # Also one that a killed program has left, or a running one writes.
+    with h5py.File(path, "r", libver="latest", swmr=True, locking=False) as root:
+        names = [name for name in root if root[name].ndim == 2]
+        for k, (step, time) in enumerate(zip(root["step"][:], root["time"][:], strict=True)):
+            columns = {name: root[name][k] for name in names}
+            columns |= {name: root[name][:] for name in ("id", "type")}
+            there = ~np.isnan(columns["x"])
+            columns = {name: column[there] for name, column in columns.items()}
+            yield Snapshot(int(step), float(time), columns, *root.attrs["domain"])
+
+
+def _pvd(path: Path) -> Iterator[Snapshot]:
+    for entry in ElementTree.parse(path).iter("DataSet"):
+        yield from _vtu(path.parent / entry.attrib["file"], float(entry.attrib["timestep"]))
+
+
+def _vtu(path: Path, time: float = np.nan) -> Iterator[Snapshot]:
+    import meshio
+
+    mesh = meshio.read(path)
+    number = re.search(r"(\d+)\D*$", path.stem)
+    columns = dict(zip("xyz", mesh.points.T, strict=True)) | mesh.point_data
+    lo, hi = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    yield Snapshot(int(number[1]) if number else 0, time, columns, lo, hi)

@@ -1,0 +1,107 @@
+"""Names of the units of a scene: what the numbers of a consistent set mean, for labels."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from math import isclose, log10
+from typing import Any, NamedTuple
+
+# In SI units.
+LENGTHS = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254}
+MASSES = {"kg": 1.0, "t": 1e3, "g": 1e-3, "mg": 1e-6, "ug": 1e-9, "lb": 0.45359237}
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+
+PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+
+
+class Powers(NamedTuple):
+    """Powers of length, mass, time and temperature in a quantity."""
+
+    length: int = 0
+    mass: int = 0
+    time: int = 0
+    temperature: int = 0
+
+
+VELOCITY, FORCE, STRESS, ENERGY = (
+    Powers(1, 0, -1),
+    Powers(1, 1, -2),
+    Powers(-1, 1, -2),
+    Powers(2, 1, -2),
+)
+NAMED = {FORCE: "N", STRESS: "Pa", ENERGY: "J", Powers(2, 1, -3): "W"}
+
+# Columns of dumps and words of the log.
+COLUMNS = {
+    r"[xyz]0?": Powers(1),
+    r"v[xyz](_update)?": VELOCITY,
+    r"s[123]{2}|seq": STRESS,
+    r"[fb][xyz]": FORCE,
+    r"volume": Powers(3),
+    r"mass": Powers(0, 1),
+    r"ienergy": ENERGY,
+    r"epdot": Powers(0, 0, -1),
+    r"T": Powers(0, 0, 0, 1),
+    r"time|dt": Powers(0, 0, 1),
+}
+# Values that fixes and computes publish, by their styles.
+STYLES = {
+    "kinetic_energy": ENERGY,
+    "strain_energy": ENERGY,
+    "dissipated_energy": ENERGY,
+    "average_velocity": VELOCITY,
+    "average_temperature": Powers(0, 0, 0, 1),
+    "max_position": Powers(1),
+    "angular_momentum": Powers(2, 1, -1),
+    "velocity_nodes": FORCE,
+    "body_force": FORCE,
+    "force_nodes": FORCE,
+}
+
+
+class Units(NamedTuple):
+    """The units that the numbers of a scene are in, by their names."""
+
+    length: str
+    mass: str
+    time: str
+    temperature: str = "K"
+
+    def __str__(self) -> str:
+        return " ".join(self)
+
+    def name(self, powers: Powers) -> str:
+        """The unit of a quantity: MPa where the set has a name for it, else mm/ms and the like."""
+        if powers in NAMED:
+            si = LENGTHS[self.length] ** powers.length * MASSES[self.mass] ** powers.mass
+            order = log10(si * TIMES[self.time] ** powers.time)
+            if isclose(order, round(order), abs_tol=1e-9) and round(order) in PREFIXES:
+                return PREFIXES[round(order)] + NAMED[powers]
+        parts = [
+            (unit if abs(power) == 1 else f"{unit}^{abs(power)}", power)
+            for unit, power in zip(self, powers, strict=True)
+            if power
+        ]
+        above = " ".join(part for part, power in parts if power > 0)
+        below = " ".join(part for part, power in parts if power < 0)
+        if not below:
+            return above
+        return f"{above or 1}/{f'({below})' if ' ' in below else below}"
+
+    def of_column(self, name: str) -> str:
+        """The unit of a column of a dump, empty where it has none."""
+        powers = (powers for names, powers in COLUMNS.items() if re.fullmatch(names, name))
+        return self.name(next(powers, Powers()))
+
+    def of_value(self, name: str, parts: Mapping[str, Any]) -> str:
+        """The unit of `name` in the log, which one of `parts` (fixes and computes) may publish."""
+        for ID, part in parts.items():
+            if name in (ID, *(f"{ID}_{end}" for end in part.published)):
+                return self.name(STYLES.get(part.style, Powers()))
+        return self.of_column(name) if name in ("time", "dt") else ""
+
+
+def labelled(name: str, unit: str) -> str:
+    """``name [unit]``, or the name where there is no unit."""
+    return f"{name} [{unit}]" if unit else name

@@ -1,0 +1,31 @@
+"""dump grid/hdf5: the nodes in one binary file, as arrays over time and id."""
+
+from karamelo_py.styles.dumps.hdf5 import Hdf5Dump
+from karamelo_py.styles.dumps.table import OfNodes
+
+
+class GridHdf5(OfNodes, Hdf5Dump):
+    """Write the nodes of the background grids to one compressed binary file.
+
+    Everything else is as in dump hdf5.
+
+    Parameters
+    ----------
+    every
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
+    file
+        File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
+    columns
+        What to write of each node, as in dump grid; ``x, y, z`` by default.
+    occupied
+        true: nodes without mass are NaN.
+
+    Example
+    -------
+    dump(d2, all, grid/hdf5, 100, nodes.h5, vx, vy, mass, occupied=true)
+
+    See Also
+    --------
+    dump grid, dump hdf5
+    """

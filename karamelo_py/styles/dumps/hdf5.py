@@ -1,0 +1,134 @@
+"""dump hdf5: the material points in one binary file, as arrays over time and id."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.output.files import reported, whole
+from karamelo_py.styles.dumps.table import OfPoints, TableDump
+
+# The least compression: with the bytes of like order together, more takes twice the time for a few
+# per cent.
+STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+CHUNK = 1 << 16
+
+
+class Hdf5Dump(TableDump):
+    """A dump as arrays (snapshot, row); rows without a value (deleted points) hold NaN."""
+
+    _snapshots = 0
+
+    def write(self) -> None:
+        """Write one snapshot: to a file of its own, or after those before it."""
+        import h5py
+
+        path = self.path()
+        ids, types = self.ids()
+        if self._snapshots == 0 or self.one_file_per_step:
+            with (
+                whole(path) as file,
+                h5py.File(file.name, "w", libver="latest", locking=False) as root,
+            ):
+                self._prepare(root, ids)
+                self._append(root, 0, ids, types)
+            self._snapshots = 1
+            return
+        with reported(path), h5py.File(path, "r+", libver="latest", locking=False) as root:
+            # Whatever happens to the program, what was written before stays readable (h5py's
+            # swmr=True also opens a file that a killed program has left).
+            root.swmr_mode = True
+            try:
+                self._append(root, self._snapshots, ids, types)
+            except BaseException:
+                for name in ("time", "step", *self.columns):
+                    root[name].resize(self._snapshots, axis=0)
+                raise
+        self._snapshots += 1
+
+    def _prepare(self, root: Any, ids: np.ndarray) -> None:
+        """Make the empty arrays, with names of their axes, as xarray reads them."""
+        root.attrs["title"] = f"{self.rows_are} of a scene of karamelo-py"
+        root.attrs["domain"] = np.array([self.hub.domain.lo, self.hub.domain.hi])
+        rows = max(int(ids.max(initial=0)), 1)
+        for name, kind in (("time", float), ("step", np.int64)):
+            root.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(1024,))
+        for name in ("id", "type"):
+            root.create_dataset(name, (0,), np.int64, maxshape=(None,), chunks=(CHUNK,), **STORED)
+        for name in ("time", "id"):
+            root[name].make_scale(name)
+        for name in self.columns:
+            root.create_dataset(
+                name,
+                (0, 0),
+                float,
+                maxshape=(None, None),
+                chunks=(1, min(rows, CHUNK)),
+                fillvalue=np.nan,
+                **STORED,
+            )
+        for name in ("time", *self.columns) if self.hub.output.units else ():
+            root[name].attrs["units"] = self.hub.output.units.of_column(name)
+        for name in ("step", "type", *self.columns):
+            scales = {"step": ["time"], "type": ["id"]}.get(name, ["time", "id"])
+            for axis, scale in enumerate(scales):
+                root[name].dims[axis].attach_scale(root[scale])
+
+    def _append(self, root: Any, k: int, ids: np.ndarray, types: np.ndarray) -> None:
+        """Write snapshot `k`. Points are numbered from 1 and nodes from 0: rows go by their id."""
+        first = int(self.rows_are == "points")
+        at = ids - first
+        count = max(int(at.max(initial=-1)) + 1, len(root["id"]))
+        if count > len(root["id"]):
+            for name in ("id", "type"):
+                root[name].resize((count,))
+            root["id"][:] = np.arange(first, first + count)
+        known = root["type"][:]
+        if (known[at] != types).any():
+            known[at] = types
+            root["type"][:] = known
+        for name, number in (("time", self.hub.update.time), ("step", self.hub.update.step)):
+            root[name].resize((k + 1,))
+            root[name][k] = number
+        row = np.full(count, np.nan)
+        for name in self.columns:
+            row[at] = self.field(name)
+            root[name].resize((k + 1, count))
+            root[name][k] = row
+
+
+class Hdf5(OfPoints, Hdf5Dump):
+    """Write the material points to one compressed binary file, which h5py and xarray read.
+
+    Each column is an array over time and id. Of a point that is not there any more the numbers are
+    NaN. The file is complete after every snapshot.
+
+    Parameters
+    ----------
+    every
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
+    file
+        File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
+    columns
+        What to write of each point, as in dump particle; ``x, y, z`` by default.
+
+    Notes
+    -----
+    In Python::
+
+        points = xarray.open_dataset("points.h5", engine="h5netcdf")
+        points.seq.sel(time=0.5, method="nearest").max()
+        h5py.File("points.h5")["seq"][-1]
+
+    A file that a killed program was writing is opened with ``h5py.File(name, swmr=True)``.
+
+    Example
+    -------
+    dump(d1, all, hdf5, 100, points.h5, x, y, z, vx, vy, vz, seq)
+
+    See Also
+    --------
+    dump particle, dump grid/hdf5
+    """

@@ -1,0 +1,63 @@
+"""dump movie: the pictures of dump pyplot, one after the other in one file."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from karamelo_py.output.files import unwarned
+from karamelo_py.output.movies import Frames, movie_format
+from karamelo_py.styles.dumps.pyplot import PNG_COMPRESSION, PyPlot
+
+FRAMES_PER_SECOND = 25
+
+
+class Movie(PyPlot):
+    """Draw a movie of the points, as dump pyplot draws pictures: 25 frames in a second.
+
+    The file is written at the end of each run, also of one that breaks off or is interrupted.
+
+    Parameters
+    ----------
+    every
+        Steps between two frames, or ``time(T)``. The first and the last state of a run are
+        always drawn.
+    file
+        File name ending in .gif or, where the program ffmpeg is installed, .mp4.
+    width, height
+        Size of the picture: up to 50 in inches (of 100 pixels), above that in pixels; from 20 to
+        20000 pixels.
+    field
+        What colours the points: any column of dump particle. Without it the solid does (in 1D: vx
+        is drawn).
+    vmin, vmax
+        Ends of the colours. Without them the colours change when numbers outgrow them.
+    cmap, azimuth, elevation, axes, title
+        As in dump pyplot.
+
+    Example
+    -------
+    dump(d3, all, movie, 100, disks.gif, 500, 500, seq, vmin=0, vmax=2e5)
+
+    See Also
+    --------
+    dump pyplot
+    """
+
+    @cached_property
+    def frames(self) -> Frames:
+        """The pictures so far."""
+        return Frames(FRAMES_PER_SECOND)
+
+    def check_format(self) -> str:
+        """The format that the file name asks for."""
+        return movie_format(self.file)
+
+    def write(self) -> None:
+        """Draw the present state as the next frame."""
+        with unwarned():
+            self._draw()
+        self.frames.add(lambda file: self._picture.save_png(file, PNG_COMPRESSION))
+
+    def finish(self) -> None:
+        """Write the movie of all frames so far."""
+        self.frames.save(self.path())

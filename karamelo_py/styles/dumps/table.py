@@ -1,0 +1,134 @@
+"""Dumps of tables: a row for each point or node, and the columns asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from karamelo_py.language.signature import OutputFile
+from karamelo_py.output.rhythm import Every
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.dumps.base import Dump
+
+POSITIONS = ("x", "y", "z")
+# Written with every row, so asking for them again adds nothing. `tag` is Karamelo's second name of
+# the id.
+LEADING = ("id", "type", "tag")
+
+
+class TableDump(Dump):
+    """A dump of ``id type x y z`` and the columns asked for, in the form that `write` gives it.
+
+    What the rows are is said by `OfPoints` or `OfNodes`, which stands in front of this class among
+    the bases of a style.
+
+    Attributes
+    ----------
+    absent
+        Columns that are always 0.
+    rows_are
+        What a row is about.
+    """
+
+    absent: Sequence[str] = ()
+    rows_are = "points"
+
+    def __init__(
+        self,
+        hub: Hub,
+        every: Every,
+        file: OutputFile,
+        *columns: str,
+    ):
+        known = [*LEADING, *self.names(hub)]
+        if str(file) in known:
+            raise ScriptError(
+                f"'{file}' is a column, not a file",
+                argument="file",
+                expected="the file name in front of the columns",
+                hint=f"dump_*.LAMMPS, {file}",
+            )
+        self.check_columns(columns, known, first=2)
+        wanted = [name for name in dict.fromkeys(columns) if name not in LEADING]
+        # A viewer needs all three positions; where some are not asked for they come first.
+        if not set(POSITIONS) <= set(wanted):
+            wanted = [*POSITIONS, *(name for name in wanted if name not in POSITIONS)]
+        super().__init__(hub, every, file, *wanted)
+        self.warn_of_absent(columns, self.absent, self.rows_are)
+
+    @staticmethod
+    def names(hub: Hub) -> Sequence[str]:
+        """Names of the columns that can be written."""
+        raise NotImplementedError
+
+    def ids(self) -> tuple[np.ndarray, np.ndarray]:
+        """Integers (n,): identity and type of each row, in the order of the ids."""
+        raise NotImplementedError
+
+    def field(self, name: str) -> np.ndarray:
+        """(n,) values of a column."""
+        raise NotImplementedError
+
+
+class OfPoints:
+    """Rows are the material points."""
+
+    @staticmethod
+    def names(hub: Hub) -> Sequence[str]:
+        """Names of the columns that can be written."""
+        return hub.fields.particle_names()
+
+    @property
+    def absent(self) -> Sequence[str]:
+        """Columns that are 0 because no point keeps them."""
+        return self.hub.fields.absent_at_points()
+
+    def ids(self) -> tuple[np.ndarray, np.ndarray]:
+        """Number and solid of each point."""
+        return tuple(self.field(name).astype(np.int64, copy=False) for name in ("id", "type"))
+
+    def field(self, name: str) -> np.ndarray:
+        """(n,) values of a particle field."""
+        return self.hub.fields.particle(name)
+
+
+class OfNodes:
+    """Rows are the nodes of the background grids, or with `occupied` those that have mass."""
+
+    rows_are = "nodes"
+
+    def __init__(
+        self,
+        hub: Hub,
+        every: Every,
+        file: OutputFile,
+        *columns: str,
+        occupied: bool = False,
+    ):
+        super().__init__(hub, every, file, *columns)
+        self.occupied = occupied
+        self._rows: np.ndarray | slice = slice(None)
+
+    @property
+    def absent(self) -> Sequence[str]:
+        """Columns that are 0 in this scene."""
+        return self.hub.fields.absent_at_nodes()
+
+    @staticmethod
+    def names(hub: Hub) -> Sequence[str]:
+        """Names of the columns that can be written."""
+        return hub.fields.node_names()
+
+    def ids(self) -> tuple[np.ndarray, np.ndarray]:
+        """Number and grid of each node."""
+        ids = np.arange(self.hub.fields.node_count)
+        if self.occupied:
+            self._rows = np.flatnonzero(self.hub.fields.node("mass") > 0)
+            ids = ids[self._rows]
+        return ids, self.field("type")
+
+    def field(self, name: str) -> np.ndarray:
+        """Values of a node field, of the nodes that are written."""
+        return self.hub.fields.node(name)[self._rows]

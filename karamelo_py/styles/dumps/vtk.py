@@ -1,0 +1,95 @@
+"""dump vtk: the material points as a series of files for ParaView."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from karamelo_py.language.signature import OutputFile
+from karamelo_py.output.files import whole
+from karamelo_py.output.rhythm import Every
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.dumps.table import POSITIONS, OfPoints, TableDump
+
+
+class VtkDump(TableDump):
+    """A series of VTU files, and a PVD file beside them that gives each its time."""
+
+    def __init__(
+        self,
+        hub: Hub,
+        every: Every,
+        file: OutputFile,
+        *columns: str,
+    ):
+        super().__init__(hub, every, file, *columns)
+        if not self.one_file_per_step or self.file.suffix != ".vtu":
+            stem = self.file.name.replace("*", "").partition(".")[0]
+            raise ScriptError(
+                f"{file} is no name for a series of files",
+                argument="file",
+                expected="a file name with a * and the ending .vtu",
+                hint=f"{stem or 'points'}.*.vtu",
+            )
+        self._series: list[tuple[float, str]] = []
+
+    @property
+    def index(self) -> Path:
+        """The file that lists the snapshots with their times."""
+        stem = str(self.file)[: -len(".vtu")].replace("*", "", 1).rstrip("._-")
+        return self.hub.folder / f"{stem}.pvd"
+
+    def cells(self, ids: np.ndarray) -> list[tuple[str, np.ndarray]]:
+        """Kind and rows of what is drawn between the rows."""
+        return [("vertex", np.arange(len(ids))[:, None])]
+
+    def write(self) -> None:
+        """Write one snapshot, then the list of all."""
+        import meshio
+
+        ids, types = self.ids()
+        columns: dict[str, Any] = {name: self.field(name) for name in self.columns}
+        x = np.column_stack([columns.pop(name) for name in POSITIONS])
+        mesh = meshio.Mesh(x, self.cells(ids), {"id": ids, "type": types, **columns})
+        path = self.path()
+        with whole(path) as file:
+            mesh.write(file.name, file_format="vtu")
+        self._series.append((self.hub.update.time, path.name))
+        with whole(self.index) as file:
+            file.write(_collection(self._series))
+
+
+def _collection(series: list[tuple[float, str]]) -> bytes:
+    rows = [f'<DataSet timestep="{t:.16g}" file={quoteattr(name)}/>\n' for t, name in series]
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
+    return (head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode()
+
+
+class Vtk(OfPoints, VtkDump):
+    """Write the material points as a series of VTU files, which ParaView opens.
+
+    Beside them, a file of the same name with the ending ``.pvd`` lists all snapshots with their
+    times: open that one.
+
+    Parameters
+    ----------
+    every
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
+    file
+        File name with a ``*``, which becomes the step number, and the ending ``.vtu``.
+    columns
+        What to write of each point, as in dump particle.
+
+    Example
+    -------
+    dump(d1, all, vtk, 100, points.*.vtu, vx, vy, vz, seq)
+
+    See Also
+    --------
+    dump particle, dump grid/vtk
+    """

@@ -1,0 +1,238 @@
+"""Dumps for other programs: what h5py, xarray, meshio and VTK read back."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+from fakes import FakeHub
+from PIL import Image
+
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.dumps.grid_hdf5 import GridHdf5
+from karamelo_py.styles.dumps.grid_vtk import GridVtk
+from karamelo_py.styles.dumps.hdf5 import Hdf5, Hdf5Dump
+from karamelo_py.styles.dumps.vtk import Vtk
+
+
+@pytest.fixture(params=[1, 2, 3])
+def hub(request, tmp_path):
+    return FakeHub(tmp_path, dimension=request.param)
+
+
+@pytest.fixture
+def plane(tmp_path):
+    return FakeHub(tmp_path, dimension=2)
+
+
+def lose(hub, count):
+    """The last points are deleted, and there is one more in front of them."""
+    for name, values in hub.fields.points.items():
+        hub.fields.points[name] = values[:-count]
+
+
+def test_hdf5_is_arrays_over_time_and_id(hub):
+    hub.dumps["d"] = Hdf5(hub, 5, "p.h5", "vx", "seq")
+    hub.run(10)
+    lose(hub, 3)
+    hub.run(1)
+    with h5py.File(hub.folder / "p.h5") as file:
+        assert file["time"][:] == pytest.approx([0, 0.5, 1.0, 1.1])
+        assert file["step"][:].tolist() == [0, 5, 10, 11]
+        assert file["id"][:].tolist() == list(range(1, 41))
+        assert file["type"][:].tolist() == [1] * 20 + [2] * 20
+        for name in ("x", "y", "z", "vx", "seq"):
+            assert file[name].shape == (4, 40)
+            values = hub.fields.particle(name)
+            np.testing.assert_array_equal(file[name][:, :37], np.tile(values, (4, 1)))
+            assert np.isnan(file[name][3, 37:]).all() and not np.isnan(file[name][:3]).any()
+
+
+def test_xarray_opens_hdf5(plane):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    plane.dumps["d"] = Hdf5(plane, 5, "p.h5", "seq")
+    plane.run(10)
+    with xarray.open_dataset(plane.folder / "p.h5", engine="h5netcdf") as data:
+        assert data.seq.dims == ("time", "id")
+        seventh = data.seq.sel(id=7).sel(time=0.52, method="nearest")
+        assert float(seventh) == plane.fields.points["seq"][6]
+        assert int(data.type.sel(id=40)) == 2
+
+
+def test_hdf5_of_nodes(plane):
+    GridHdf5(plane, 1, "g.*.h5", "mass", occupied=True).write()
+    with h5py.File(plane.folder / "g.0.h5") as file:
+        occupied = plane.fields.nodes["mass"] > 0
+        assert file["id"][:].tolist() == list(range(25))
+        np.testing.assert_array_equal(file["mass"][0], np.where(occupied, 1, np.nan))
+
+
+def test_a_new_run_of_the_program_replaces_the_file(tmp_path):
+    for _ in range(2):
+        hub = FakeHub(tmp_path)
+        hub.dumps["d"] = Hdf5(hub, 4, "p.h5")
+        hub.run(4)
+    with h5py.File(tmp_path / "p.h5") as file:
+        assert file["step"][:].tolist() == [0, 4]
+
+
+def test_ctrl_c_in_a_snapshot_takes_it_back(plane, monkeypatch):
+    dump = Hdf5(plane, 1, "p.h5", "seq")
+    dump.write()
+    plane.update.step = 1
+    append = Hdf5Dump._append
+
+    def interrupted(self, *arguments):
+        append(self, *arguments)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(Hdf5Dump, "_append", interrupted)
+        dump.write()
+    with h5py.File(plane.folder / "p.h5") as file:
+        assert file["seq"].shape == (1, 40)
+    dump.write()
+    with h5py.File(plane.folder / "p.h5") as file:
+        assert file["step"][:].tolist() == [0, 1] and not np.isnan(file["seq"][:]).any()
+
+
+KILLED = """
+import os, sys
+sys.path.insert(0, sys.argv[1])
+import h5py
+from fakes import FakeHub
+from PIL import Image
+from karamelo_py.styles.dumps.hdf5 import Hdf5
+hub = FakeHub(sys.argv[2])
+dump = Hdf5(hub, 1, "p.h5", "seq")
+dump.write()
+dump.write()
+left = int(sys.argv[3])
+write = h5py.Dataset.__setitem__
+def until(self, *arguments):
+    global left
+    left -= 1
+    if left == 0:
+        self.file.flush()
+        os._exit(9)
+    write(self, *arguments)
+h5py.Dataset.__setitem__ = until
+dump.write()
+"""
+
+
+@pytest.mark.parametrize("left", [2, 4, 6])
+def test_a_killed_program_leaves_a_file_that_can_be_read(tmp_path, left):
+    """Killed at a write within the third snapshot: the two before are there."""
+    arguments = [str(Path(__file__).parent), str(tmp_path), str(left)]
+    program = subprocess.run([sys.executable, "-c", KILLED, *arguments])
+    assert program.returncode == 9
+    with h5py.File(tmp_path / "p.h5", swmr=True) as file:
+        expected = FakeHub(tmp_path).fields.points["seq"]
+        np.testing.assert_array_equal(file["seq"][:2], [expected, expected])
+
+
+def test_vtk_of_points(hub):
+    hub.dumps["d"] = Vtk(hub, 5, "points.*.vtu", "vx", "seq")
+    hub.run(10)
+    index = (hub.folder / "points.pvd").read_text()
+    times = [float(time) for time in re.findall('timestep="(.*?)"', index)]
+    assert times == pytest.approx([0, 0.5, 1])
+    for step in (0, 5, 10):
+        assert f'file="points.{step}.vtu"/>' in index
+        mesh = meshio.read(hub.folder / f"points.{step}.vtu")
+        xyz = np.column_stack([hub.fields.points[name] for name in "xyz"])
+        np.testing.assert_array_equal(mesh.points, xyz)
+        assert [block.type for block in mesh.cells] == ["vertex"]
+        for name in ("id", "type", "vx", "seq"):
+            np.testing.assert_array_equal(mesh.point_data[name], hub.fields.points[name])
+
+
+@pytest.mark.parametrize("occupied", [False, True])
+def test_vtk_of_the_grid(hub, occupied):
+    """The cells fill the domain, or the half of it whose nodes have mass (x > 0)."""
+    GridVtk(hub, 1, "g_*.vtu", "mass", occupied=occupied).write()
+    assert (hub.folder / "g.pvd").exists()
+    mesh = meshio.read(hub.folder / "g_0.vtu")
+    d = hub.domain.dimension
+    (block,) = mesh.cells
+    assert block.type == {1: "line", 2: "quad", 3: "hexahedron"}[d]
+    assert len(block.data) == 4**d // (4 if occupied else 1)
+    x = mesh.points[block.data][..., :d]
+    np.testing.assert_allclose(np.ptp(x, axis=1), 0.25)
+    assert (mesh.point_data["mass"] == (mesh.points[:, 0] > 0)).all()
+    # Neighbours in the list of corners are one edge apart, so that no cell is twisted.
+    edges = np.linalg.norm(np.diff(x[:, : 2 ** min(d, 2)], axis=1), axis=2)
+    np.testing.assert_allclose(edges, 0.25)
+
+
+def test_vtk_opens_both(plane):
+    xml = pytest.importorskip("vtkmodules.vtkIOXML", exc_type=ImportError)
+    Vtk(plane, 1, "p.*.vtu", "seq").write()
+    GridVtk(plane, 1, "g.*.vtu").write()
+    for name, count in (("p.0.vtu", 40), ("g.0.vtu", 16)):
+        reader = xml.vtkXMLUnstructuredGridReader()
+        reader.SetFileName(str(plane.folder / name))
+        reader.Update()
+        assert reader.GetErrorCode() == 0
+        assert reader.GetOutput().GetNumberOfCells() == count
+
+
+@pytest.mark.parametrize("name", ["p.vtu", "p.*.vtk", "p"])
+def test_a_series_needs_a_name_for_a_series(plane, name):
+    with pytest.raises(ScriptError) as caught:
+        Vtk(plane, 1, name)
+    assert caught.value.hint == "p.*.vtu"
+
+
+@pytest.mark.parametrize("method", ["ulmpm", "tlmpm", "ulmpm/contacts"])
+def test_all_styles_on_a_scene(run_interpreted, method):
+    """An axisymmetric scene of two solids, of one grid or several, in every form."""
+    run = run_interpreted(
+        f"""
+        units(mm, g, ms)
+        method({method}, FLIP, linear, 1)
+        dimension(2, 0, 1, 0, 1, 0.1)
+        axisymmetric(true)
+        region(a, block, 0.2, 0.5, 0.1, 0.4)
+        region(b, block, 0.2, 0.5, 0.6, 0.9)
+        material(m, linear, 1, 100, 0.3)
+        solid(lower, region, a, 2, m, 0.1)
+        solid(upper, region, b, 2, m, 0.1)
+        dump(h, all, hdf5, 1, p.h5, mass, seq)
+        dump(v, all, vtk, 1, p.*.vtu, mass, seq)
+        dump(gh, all, grid/hdf5, 1, g.h5, mass, occupied=true)
+        dump(gv, all, grid/vtk, 1, g.*.vtu, mass, occupied=true)
+        dump(g, all, grid, 1, g.dump, mass, occupied=true)
+        dump(p, all, pyplot, 1, p.png, 300, 300)
+        dump(m, all, movie, 1, p.gif, 300, 300, vy)
+        run(2)
+        """
+    )
+    assert "mm g ms K" in run.out
+    mass = run.dump("g.dump").mass
+    with h5py.File(run.folder / "g.h5") as file:
+        assert file["mass"].attrs["units"] == "g"
+        stored = file["mass"][-1]
+        assert stored[np.isfinite(stored)] == pytest.approx(mass)
+    grid = meshio.read(run.folder / "g.2.vtu")
+    assert grid.point_data["mass"] == pytest.approx(mass)
+    # The cells with points in them: 3 x 3 in each solid, whatever grid they belong to.
+    assert len(grid.cells[0].data) == 18
+    points = meshio.read(run.folder / "p.2.vtu")
+    with h5py.File(run.folder / "p.h5") as file:
+        assert file["step"][:].tolist() == [0, 1, 2]
+        np.testing.assert_array_equal(file["mass"][-1], points.point_data["mass"])
+    assert points.point_data["mass"].sum() == pytest.approx(mass.sum())
+    # The points fill the solids in the picture: 0.18 of the domain, whose height they take 0.8 of.
+    image = np.asarray(Image.open(run.folder / "p.png").convert("RGB")).astype(int)
+    inked = np.ptp(image[:, :200], axis=2) > 60  # the legend is at the right
+    frame = (np.ptp(np.nonzero(inked)[0]) / 0.8) ** 2
+    assert inked.sum() / frame == pytest.approx(0.18, rel=0.2)

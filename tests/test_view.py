@@ -1,0 +1,168 @@
+"""karamelo-py view and plot, and where the files of a run go: what a person does after a run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fakes import FakeHub
+from PIL import Image
+
+from karamelo_py.app import plot
+from karamelo_py.app.cli import main
+from karamelo_py.output.rhythm import ByTime
+from karamelo_py.output.snapshots import read
+from karamelo_py.styles.dumps.hdf5 import Hdf5
+from karamelo_py.styles.dumps.particle import Particle
+from karamelo_py.styles.dumps.particle_gz import ParticleGz
+from karamelo_py.styles.dumps.vtk import Vtk
+
+FORMS = {"p.dump": Particle, "p.dump.gz": ParticleGz, "p.h5": Hdf5, "p.*.vtu": Vtk}
+
+
+@pytest.fixture(params=[1, 2, 3])
+def hub(request, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return FakeHub(tmp_path, dimension=request.param)
+
+
+def call(capsys, *arguments):
+    status = main(list(arguments))
+    output = capsys.readouterr()
+    assert "Traceback" not in output.err
+    return status, output.out, output.err
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_dumps_are_read_back(hub, name):
+    hub.dumps["d"] = FORMS[name](hub, 5, name, "vx", "seq")
+    hub.run(10)
+    snapshots = list(read(hub.folder / name.replace(".*.vtu", ".pvd")))
+    assert [s.step for s in snapshots] == [0, 5, 10]
+    assert [s.time for s in snapshots] == pytest.approx([0, 0.5, 1])
+    for snapshot in snapshots:
+        for column in ("id", "type", "x", "y", "z", "vx", "seq"):
+            expected = hub.fields.points[column]
+            np.testing.assert_allclose(snapshot.columns[column], expected, rtol=1e-8)
+        if name.endswith(("dump", "gz", "h5")):
+            d = hub.domain.dimension
+            np.testing.assert_allclose([snapshot.lo[:d], snapshot.hi[:d]], [[-0.5] * d, [0.5] * d])
+
+
+@pytest.mark.parametrize("file", ["p.h5", "p.pvd", "p.dump"])
+def test_view_draws_pictures_and_movies(hub, capsys, file):
+    for name, style in FORMS.items():
+        hub.dumps[name] = style(hub, 5, name, "vx")
+    hub.run(10)
+    assert call(capsys, "view", file)[0] == 0
+    assert sorted(p.name for p in hub.folder.glob("view*")) == [
+        "view.0.png",
+        "view.10.png",
+        "view.5.png",
+    ]
+    arguments = ["-c", "vx", "-o", "m.gif", "--size", "300", "200", "--vmax", "1e-3"]
+    status, out, _ = call(capsys, "view", file, *arguments)
+    assert status == 0 and out == "m.gif: 3 frames\n"
+    movie = Image.open(hub.folder / "m.gif")
+    assert (movie.n_frames, movie.size) == (3, (300, 200))
+
+
+def test_view_takes_files_in_the_order_of_their_steps(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    hub = FakeHub(tmp_path)
+    hub.dumps["d"] = Particle(hub, 8, "p.*.dump")
+    hub.run(16)
+    files = [p.name for p in tmp_path.glob("p.*.dump")]
+    status, out, _ = call(capsys, "view", *sorted(files), "-o", "f.*.png")
+    assert (status, out) == (0, "f.*.png: 3 pictures\n")
+    assert (tmp_path / "f.16.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "remedy"),
+    [
+        (["p.dump", "-c", "vxx"], "did you mean 'vx'?"),
+        (["gone.dump"], "No such file"),
+        (["text"], "is not a dump"),
+        (["text.h5"], "is not a dump"),
+        (["text.vtu"], "is not a dump"),
+        (["text.pvd"], "is not a dump"),
+        (["p.dump", "-o", "p.avi"], ".png"),
+        (["p.dump", "-o", "p.pdf"], ".gif"),
+        (["p.dump", "--cmap", "rainbows"], "rainbows"),
+        ([], "FILE"),
+    ],
+)
+def test_view_says_what_is_wrong(tmp_path, monkeypatch, capsys, arguments, remedy):
+    monkeypatch.chdir(tmp_path)
+    Particle(FakeHub(tmp_path), 1, "p.dump", "vx").write()
+    for ending in ("", ".h5", ".vtu", ".pvd"):
+        (tmp_path / f"text{ending}").write_text("no dump at all\n")
+    status, _, err = call(capsys, "view", *arguments)
+    assert status == 1 and remedy in err
+
+
+@pytest.mark.parametrize("name", ["log.mpm", "log.csv"])
+def test_plot_draws_columns_of_a_log(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    hub = FakeHub(tmp_path)
+    hub.output.log.file = tmp_path / name
+    hub.run(4)
+    rows = plot.read(tmp_path / name)
+    assert [row["Step"] for row in rows] == [0, 1, 2, 3, 4]
+    assert [row["Time"] for row in rows] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4])
+    assert call(capsys, "plot", name)[:2] == (0, "Step dt Time\n")
+    status, out, _ = call(capsys, "plot", name, "Step", "--right", "dt", "-o", "p.svg")
+    assert (status, out) == (0, "p.svg\n")
+    svg = (tmp_path / "p.svg").read_text()
+    assert "<!-- Step -->" in svg and "<!-- dt (right) -->" in svg and "<!-- Time -->" in svg
+    for arguments, remedy in [
+        ([name, "Stepp"], "did you mean 'Step'?"),
+        (["gone.mpm", "Step"], "No such file"),
+        ([name, "Step", "-o", "p.txt"], ".pdf"),
+    ]:
+        status, _, err = call(capsys, "plot", *arguments)
+        assert status == 1 and remedy in err
+
+
+def test_plot_reads_a_log_whose_columns_change(tmp_path):
+    (tmp_path / "log.mpm").write_text("Step Time\n0 0\n1 0.5\n# Step Time Ek\n1 0.5 7\n")
+    rows = plot.read(tmp_path / "log.mpm")
+    assert rows[0] == {"Step": 0, "Time": 0} and rows[-1] == {"Step": 1, "Time": 0.5, "Ek": 7}
+
+
+SCRIPT = """
+    method(ulmpm, FLIP, linear, 1)
+    dimension(1, 0, 1, 0.1)
+    region(a, block, 0.2, 0.5)
+    material(m, linear, 1, 100, 0)
+    solid(a, region, a, 2, m, 0.1)
+    set_dt(0.001)
+    set_output(time(0.01))
+    dump(d, all, particle, time(0.004), p.*.dump, seq)
+    compute(mean, probe, all, s11)
+    log_modify(custom, step, time, mean)
+    run(25)
+"""
+
+
+def test_log_and_out(run_interpreted, tmp_path):
+    run = run_interpreted(SCRIPT, "-out", "results/here", "-log", "table.csv")
+    made = tmp_path / "run/results/here"
+    assert sorted(p.name for p in run.folder.iterdir()) == ["in.script", "results"]
+    rows = plot.read(made / "table.csv")
+    assert [row["Step"] for row in rows] == [0, 10, 20, 25]
+    steps = sorted(int(p.name.split(".")[1]) for p in made.glob("p.*.dump"))
+    assert steps == [0, 4, 8, 12, 16, 20, 24, 25]
+
+
+def test_log_without_a_folder(run_interpreted):
+    run = run_interpreted(SCRIPT, "-log", "gone/log.csv", status=1)
+    assert "a folder that exists" in run.err
+    run = run_interpreted(SCRIPT, "-out", "in.script", status=1)
+    assert "cannot write to in.script" in run.err
+
+
+def test_by_time_goes_on_in_a_further_run():
+    every = ByTime(0.1)
+    times = (0, 0.05, 0.1 - 1e-17, 0.1, 0.30000000000000004)
+    assert [every.now(time) for time in times] == [0, 0, 1, 1, 3]
