@@ -52,6 +52,7 @@ class Reference(Compute):
 
     Example
     -------
+    compute(v, average_velocity, all)
     compute(tip, reference, v_x, measured.csv, velocity, max, relative)
     compute(profile, reference, all, exact.csv, s11)
     log_modify(custom, step, time, tip, tip_curve, profile)
