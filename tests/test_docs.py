@@ -152,7 +152,7 @@ def _tried(lines, dimension, folder):
             interpreter.run_text(line)
             continue
         kind = "nodes" if words[2] in ("body_force",) or "_nodes" in words[2] else "particles"
-        if words[0] in ("fix", "compute") and words[3] != "all":
+        if words[0] in ("fix", "compute") and words[3] not in ("all", "v_x"):
             interpreter.run_text(f"group({words[3]}, {kind}, region, wall, all)")
         if words[2] in ("union", "intersection", "difference"):
             for region in set(words[3:]) - {"disk", "wall"}:
