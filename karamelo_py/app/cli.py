@@ -21,6 +21,10 @@ karamelo-py check SCRIPT [options]     read and build a scene, print what it nee
 karamelo-py styles [FAMILY]            list commands and styles, and where they come from
 karamelo-py help [FAMILY] STYLE        explain a command or style
 karamelo-py bench [WORKLOAD ...]       measure the speed of this machine on known scenes
+karamelo-py sweep SCRIPT -var A=1,2    run a family of variants, and put them into one table
+karamelo-py chart TABLE                draw a table of runs: what accuracy costs
+karamelo-py advise SCRIPT -target E    find the cheapest variant that is accurate enough
+karamelo-py stability SCRIPT           map where a method is stable
 """
 OPTIONS = """
 options:
@@ -49,6 +53,7 @@ Lists commands and styles, all or those of a family (fix, compute, region, ...),
 they come from.
 """
 
+STUDIES = ("sweep", "chart", "advise", "stability")
 RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 
 
@@ -101,6 +106,8 @@ def _dispatch(arguments: list[str]) -> int:
     if arguments[0] == "--version":
         print(f"karamelo-py {__version__}")
         return 0
+    if arguments[0] in STUDIES:
+        return _study(arguments)
     commands: dict[str, Callable[[list[str]], int]] = {
         "run": _run,
         "check": _check,
@@ -113,11 +120,11 @@ def _dispatch(arguments: list[str]) -> int:
             print(_explanation(arguments[0]), end="")
             return 0
         return commands[arguments[0]](arguments[1:])
-    close = nearest(arguments[0], commands)
+    close = nearest(arguments[0], [*commands, *STUDIES])
     if close and len(arguments) > 1 and not Path(arguments[0]).exists():
         raise ScriptError(
             f"there is no file {arguments[0]} and no such subcommand",
-            expected="a script, or one of " + ", ".join(commands),
+            expected="a script, or one of " + ", ".join([*commands, *STUDIES]),
             hint=f"did you mean 'karamelo-py {close}'?",
         )
     return _run(arguments)
@@ -140,7 +147,8 @@ class CommandLine(argparse.ArgumentParser):
     """A command line whose errors are messages in our own form."""
 
     def error(self, message: str):
-        raise ScriptError(message, expected=USAGE.rstrip())
+        usage = self.format_usage().strip() if self.prog.split()[1:] else USAGE.rstrip()
+        raise ScriptError(message, expected=usage)
 
 
 def _script_parser() -> CommandLine:
@@ -218,6 +226,8 @@ def _styles(arguments: list[str]) -> int:
 
 
 def _help(arguments: list[str]) -> int:
+    if len(arguments) == 1 and arguments[0] in STUDIES:
+        return _study([*arguments, "--help"])
     if arguments in (["check"], ["styles"], ["help"], ["bench"]):
         print(_explanation(arguments[0]), end="")
         return 0
@@ -230,6 +240,18 @@ def _bench(arguments: list[str]) -> int:
     from karamelo_py.app.bench.command import main as bench
 
     return bench(arguments)
+
+
+def _study(arguments: list[str]) -> int:
+    from karamelo_py.app.studies import add_parsers
+
+    parser = CommandLine(prog="karamelo-py", allow_abbrev=False)
+    add_parsers(parser.add_subparsers(parser_class=CommandLine))
+    try:
+        options = parser.parse_args(arguments)
+    except SystemExit:  # Help is shown.
+        return 0
+    return options.act(options)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from typing import Any
 from karamelo_py.kernels.step import DONE
 from karamelo_py.run import diagnosis
 from karamelo_py.run.lowering import check_scene
+from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
@@ -56,8 +57,6 @@ class Runner:
             return
         hub.rehearse()
         if hub.checking:
-            from karamelo_py.run.report import report
-
             report(hub, self.end_time)
             raise Quit
         with self._telling_of_compilation():
@@ -186,7 +185,7 @@ class Runner:
 
     @contextmanager
     def _telling_of_compilation(self) -> Iterator[None]:
-        """Say so when kernels are compiled, and count the time."""
+        """Say so when kernels are compiled; count the time, also that of loading them."""
         from numba.core import event
 
         runner = self
@@ -194,29 +193,38 @@ class Runner:
         class Listener(event.Listener):
             depth = 0
             begun = 0.0
-            said = False
 
             def on_start(self, _: Any) -> None:
                 self.depth += 1
                 if self.depth == 1:
                     self.begun = time.perf_counter()
-                    if not self.said:
-                        self.said = True
-                        runner.hub.console.say(
-                            "Compiling for this kind of scene (only the first time) ..."
-                        )
 
             def on_end(self, _: Any) -> None:
                 self.depth -= 1
                 if self.depth == 0:
                     runner.spent["compilation"] += time.perf_counter() - self.begun
 
-        listener = Listener()
-        event.register("numba:compile", listener)
+        class Teller(event.Listener):
+            said = False
+
+            def on_start(self, _: Any) -> None:
+                if not self.said:
+                    self.said = True
+                    runner.hub.console.say(
+                        "Compiling for this kind of scene (only the first time) ..."
+                    )
+
+            def on_end(self, _: Any) -> None: ...
+
+        # The lock is also held while a kernel is loaded from the cache.
+        listeners = {"numba:compiler_lock": Listener(), "numba:compile": Teller()}
+        for kind, listener in listeners.items():
+            event.register(kind, listener)
         try:
             yield
         finally:
-            event.unregister("numba:compile", listener)
+            for kind, listener in listeners.items():
+                event.unregister(kind, listener)
 
     def _banner(self, simulation: Simulation) -> None:
         hub = self.hub
@@ -226,6 +234,7 @@ class Runner:
                 "method": hub.update.words,
                 "points": int(simulation.present.sum()),
                 "nodes": hub.fields.node_count,
+                "bytes per particle": bytes_per_point(simulation),
                 "dt": simulation.dt,
                 "stable dt": simulation.limit,
                 "threads": simulation.threads,
