@@ -58,7 +58,9 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     assert good["min:c_x"].to_numpy() == pytest.approx(1.5)
     assert list(good["max:Step"]) == list(good["steps"]) == [4, 4]
     assert list(good["points"]) == [4, 8]  # two in each of N cells, N a unit of length
-    assert (good[["seconds", "particle_steps_per_s", "peak_memory_mib", "wall_s"]] > 0).all(None)
+    assert (good[["seconds", "particle_steps_per_s", "peak_memory_mib", "wall_s"]] > 0).all(
+        axis=None
+    )
     assert (good["bytes_per_particle"] > 8 * 5).all() and (good["dt"] == 0.01).all()
     assert bad["reason"].str.contains("unknown basis style 'cubic'").all()
     assert (folder / good["folder"].iloc[0] / "log.mpm").exists()

@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import re
+import signal
 import statistics
 import subprocess
 import sys
@@ -182,7 +183,10 @@ class Launch:
         pause, memory = 0.005, None
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
-                process.kill()
+                if hasattr(os, "wait4"):
+                    os.kill(process.pid, signal.SIGKILL)  # Popen.kill might reap it before wait4.
+                else:
+                    process.kill()
             if hasattr(os, "wait4"):
                 number, status, usage = os.wait4(process.pid, os.WNOHANG)
                 if number:

@@ -275,16 +275,19 @@ def results_table(
 
     table = Table(title=title or None, title_justify="left", box=None, pad_edge=False)
     for name in names:
-        table.add_column(name, style="cyan", no_wrap=True)
+        table.add_column(name, style="cyan", no_wrap=True, min_width=min(len(name), 12))
     for name in [*(item.word for item in items), *_SHOWN]:
-        table.add_column(name, justify="left" if name == "status" else "right", no_wrap=True)
+        last = name == "status"
+        justify = "left" if last else "right"
+        width = 6 if last else min(len(name), 12)
+        table.add_column(name, justify=justify, no_wrap=True, min_width=width)
     for each in rows:
         cells = [Text(shown(each[name])) for name in names]
         cells += [Text(shown(each[item.word])) for item in items]
         cells += [Text(shown(each[name])) for name in _SHOWN[:-1]]
         end = each["status"] + (f": {each['reason']}" if each["reason"] else "")
         style = {"done": "green", "failed": "red"}.get(each["status"], "yellow")
-        cells.append(Text(end, style=style))
+        cells.append(Text(end if len(end) < 60 else end[:59] + "…", style=style))
         table.add_row(*cells)
     return table
 
