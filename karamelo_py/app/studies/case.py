@@ -149,9 +149,6 @@ class Launch:
         for name, value in case.items():
             command += ["-var", name, value]
         command += ["--threads", str(self.threads or "auto")]
-        above = Path(karamelo_py.__file__).parent.parent
-        paths = [str(above), os.environ.get("PYTHONPATH")]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
         (folder / "log.mpm").unlink(missing_ok=True)
         begun = time.perf_counter()
         with (
@@ -160,7 +157,7 @@ class Launch:
         ):
             process = subprocess.Popen(
                 command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=err,
-                env=environment, start_new_session=os.name == "posix",
+                env=environment(), start_new_session=os.name == "posix",
             )  # fmt: skip
             memory, overdue = self._wait(process, begun)
         said = (folder / "out.txt").read_text(encoding="utf-8", errors="replace")
@@ -203,6 +200,12 @@ class Launch:
             raise Stop
         late = bool(self.limit) and time.perf_counter() - begun > self.limit
         return memory, late and process.returncode != 0
+
+
+def environment() -> dict[str, str]:
+    """The environment of a run: it runs this very program, wherever it starts."""
+    paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
 
 def read_facts(said: str) -> dict[str, float]:

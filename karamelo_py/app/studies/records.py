@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import karamelo_py
-from karamelo_py.app.studies.case import Outcome, read_log
+from karamelo_py.app.studies.case import COLUMNS, Outcome, read_log
 from karamelo_py.app.studies.variables import number
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, nearest
@@ -73,8 +73,6 @@ def row(
     case: Mapping[str, str], outcome: Outcome, items: Iterable[Recorded], folder: Path
 ) -> dict[str, Any]:
     """The row of a run; what is not known of it is left empty."""
-    from karamelo_py.app.studies.case import COLUMNS
-
     log = read_log(outcome.folder)
     found: dict[str, Any] = dict(case)
     for item in items:

@@ -42,6 +42,8 @@ class Study:
     ----------
     rows
         The rows of finished runs, by the values of the case.
+    names
+        The variables.
     ran
         How many were run, not taken from an earlier study.
     """
@@ -63,6 +65,7 @@ class Study:
         self.again = again
         self.title = title
         self.rows: dict[tuple[str, ...], dict[str, Any]] = {}
+        self.names: list[str] = []
         self.ran = 0
         self.on_row: Callable[[], None] = lambda: None
 
@@ -74,6 +77,7 @@ class Study:
         KeyboardInterrupt
             When the user interrupts; the runs in progress are taken down, finished ones are kept.
         """
+        self.names = list(cases[0])
         waiting = []
         for case in cases:
             key = tuple(case.values())
@@ -96,7 +100,7 @@ class Study:
         pool = ThreadPoolExecutor(self.jobs)
         running: dict[Future, Mapping[str, str]] = {}
         started: set[tuple] = set()
-        compiled = {kind_of(dict(zip(display.names, key, strict=True))) for key in self.rows}
+        compiled = {kind_of(dict(zip(self.names, key, strict=True))) for key in self.rows}
         try:
             queue = list(waiting)
             while queue or running:
@@ -145,8 +149,7 @@ class _Display:
 
     def __init__(self, study: Study, cases: Sequence[Mapping[str, str]], count: int):
         self.study = study
-        self.names = list(cases[0])
-        self.total = len(cases)
+        self.names = study.names
         self.count = count
         self.finished = 0
         self.begun = time.perf_counter()
