@@ -16,7 +16,14 @@ from karamelo_py.app.studies.case import environment
 from karamelo_py.app.studies.curves import column, order, usable
 from karamelo_py.app.studies.forecast import Forecast, forecast
 from karamelo_py.app.studies.options import (
-    add_family, family, new_parser, out_file, positive, seconds,
+    add_combinations,
+    add_family,
+    family,
+    new_parser,
+    out_file,
+    positive,
+    seconds,
+    zipped,
 )  # fmt: skip
 from karamelo_py.app.studies.study import Study, shown, terminal
 from karamelo_py.app.studies.variables import cases, logged, number
@@ -147,6 +154,7 @@ def add_parser(subparsers: Any) -> None:
         subparsers, "advise", "find the cheapest variant that is accurate enough", DESCRIPTION, run
     )
     add_family(parser)
+    add_combinations(parser)
     parser.add_argument(
         "-accuracy", required=True, metavar="COLUMN", help="log column: err, max:err"
     )
@@ -177,7 +185,11 @@ def run(options: Any) -> int:
             expected="a number with at least 3 values, such as -var N=10,20,40,80",
         )  # fmt: skip
     others = {n: v for n, v in values.items() if n != name}
-    choices = [Choice(case) for case in cases(others)] if others else [Choice({})]
+    together = zipped(options)
+    if any(name in group for group in together):
+        raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
+    combined = cases(others, together, options.where) if others else [{}]
+    choices = [Choice(case) for case in combined]
     study = Study(launch, out.with_suffix(""), items, jobs, again=options.again)
     study.names = list(values)
     records.describe(
@@ -288,18 +300,26 @@ def _nothing(adviser: Adviser) -> int:
 
 
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
-    """Run what is advised; where it misses the target, say so and go on with what is known then."""
-    while best is not None:
-        while len(best.choice.rows) <= best.step:
-            adviser.go_on(best.choice)
-        row = best.choice.rows[best.step]
-        error, cost = (column([row], name)[0] for name in (adviser.accuracy, adviser.cost))
-        end = f"{adviser.accuracy} {error:.4g}, {adviser.cost} {cost:.4g}"
-        if error <= adviser.target:
-            print(f"\nrun: the target is met ({end}); its files are in {row['folder']}")
-            return 0
-        print(f"\nrun: the target is missed ({end}{': ' + row['reason'] if row['reason'] else ''})")
+    """Run what is advised; where it misses the target, go on with what is known then."""
+    while best is not None and best.forecast is not None:
+        advised = best.step == len(best.choice.rows)
+        adviser.go_on(best.choice)
+        row = best.choice.rows[-1]
+        error = column([row], adviser.accuracy)[0]
+        word = "met" if error <= adviser.target else "missed" if advised else "not yet met"
+        said = f"{best.choice.label}, {adviser.name} = {row[adviser.name]}"
+        print(f"\nrun: {said}: {adviser.accuracy} {error:.4g}, the target is {word}")
+        if row["reason"]:
+            print(f"{row['status']}: {row['reason']}")
         best = adviser.best()
-        if best is not None:
+        if best is not None and best.forecast is not None:
             advise(adviser, best, script)
-    return _nothing(adviser)
+    if best is None:
+        return _nothing(adviser)
+    row = best.choice.rows[best.step]
+    print(
+        f"\nthe target is met: {best.choice.label}, {adviser.name} = {row[adviser.name]} with "
+        f"{adviser.accuracy} {best.error:.4g} at {adviser.cost} {best.cost:.4g}; "
+        f"its files are in {row['folder']}"
+    )
+    return 0

@@ -34,8 +34,9 @@ def forecast(
 ) -> Forecast | None:
     """What the runs at `xs`, coarse ones first, let expect of a run at `x`.
 
-    The error goes on with the order between the last two; its bounds are those of the least and the
-    largest order so far, at least a third of the expected order wide. The time is steps times
+    The error goes on with the order between the last two. Its bounds are those of the least and the
+    largest order so far, at least a third of the expected order away; an order that has fallen may
+    fall by as much again. The time is steps times
     (a + b points), fitted to the runs; any other cost goes on as between the last two.
 
     Returns
@@ -58,7 +59,10 @@ def forecast(
         return None
     expected = -fall[-1]
     rates = [-f for f in fall if f < 0]
-    slow, fast = min(*rates, 2 / 3 * expected), max(*rates, 4 / 3 * expected)
+    # An order that falls may go on falling.
+    drop = max(-fall[-2] - expected, 0.0) if len(fall) > 1 else 0.0
+    slow = max(min(*rates, 2 / 3 * expected, expected - drop), 0.0)
+    fast = max(*rates, 4 / 3 * expected)
     at = [float(error[-1] * np.exp(-rate * way)) for rate in (expected, fast, slow)]
     return Forecast(*at, _cost(x, xs, rows, cost))
 

@@ -43,6 +43,23 @@ def add_family(parser: Any) -> None:
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
+def add_combinations(parser: Any) -> None:
+    """Options of which values go together."""
+    parser.add_argument(
+        "-zip", action="append", default=[], metavar="A,B",
+        help="variables that go in step: the first values together, then the second, ...",
+    )  # fmt: skip
+    parser.add_argument(
+        "-where", action="append", default=[], metavar="CONDITION",
+        help="keep the combinations that fulfil it: 'N < 40 || basis == linear'",
+    )  # fmt: skip
+
+
+def zipped(options: Any) -> list[list[str]]:
+    """The variables that go in step."""
+    return [[name.strip() for name in group.split(",")] for group in options.zip]
+
+
 def family(options: Any, *, timed: bool = False, repeat: int = 1) -> tuple[dict, Launch, int]:
     """Values of the variables, how to run, and how many at once.
 

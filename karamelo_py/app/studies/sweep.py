@@ -7,7 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.options import add_family, family, new_parser, out_file, positive
+from karamelo_py.app.studies.options import (
+    add_combinations,
+    add_family,
+    family,
+    new_parser,
+    out_file,
+    positive,
+    zipped,
+)
 from karamelo_py.app.studies.study import Study, results_table, terminal
 from karamelo_py.app.studies.variables import cases, logged
 from karamelo_py.script.errors import ScriptError
@@ -27,14 +35,7 @@ def add_parser(subparsers: Any) -> None:
     """The subcommand for the command line."""
     parser = new_parser(subparsers, "sweep", "run a family of variants", DESCRIPTION, run)
     add_family(parser)
-    parser.add_argument(
-        "-zip", action="append", default=[], metavar="A,B",
-        help="variables that go in step: the first values together, then the second, ...",
-    )  # fmt: skip
-    parser.add_argument(
-        "-where", action="append", default=[], metavar="CONDITION",
-        help="keep the combinations that fulfil it: 'N < 40 || basis == linear'",
-    )  # fmt: skip
+    add_combinations(parser)
     parser.add_argument(
         "-record", default="", metavar="COLUMNS",
         help="log columns: err (the last value), max:err, min:err, mean:err; with commas",
@@ -52,8 +53,7 @@ def run(options: Any) -> int:
     out = out_file(options.o, ".csv")
     repeat = options.repeat if options.time else 1
     values, launch, jobs = family(options, timed=options.time, repeat=repeat)
-    zipped = [[name.strip() for name in group.split(",")] for group in options.zip]
-    combinations = cases(values, zipped, options.where)
+    combinations = cases(values, zipped(options), options.where)
     items = records.recorded(options.record, logged(options.script), options.script)
     folder = out.with_suffix("")
     if folder.exists() and not folder.is_dir():
