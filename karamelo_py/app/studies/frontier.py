@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
+from itertools import pairwise
 from math import ceil
 
 Cell = tuple[int, int]
@@ -70,4 +71,4 @@ def _cuts(count: int, stride: int) -> list[int]:
 
 
 def _spans(cuts: Sequence[int]) -> list[tuple[int, int]]:
-    return list(zip(cuts[:-1], cuts[1:], strict=True)) or [(0, 0)]
+    return list(pairwise(cuts)) or [(0, 0)]
