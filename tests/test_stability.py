@@ -9,10 +9,10 @@ from karamelo_py.app.studies import stability
 from karamelo_py.app.studies.frontier import explore
 from karamelo_py.script.errors import ScriptError
 
-# An elastic bar on a Lagrangian grid of equal cells, a point in the middle of each. A wave of number
-# k has the frequency 2 c/h sin(k h/2) on the nodes, and going from the points to the nodes and back
-# multiplies velocities by cos(k h/2) each time: c/h sin(k h) is what is stepped, by central
-# differences, which are stable up to dt = 2/omega = 2 h/c, twice the Courant limit.
+# An elastic bar on a Lagrangian grid of equal cells, a point in the middle of each. A wave of
+# number k has the frequency 2 c/h sin(k h/2) on the nodes, and going from the points to the nodes
+# and back multiplies velocities by cos(k h/2) each time: c/h sin(k h) is what is stepped, by
+# central differences, which are stable up to dt = 2/omega = 2 h/c, twice the Courant limit.
 SCRIPT = """
 factor = 0.9
 push = 0
@@ -61,6 +61,19 @@ def test_failures_have_reasons(folder):
     assert list(table["class"]) == ["stable", "failed"]
     assert table["reason"][1] in set(stability.REASONS.values())
     assert "point" in table["message"][1]
+
+
+def test_energy_that_grows_is_told_from_failure(folder):
+    """An "energy" that is set to double and to treble beside the bound of 2.5."""
+    text = SCRIPT.replace("Ek + Es)", "Etot)").replace(
+        "log_mod", "Etot = 1 + push*step(time - 5)\nlog_mod"
+    )
+    (folder / "in.bar").write_text(text, encoding="utf-8")
+    words = ["-var", "push=1e-3,1,2", "-var", "factor=0.5", "-bound", "2.5", "-o", "map.pdf"]
+    assert main(["stability", "in.bar", *words]) == 0
+    table = pandas.read_csv(folder / "map.csv")
+    assert list(table["class"]) == ["stable", "stable", "growing"]
+    assert table["reason"][2] == "Etot grows 3 times"
 
 
 def test_a_map_of_400_cells_takes_about_100_runs():
