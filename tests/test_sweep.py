@@ -69,6 +69,15 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     assert beside["threads"] == 1 and beside["versions"]["numba"] and beside["processor"]
 
 
+def test_a_run_that_breaks_off_has_no_values(folder):
+    words = ["-var", "speed=3,300", "-record", "v_x,max:c_x"]
+    assert main(["sweep", "in.flight", *words]) == 0
+    good, bad = records.read(folder / "sweep.csv")
+    assert good["v_x"] == "3" and bad["status"] == "failed" and "moves by 6 cells" in bad["reason"]
+    assert case.read_log(folder / bad["folder"])["v_x"].size > 0  # though it has a log
+    assert bad["v_x"] == bad["max:c_x"] == ""
+
+
 def test_what_is_known_is_not_run_again(folder, capsys):
     command = ["sweep", "in.flight", "-var", "speed=3,4", "-record", "v_x", "-o", "s.csv"]
     assert main(command) == 0

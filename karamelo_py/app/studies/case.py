@@ -109,6 +109,8 @@ class Launch:
             return None
         if found.get("key") != self.key(case):
             return None
+        if found["status"] == "killed":
+            return None  # Somebody else's doing, which the next time may not come.
         # A run that was given up is tried again when it may take longer.
         if found["status"] == "too long" and (self.limit or 1e300) > found["facts"]["wall_s"]:
             return None

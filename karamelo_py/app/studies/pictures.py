@@ -50,10 +50,8 @@ def lines(family: Family, path: Path, *, convergence: bool, title: str = "") -> 
             )  # fmt: skip
             last = int(np.argmax(px))
             ends.append((px[last], py[last], line.label, colour))
-    for line, gone in zip(family.lines, failed, strict=False):
-        colour, *_ = look.style(line.choice, values)
-        up = axes.get_ylim()[1]
-        axes.plot(gone, np.full(len(gone), up), "x", color=colour, clip_on=False, zorder=4)
+    _gone(axes, [(x, look.style(line.choice, values)[0]) for line, gone in
+                 zip(family.lines, failed, strict=False) for x in gone])  # fmt: skip
     look.direct_labels(axes, ends)
     axes.set_xlabel(family.along if convergence else look.label(family.cost))
     axes.set_ylabel(look.label(family.accuracy))
@@ -61,6 +59,18 @@ def lines(family: Family, path: Path, *, convergence: bool, title: str = "") -> 
     tidy(axes)
     _footnote(figure, family, convergence, not convergence and family.front())
     savefig(figure, path)
+
+
+def _gone(axes: Any, marks: Sequence[tuple[float, str]]) -> None:
+    """A cross at the top for each run without a value; those at one place stand side by side."""
+    for at in {x for x, _ in marks}:
+        colours = [colour for x, colour in marks if x == at]
+        for k, colour in enumerate(colours):
+            axes.annotate(
+                "×", (at, 1.0), xycoords=axes.get_xaxis_transform(), color=colour, fontsize=12,
+                xytext=(7 * (k - (len(colours) - 1) / 2), 0), textcoords="offset points",
+                ha="center", va="center", annotation_clip=False, in_layout=False,
+            )  # fmt: skip
 
 
 def _ends(values: np.ndarray) -> tuple[float, float]:

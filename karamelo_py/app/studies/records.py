@@ -72,8 +72,11 @@ def recorded(text: str, headings: Sequence[str] | None, script: Path) -> list[Re
 def row(
     case: Mapping[str, str], outcome: Outcome, items: Iterable[Recorded], folder: Path
 ) -> dict[str, Any]:
-    """The row of a run; what is not known of it is left empty."""
-    log = read_log(outcome.folder)
+    """The row of a run; what is not known of it is left empty.
+
+    A run that did not end well has no recorded values: those of its last moments say nothing.
+    """
+    log = read_log(outcome.folder) if outcome.status == "done" else {}
     found: dict[str, Any] = dict(case)
     for item in items:
         found[item.word] = item.of(log)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies.case import Launch, Outcome, Stop, folder_name
+from karamelo_py.app.studies.case import Launch, Outcome, folder_name
 from karamelo_py.app.studies.records import Recorded, row
 from karamelo_py.app.studies.variables import number
 from karamelo_py.output.console import duration
@@ -124,9 +124,6 @@ class Study:
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-            for future in running:
-                if future.done() and isinstance(future.exception(), Stop):
-                    continue
 
     @staticmethod
     def _ready(queue: list, started: set, compiled: set) -> Any:
