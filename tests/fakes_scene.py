@@ -30,12 +30,6 @@ def _(law):
     return 1 / law.rho
 
 
-class FakeMaterial(Material):
-    """A material with this law."""
-
-    law = FakeLaw()
-
-
 class FakeArgument:
     """An argument as a script has it: a number, a word, or a formula (anything else)."""
 
@@ -65,11 +59,13 @@ class FakeHub:
         self.place = None
         self.folder = Path.cwd()
         self.values = Values()
+        self.parts = {}
         self.materials = Catalogue("material", self)
-        self.materials.add("steel", FakeMaterial())
+        self.materials.add("steel", Material("material", "fake", FakeLaw()))
         self.rehearsing = self.checking = False
         self.warnings = []
-        self.update = SimpleNamespace(method=Method(self, Linear()), thermal=False)
+        self.update = SimpleNamespace(thermal=False)
+        self.use(Method, Linear())
         self.regions = Catalogue("region", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
@@ -80,6 +76,11 @@ class FakeHub:
     _lattices = None
     lattices = Hub.lattices
     catalogues = Hub.catalogues
+
+    def use(self, method, basis):
+        """Choose method and basis, as the command does."""
+        self.update.method = method(self)
+        self.update.method.basis = basis
 
     def warn(self, message, place=None, hint=None):
         self.warnings.append(message)

@@ -24,14 +24,11 @@ def final_state(script: Path, threads: int | None = None) -> dict[str, np.ndarra
     """Arrays of all points by id, and the clock."""
     hub = final_hub(script, threads)
     state = hub.simulation.state()
-    arrays = {"x": state.x, "v": state.v, "time": np.array([hub.update.time, hub.update.step])}
+    arrays = {"x": state.places, "v": state.v, "time": np.array([hub.update.time, hub.update.step])}
     arrays["mass"] = hub.simulation.mass
     arrays["nodal mass"] = hub.simulation.setup.nodes.sums[:, 0].sum()
     arrays |= {"-".join(k.__name__ for k in kind): rows for kind, rows in state.laws.items()}
-    if state.deformation is not None:
-        arrays["deformation"] = state.deformation
-    if state.moment is not None:
-        arrays["moment"] = state.moment
+    arrays |= {kind.__name__: rows for kind, rows in state.fields.items()}
     return arrays
 
 

@@ -73,7 +73,7 @@ def test_help_of_method_names_all_that_there_is(capsys):
 
 
 def test_help_of_a_part_of_the_method(capsys):
-    assert "method(kind, FLIP, basis, alpha)" in call(capsys, "help", "transfer", "FLIP")[1]
+    assert "method(kind, FLIP, basis, alpha[, " in call(capsys, "help", "transfer", "FLIP")[1]
     assert "scheme(usl)" in call(capsys, "help", "usl")[1]
 
 

@@ -26,12 +26,10 @@ from karamelo_py.points.basis import (
     reach,
     support,
 )
-from karamelo_py.points.basis.cpdi import domain
+from karamelo_py.points.basis.cpdi import CUBE, SQUARE, domain
 from karamelo_py.points.basis.cpdi.hexahedron import H8
-from karamelo_py.points.basis.cpdi.hexahedron import SIGNS as CUBE
 from karamelo_py.points.basis.cpdi.parallel import R4, R8
 from karamelo_py.points.basis.cpdi.quadrilateral import Q4
-from karamelo_py.points.basis.cpdi.quadrilateral import SIGNS as SQUARE
 from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
 from karamelo_py.scene.lattice import Lattice
@@ -44,7 +42,7 @@ every_domain = pytest.mark.parametrize(
     "basis, kin", ALL, ids=lambda item: getattr(item, "__name__", type(item).__name__)
 )
 UNIT = {
-    Q4: SQUARE, H8: CUBE, T3: np.array([(-1, -1), (1, -1), (0, 1)]),
+    Q4: np.array(SQUARE), H8: np.array(CUBE), T3: np.array([(-1, -1), (1, -1), (0, 1)]),
     Tet4: np.array([(-1, -1, -1), (1, -1, -1), (0, 1, -1), (0, 0, 1)]),
 }  # fmt: skip
 

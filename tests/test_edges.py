@@ -171,25 +171,6 @@ def test_a_hook_that_moves_points_moves_their_mass(tmp_path):
     assert "moved True" in done.stdout
 
 
-def test_old_caches_are_forgotten_and_nothing_else(tmp_path):
-    """Only folders that the cache has named itself are removed from where it lives."""
-    kernels = tmp_path / "kernels"
-    for k in range(12):
-        (kernels / f"{k:016x}").mkdir(parents=True)
-    for name in ("mine", "0123"):
-        (kernels / name).mkdir()
-    (tmp_path / "data").mkdir()
-    subprocess.run(
-        [sys.executable, "-c", "import karamelo_py.compiler.compile"],
-        env={**os.environ, "KARAMELO_PY_CACHE": str(tmp_path)},
-        check=True,
-    )
-    left = {path.name for path in kernels.iterdir()}
-    assert {"mine", "0123"} <= left
-    assert sum(len(name) == 16 for name in left) == 6
-    assert (tmp_path / "data").is_dir()
-
-
 def test_a_solid_in_the_place_of_another_is_warned_of(run_interpreted):
     """A line copied with its region would double the mass."""
     twice = run_interpreted(block(2, "solid(twin, region, box, 2, rubber, 0.1, 0)", "run(0)"))

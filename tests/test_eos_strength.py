@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 from tensors import ALL_KINEMATICS, flat, symmetric_flat, symmetric_matrix, symmetric_tensors
 
 from karamelo_py.app.cli import main
+from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.laws import law_in, law_kind, law_table
+from karamelo_py.kernels.laws import law_in, law_table
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space, trace, von_mises
 from karamelo_py.points.laws import (
     advance,
@@ -22,15 +24,18 @@ from karamelo_py.points.laws import (
     initial_state,
     jacobian,
     kirchhoff_stress,
+    law_kind,
     plastic_strain,
     specific_volume,
     wave_speed_squared,
     with_stress,
 )
 from karamelo_py.points.laws.eos.linear import LinearPressure
-from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.strength.elastic import Elastic
-from karamelo_py.points.laws.strength.plastic import Plastic
+from karamelo_py.points.laws.eos_strength import EosStrength, memory_of
+from karamelo_py.points.laws.further import chained, initial_part, part_after, part_pressure
+from karamelo_py.points.laws.strengths.linear import Elastic
+from karamelo_py.points.laws.strengths.plastic import Plastic
+from karamelo_py.scene.material import Part
 from karamelo_py.script.values import Values
 
 RHO, K, G, Y = 2.0, 160.0, 80.0, 0.4
@@ -355,3 +360,52 @@ def test_values_of_a_replaced_compute_are_forgotten():
 )
 def test_mistakes(run_interpreted, line, says):
     assert says in run_interpreted(BLOCK + line + "\n", status=1).err
+
+
+# --- a part of a kind that the law does not name ------------------------------------------------
+
+
+class Swelling(NamedTuple):
+    """A pressure that grows by `rate` per time."""
+
+    rate: float
+
+
+@initial_part.on(Swelling)
+def _(part, like):
+    return (real(0, like),)
+
+
+@part_after.on(Swelling)
+def _(part, memory, law, kin, j, s, memories, dt):
+    return (memory[0] + dt,)
+
+
+@part_pressure.on(Swelling)
+def _(part, memory):
+    return (part.rate * memory[0],)
+
+
+@every_kinematics
+@every_law
+def test_parts_of_other_kinds_add_their_pressure(kin, law):
+    """Two of them, beside the parts that the law names: their pressures add up."""
+    swelling = law._replace(further=chained([Swelling(3.0), Swelling(5.0)]))
+    full = np.diag([1e-4, 0, 0])
+    plain = after(law, kin, initial_state(law, kin, 1.0), full, 4)
+    state = after(swelling, kin, initial_state(swelling, kin, 1.0), full, 4)
+    assert memory_of(swelling, kin, state).strength == memory_of(law, kin, plain).strength
+    t = memory_of(swelling, kin, state).further
+    assert t[0] == t[1] > 0
+    more = trace(cauchy_stress(law, kin, plain)) - trace(cauchy_stress(swelling, kin, state))
+    assert more / 3 == pytest.approx((3 + 5) * t[0])
+
+
+def test_a_script_puts_a_part_of_another_kind_into_the_law():
+    made = EosStrength.given(
+        Part("eos", "linear", LinearPressure(1 / RHO, K)),
+        Part("strength", "linear", Elastic(G)),
+        Part("swelling", "even", Swelling(3.0)),
+    )
+    assert made == ELASTIC._replace(further=chained([Swelling(3.0)]))
+    assert Swelling in law_kind(made)

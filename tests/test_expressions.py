@@ -125,9 +125,38 @@ def test_presets_win_over_the_script(hub):
     assert hub.warnings == []
 
 
-def test_a_preset_that_the_script_does_not_know_is_mentioned(hub):
-    run(hub, "h = 0.1", hh="1")
-    assert len(hub.warnings) == 1
+@pytest.mark.parametrize(
+    "text",
+    ["hh = 0.1", "a = 2*hh", "b = 1  # hh\nc = hh", "a = k", "if(1 > 2, hh, 1)"],
+)
+def test_a_preset_that_is_read_or_assigned(hub, text):
+    run(hub, text, hh="1", **({"k": "2*hh"} if text == "a = k" else {}))
+
+
+@pytest.mark.parametrize("text", ["h = 0.1", 'h = 1\nprint("hh")', "h = 1 # hh"])
+def test_a_preset_that_the_script_does_not_know_is_refused(hub, text):
+    """Before anything is run, with the nearest name that there is."""
+    with pytest.raises(ScriptError, match="-var hh: the script has no variable 'hh'") as caught:
+        run(hub, text + "\nnosuchcommand(1)", hh="1")
+    assert caught.value.hint == "did you mean 'h'?"
+    with pytest.raises(ScriptError):
+        run(hub, "", hh="1")
+
+
+def test_presets_of_included_scripts(hub, tmp_path):
+    """A variable may be that of an included script; what is included by a variable is not known."""
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "in.main").write_text("include(sub/one.in)\nb = 2")
+    (tmp_path / "sub" / "one.in").write_text("include(two.in)\n")
+    (tmp_path / "sub" / "two.in").write_text("deep = 1\n")
+    interpreter = Interpreter(hub, {"deep": "3"})
+    interpreter.run_file(tmp_path / "in.main")
+    assert interpreter.variables["deep"] == 3
+    with pytest.raises(ScriptError, match="no variable 'deap'") as caught:
+        Interpreter(hub, {"deap": "3"}).run_file(tmp_path / "in.main")
+    assert caught.value.hint == "did you mean 'deep'?"
+    (tmp_path / "in.main").write_text('which = "sub/two.in"\ninclude(which)')
+    Interpreter(hub, {"deap": "3"}).run_file(tmp_path / "in.main")
 
 
 @pytest.mark.parametrize("name", ["x", "time", "run", "sin", "PI", "1a", "NULL"])

@@ -2,17 +2,21 @@
 
 import sys
 from importlib.metadata import EntryPoint
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numba import config
 
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.run.hooks import lower_hooks
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 
 STYLES = """
+from karamelo_py.kernels.hooks import point_hook
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.modify import Compute, Fix
 
@@ -23,6 +27,16 @@ class Spring(Fix):
 
     def initial_integrate(self, points):
         return missing
+
+def light(mass, v, x_old, x, value, before, dt):
+    return v + "1", x, 0.0
+
+class Light(Fix):
+    def __init__(self, hub, group: ParticleGroup):
+        super().__init__(hub, group)
+
+    def hooks(self):
+        return {"post_grid_to_point": point_hook(light)}
 
 class Idle(Fix):
     def initial_integrat(self, points): ...
@@ -40,11 +54,12 @@ def hub(tmp_path, monkeypatch):
     """A hub that knows the styles above and has a script with a fix and a compute of them."""
     (tmp_path / "styles_under_test.py").write_text(STYLES)
     monkeypatch.syspath_prepend(tmp_path)
-    for family, name in (("fix", "Spring"), ("fix", "Idle"), ("compute", "Gauge")):
+    names = (("fix", "Spring"), ("fix", "Light"), ("fix", "Idle"), ("compute", "Gauge"))
+    for family, name in names:
         entry = EntryPoint(name.lower(), f"styles_under_test:{name}", f"karamelo_py.{family}")
         monkeypatch.setitem(registry._families()[family], name.lower(), [entry])
     yield Hub()
-    for key in [key for key in registry._loaded if key[1] in ("spring", "idle", "gauge")]:
+    for key in [key for key in registry._loaded if key[1] in ("spring", "light", "idle", "gauge")]:
         del registry._loaded[key]
     sys.modules.pop("styles_under_test", None)
 
@@ -60,12 +75,24 @@ def test_hook(hub):
     text = caught.value.render()
     assert text.startswith("in.wrong:1:1: error: fix spring (of ")
     assert "initial_integrate: NameError: name 'missing' is not defined" in text
-    assert "(styles_under_test.py:11)" in text
+    assert "(styles_under_test.py:12)" in text
 
 
 def test_init(hub):
-    with pytest.raises(ScriptError, match=r"fix spring .*__init__: ZeroDivisionError.*_test.py:8"):
+    with pytest.raises(ScriptError, match=r"fix spring .*__init__: ZeroDivisionError.*_test.py:9"):
         run(hub, "fix(s, spring, all, 0)")
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_a_hook_that_cannot_be_compiled(hub):
+    run(hub, "dimension(2)\nfix(s, light, all)")
+    hub.domain = SimpleNamespace(dimension=2)
+    with pytest.raises(ScriptError) as caught:
+        lower_hooks(hub, list(hub.fixes.values()))
+    text = caught.value.render()
+    assert text.startswith("in.wrong:2:1: error: fix light (of ")
+    assert "post_grid_to_point: Numba cannot compile it: No implementation of function" in text
+    assert "(styles_under_test.py:15)" in text
 
 
 def test_refresh(hub):
@@ -83,6 +110,7 @@ class View(PointsView):
     """Three points in 2D."""
 
     def __init__(self):
+        self._handed_out = {}
         self.ids = np.arange(3)
         self._v = np.zeros((3, 2))
 
@@ -97,6 +125,7 @@ def test_views_refuse_what_does_not_fit():
     view = View()
     view.velocity = 1.0
     view.velocity += np.ones((3, 2))
+    view.write_back()
     assert (view._v == 2).all()
     with pytest.raises(AttributeError, match="did you mean velocity"):
         view.velocty = 1.0

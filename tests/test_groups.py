@@ -109,7 +109,7 @@ def test_points_made_later_do_not_join():
 @pytest.mark.parametrize("method", [TLMPM, ULMPMContacts])
 def test_nodes_of_grids_made_later_join(method):
     hub = FakeHub(2, 0, 1, 0.1)
-    hub.update.method = method(hub, Linear())
+    hub.use(method, Linear())
     r1 = hub.region("r1", Block, 0, 0.2, 0, 0.2)
     r2 = hub.region("r2", Block, 0.5, 0.7, 0.5, 0.7)
     group(hub, "g", "nodes", "region", r2, "all")
@@ -129,7 +129,7 @@ def test_nodes_of_the_grid_of_a_method_that_comes_later():
     hub.update.method = None
     group(hub, "g", "nodes", "region", hub.region("r", Block, 0.5, 1), "all")
     np.testing.assert_array_equal(hub.groups["g"].nodes, [2, 3, 4])
-    hub.update.method = Method(hub, BernsteinQuadratic())
+    hub.use(Method, BernsteinQuadratic())
     np.testing.assert_array_equal(hub.groups["g"].nodes, [4, 5, 6, 7, 8])
 
 

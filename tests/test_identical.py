@@ -164,5 +164,5 @@ def test_single_precision_arrays(tmp_path, monkeypatch):
     setup = final_hub(path).simulation.setup
     assert {a.dtype for a in setup.nodes if a is not None} == {np.dtype(np.float32)}
     for b in setup.blocks:
-        fields = [b.x, b.points.v, b.points.mass, b.points.state, *b.laws]
+        fields = [b.points.x, b.points.v, b.points.mass, b.points.state, *b.laws]
         assert {array.dtype for array in fields} == {np.dtype(np.float32)}

@@ -23,12 +23,12 @@ from karamelo_py.points.laws import (
     with_stress,
     with_temperature,
 )
-from karamelo_py.points.laws.damages.johnson_cook import JohnsonCookDamage
+from karamelo_py.points.laws.damages.damage_johnson_cook import JohnsonCookDamage
 from karamelo_py.points.laws.eos.linear import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.strength.johnson_cook import JohnsonCook
-from karamelo_py.points.laws.strength.plastic import Plastic
+from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strengths.plastic import Plastic
 from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
 
 K, G, Y = 160.0, 80.0, 0.4

@@ -26,13 +26,14 @@ from karamelo_py.points.laws.eos import (
     pressure,
     ratio_at_pressure,
 )
+from karamelo_py.points.laws.eos.fluid import Tait
 from karamelo_py.points.laws.eos.ideal_gas import IdealGas
 from karamelo_py.points.laws.eos.linear import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
-from karamelo_py.points.laws.eos.tait import Tait
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.strength.elastic import Elastic
-from karamelo_py.points.laws.strength.viscous import Viscous
+from karamelo_py.points.laws.strengths.fluid import Viscous
+from karamelo_py.points.laws.strengths.linear import Elastic
+from karamelo_py.points.laws.temperatures import Warm
 from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
 from karamelo_py.points.laws.viscosity.artificial import ArtificialViscosity
 
@@ -64,8 +65,8 @@ def test_hugoniot():
 
 def test_heat_adds_to_the_hugoniot_above_the_reference_temperature():
     cold = pressure(COPPER, 0.9, (), ())
-    assert pressure(COPPER, 0.9, (), (200.0,)) == cold
-    hot = pressure(COPPER, 0.9, (), (498.0,))
+    assert pressure(COPPER, 0.9, (), Warm(200.0)) == cold
+    hot = pressure(COPPER, 0.9, (), Warm(498.0))
     assert hot - cold == pytest.approx(GAMMA * RHO * CV * 200, rel=1e-12)
 
 

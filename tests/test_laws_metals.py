@@ -23,9 +23,9 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.points.laws.eos.linear import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.strength.johnson_cook import JohnsonCook
-from karamelo_py.points.laws.strength.plastic import LinearHardening, Plastic
-from karamelo_py.points.laws.strength.swift import Swift
+from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strengths.plastic import LinearHardening, Plastic
+from karamelo_py.points.laws.strengths.swift import Swift
 from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
 
 RHO, K, G = 8.0, 160.0, 80.0
@@ -140,7 +140,7 @@ def test_factor_of_the_temperature():
         flow.append(mises(law, kin, state) / static_flow(COOK, ep))
         assert temperature(law, kin, state) == T
     assert flow == pytest.approx([1, 1, 1 - 0.5**M, 0, 0], rel=1e-12, abs=1e-12)
-    never = EosStrength(EOS, COOK._replace(m=0.0), temperature=HEAT)
+    never = EosStrength(EOS, COOK._replace(m=0.0).checked(), temperature=HEAT)
     state = with_temperature(never, kin, start(never, kin), 800.0)
     state = stretched(never, kin, state, isochoric(1e-2), 1, 1e3)
     ep = plastic_strain(never, kin, state)

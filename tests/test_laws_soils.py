@@ -31,9 +31,8 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos.linear import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.strength.mohr_coulomb import returned_to_plane
-from karamelo_py.styles.strengths.drucker_prager import DruckerPrager
-from karamelo_py.styles.strengths.mohr_coulomb import MohrCoulomb
+from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
+from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb, returned_to_plane
 
 RHO, K, G = 2.0, 100.0, 60.0
 COHESION, PHI, PSI = 0.3, 30.0, 10.0
@@ -45,11 +44,11 @@ FITS = ("compression", "extension", "plane-strain")
 
 
 def mohr(c=COHESION, phi=PHI, psi=PSI, **options):
-    return EosStrength(EOS, MohrCoulomb(None, G, c, phi, psi, **options).law)
+    return EosStrength(EOS, MohrCoulomb.given(G, c, phi, psi, **options))
 
 
 def drucker(c=COHESION, phi=PHI, psi=PSI, **options):
-    return EosStrength(EOS, DruckerPrager(None, G, c, phi, psi, **options).law)
+    return EosStrength(EOS, DruckerPrager.given(G, c, phi, psi, **options))
 
 
 LAWS = [mohr(), mohr(psi=0), mohr(phi=0, psi=0), mohr(c=0), drucker(), drucker(fit="plane-strain")]

@@ -25,8 +25,8 @@ from karamelo_py.points.laws import (
     with_stress,
     with_temperature,
 )
-from karamelo_py.styles.materials.linear import LinearElastic
-from karamelo_py.styles.materials.neo_hookean import NeoHookean
+from karamelo_py.points.laws.linear import LinearElastic
+from karamelo_py.points.laws.neo_hookean import NeoHookean
 
 E, NU, ALPHA, T0 = 200.0, 0.25, 1e-4, 300.0
 K = E / (3 * (1 - 2 * NU))
@@ -37,7 +37,7 @@ every_kinematics = pytest.mark.parametrize(
 
 
 def warm(style, kin, T):
-    law = law_on(style(None, 2.0, E, NU, 0.5, 0.1, ALPHA).law, 1.0, T0)
+    law = law_on(style.given(2.0, E, NU, 0.5, 0.1, ALPHA), 1.0, T0)
     return law, with_temperature(law, kin, initial_state(law, kin, 1.0), T)
 
 

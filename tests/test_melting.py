@@ -1,9 +1,15 @@
-"""What always melts into its callers is not compiled on its own."""
+"""What always melts into its callers is not compiled on its own; what of Numba that leans on."""
 
 from __future__ import annotations
 
+import hashlib
+import inspect
+
+import numba
 import pytest
 from numba import config, njit
+from numba.core import caching, ccallback, codegen, compiler, dispatcher
+from numba.core.typing import context, templates
 
 from karamelo_py.compiler import melting
 from karamelo_py.compiler.compile import kernel, shared
@@ -15,8 +21,9 @@ def doubled(x):
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
-def test_what_melts(monkeypatch):
+def test_what_melts(tmp_path, monkeypatch):
     """A helper of point functions melts; a kernel, and a function of anybody else, do not."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))  # nothing is loaded
     seen = {}
     melts = melting.melts
 
@@ -39,3 +46,33 @@ def test_what_melts(monkeypatch):
     assert names["doubled"]
     assert not names["called"]
     assert not names["plain"]
+
+
+# What compiler/ uses of the inside of Numba, and the text of it that this was written for.
+INSIDE = {
+    codegen.CodeLibrary.__init__: "1de447705f23",
+    codegen.CPUCodeLibrary.finalize: "4b4c34b83488",
+    codegen.CPUCodeLibrary.add_linking_library: "b7c82a3a3a8d",
+    codegen.CPUCodeLibrary._optimize_functions: "9439219fa946",
+    codegen.CPUCodeLibrary._optimize_final_module: "e405bd473752",
+    codegen.CPUCodeLibrary._finalize_final_module: "95bbf4fcbb90",
+    codegen.CPUCodeLibrary._get_module_for_linking: "56dde0e0555b",
+    codegen.JITCPUCodegen.set_env: "207cf44be0e0",
+    codegen.JitEngine.is_symbol_defined: "8acc1ebba0b0",
+    caching._Cache: "ee22baec643a",
+    dispatcher.Dispatcher.enable_caching: "8c75d787fa68",
+    dispatcher.Dispatcher.compile: "0ab4aee15e79",
+    ccallback.CFunc.__init__: "9d54f928215e",
+    ccallback.CFunc.compile: "08edc561907b",
+    compiler.CompileResult._reduce: "5f86eacfa520",
+    compiler.CompileResult._rebuild: "44fa9dc22558",
+    context.BaseContext._lookup_global: "08d354cbcacf",
+    templates.make_overload_template: "7f6974584cb1",
+}
+
+
+@pytest.mark.parametrize("part", INSIDE, ids=lambda part: part.__qualname__)
+def test_the_inside_of_numba_is_as_it_was(part):
+    """Another text may mean something else: read it, look at compiler/, then change this table."""
+    found = hashlib.sha256(inspect.getsource(part).encode()).hexdigest()[:12]
+    assert found == INSIDE[part], f"{part.__qualname__} of Numba {numba.__version__} is another"

@@ -92,7 +92,7 @@ def test_styles_names_the_package(site, tmp_path):
     assert done.returncode == 0, done.stderr
     lines = [line for line in done.stdout.splitlines() if "mpm-drag 0.1.0" in line]
     listed = {line.split()[0]: line for line in lines}
-    assert set(listed) == {"drag", "damp_nodes", "momentum", "elastic-fluid"}
+    assert set(listed) == {"drag", "damp_nodes", "momentum", "elastic-fluid", "recovering"}
     assert "Slow points down" in listed["drag"]
 
 
@@ -163,3 +163,38 @@ def test_the_material_is_a_linear_one_at_small_strain(site, tmp_path):
     np.testing.assert_allclose(kinetic, reference, atol=0.002 * start)
     np.testing.assert_allclose(stored, stored_reference, atol=0.002 * start)
     np.testing.assert_allclose(kinetic, start * np.cos(np.pi * time / 2) ** 2, atol=0.05 * start)
+
+
+# A bar that is pulled at a constant rate, in uniaxial strain.
+PULL = """
+rate = 10
+method(ulmpm, FLIP, linear, 1)
+dimension(1, 0, 4, 0.5)
+region(bar, block, 1, 3)
+eos(bulk, linear, 1000, 5e7)
+strength(hot, recovering, 25e6, 20e3, 1e6, {recovery})
+material(m, eos-strength, bulk, hot)
+solid(bar, region, bar, 2, m, 0.5)
+region(everywhere, block, -INF, INF)
+group(nodes, nodes, region, everywhere, all)
+fix(pull, velocity_nodes, nodes, rate*x)
+fix(start, initial_velocity_particles, all, rate*x0)
+set_dt(2e-5)
+set_output(100)
+dump(points, all, particle, 100, points.*.LAMMPS, ep, R, seq)
+run(100)
+"""
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_strength_shows_its_own_number(site, tmp_path, compiled):
+    recovery = 4e3
+    (tmp_path / "in.pull").write_text(PULL.replace("{recovery}", str(recovery)))
+    done = karamelo_py(site, tmp_path, "in.pull", compiled=compiled)
+    assert done.returncode == 0, done.stderr
+    rows = np.loadtxt(tmp_path / "points.100.LAMMPS", skiprows=11)
+    ep, R, q = rows[:, -3:].T
+    # Exact for steady flow, whose strain rate is 2/3 of the stretching: R = H (dep/dt) / rate.
+    np.testing.assert_allclose(R, 1e6 * (2 / 3 * 10) / recovery, rtol=2e-3)
+    np.testing.assert_allclose(q, 20e3 + R, rtol=1e-6)
+    assert (ep > 0.01).all()

@@ -167,7 +167,7 @@ COMMANDS = [
     ("fix(f, all, body_force, 0, 1)", 13, "fix(f, body_force, all, ...)"),
     ("compute(k, p, kinetic_energy)", 15, "compute(k, kinetic_energy, p, ...)"),
     ("fix(1, all, body_force, 0, 1)", 5, "such as n1"),
-    ("method(ulmpm, MLS, quadratic-spline, 0.9)", 38, "MLS takes no share of FLIP"),
+    ("method(ulmpm, MLS, quadratic-spline, 0.9)", 38, "MLS takes no number"),
     ("a = 1\nmethod(ulmpm, PIC, linear, a, mechanical)", 28, "method(ulmpm, PIC, linear, mech"),
     ("method(ulmpm, FLIP, cubic, 1)", 21, "did you mean 'cubic-spline'?"),
     ("method(ulmpm, FLIP, quadratic spline, 1)", 21, "did you mean 'quadratic-spline'?"),

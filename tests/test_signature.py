@@ -1,6 +1,6 @@
 """From a script's arguments to typed Python calls, and help from signatures."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import pytest
 
@@ -234,6 +234,51 @@ def test_raw_arguments_pass_names_on_to_the_style(hub):
         return signature.call(Style, hub, list(rest), "style")
 
     assert call(hub, outer, "a, g, 1, glue=h").glue.name == "h"
+
+
+class Moduli(NamedTuple):
+    """A record of other numbers than a script gives.
+
+    Parameters
+    ----------
+    E
+        Young's modulus.
+    nu
+        Poisson's ratio.
+    """
+
+    K: float
+    G: float
+
+    @classmethod
+    def given(cls, E: Annotated[float, Positive], nu: Annotated[float, In(-1, 0.5)] = 0.0):
+        return cls(E / (3 * (1 - 2 * nu)), E / (2 * (1 + nu)))
+
+    def checked(self):
+        if self.K > 1e6:
+            raise ScriptError("too stiff", argument="E")
+        return self
+
+
+class Pair(NamedTuple):
+    """Two numbers."""
+
+    a: Annotated[float, Positive]
+    b: int = 2
+
+
+def test_records_need_no_hub(hub):
+    assert call(hub, Pair, "0.5") == Pair(0.5, 2)
+    assert call(hub, Pair, "0.5, 3") == Pair(0.5, 3)
+    assert signature.syntax(Pair, "pair") == "pair(a[, b])"
+    with pytest.raises(ScriptError, match="argument 1 'a' must be a number above 0, not -1"):
+        call(hub, Pair, "-1")
+    assert call(hub, Moduli, "6, 0.25") == Moduli(4.0, 2.4)
+    first, _ = signature.describe(Moduli, "m").parameters
+    assert first.description == "Young's modulus."
+    with pytest.raises(ScriptError, match="too stiff") as caught:
+        call(hub, Moduli, "1e9, 0")
+    assert caught.value.place.column == 3
 
 
 def test_a_signature_that_cannot_be_understood_is_no_crash(hub):

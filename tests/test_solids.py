@@ -226,10 +226,10 @@ def test_three_points_are_those_of_karamelo_unless_said_otherwise():
     np.testing.assert_allclose(regular.x0[:, 0], [1 / 6, 1 / 2, 5 / 6])
 
 
-@pytest.mark.parametrize("method", [Method(None, UGIMP()), ULCPDI(None, R4())])
-def test_three_points_with_domains_stand_so_that_these_tile_the_cell(method):
+@pytest.mark.parametrize("method, basis", [(Method, UGIMP()), (ULCPDI, R4())])
+def test_three_points_with_domains_stand_so_that_these_tile_the_cell(method, basis):
     hub = FakeHub(2, 0, 1, 1)
-    hub.update.method = method
+    hub.use(method, basis)
     solid = hub.solid("s", whole(hub), ppc=3)
     np.testing.assert_allclose(np.unique(solid.x0), [1 / 6, 1 / 2, 5 / 6])
     np.testing.assert_allclose(solid.half_size, 1 / 6)
@@ -261,7 +261,7 @@ def test_axisymmetric_volumes_are_times_the_radius():
 
 def own_grids(hub, **attributes):
     """Let the method lay a grid for each solid, as total Lagrangian ones do."""
-    hub.update.method = OwnGrids(hub, Linear())
+    hub.use(OwnGrids, Linear())
     hub.update.method.__dict__.update(attributes)
     return hub
 

@@ -2,36 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
-import os
-import shutil
 import sys
 import textwrap
 from collections.abc import Iterable, Sequence
-from typing import Any
+from io import TextIOWrapper
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.signature import Help, Parameter
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 
 COMMAND = "command"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
 HELP_USAGE = "karamelo-py help COMMAND, karamelo-py help STYLE, or karamelo-py help FAMILY STYLE"
-HELP = """\
-karamelo-py help COMMAND         explain a command: karamelo-py help solid
-karamelo-py help STYLE           explain a style: karamelo-py help body_force
-karamelo-py help FAMILY STYLE    where a name means several things:
-                                 karamelo-py help fix kinetic_energy
-karamelo-py styles [FAMILY]      list commands and styles
-"""
-# Families whose styles are words of a command and take no arguments of their own.
-WRITTEN = {
-    "scheme": "scheme({name})",
-    "method": "method({name}, transfer, basis[, alpha])",
-    "transfer": "method(kind, {name}, basis{fields})",
-    "basis": "method(kind, transfer, {name}[, alpha])",
-}
 _WIDEST = 88  # running text is hard to read in longer lines
 
 
@@ -52,8 +35,6 @@ def help_of(family: str, name: str) -> Help:
         If there is none of this name, or its package is broken.
     """
     target = registry.find(family, name)
-    if family in WRITTEN:
-        return _help_from_docstring(family, name, target)
     try:
         return signature.describe(target, name if family == COMMAND else f"{family} {name}")
     except TypeError as error:
@@ -61,26 +42,6 @@ def help_of(family: str, name: str) -> Help:
             f"{family} '{name}' of {registry.origin(family, name)} has a signature that cannot be "
             f"understood: {error}"
         ) from error
-
-
-def _help_from_docstring(family: str, name: str, target: Any) -> Help:
-    """Help about a style that is a word of a command: only the docstring speaks of it."""
-
-    def nothing(hub: Any) -> None: ...
-
-    nothing.__doc__ = target.__doc__
-    help_ = signature.describe(nothing, name)
-    described = signature.documented(target.__doc__ or "") if family == "transfer" else {}
-    anything = signature.kind_of(Any)
-    fields = "".join(f", {word}" for word in described)
-    return dataclasses.replace(
-        help_,
-        name=f"{family} {name}",
-        syntax=WRITTEN[family].format(name=name, fields=fields),
-        parameters=[
-            Parameter(word, anything, description=text) for word, text in described.items()
-        ],
-    )
 
 
 def describe_parameter(parameter: Parameter) -> str:
@@ -108,12 +69,12 @@ def describe_parameter(parameter: Parameter) -> str:
 # ---- the two commands ---------------------------------------------------------------------------
 
 
-def print_styles(arguments: Sequence[str]) -> int:
+def print_styles(given: Sequence[str]) -> int:
     """List commands and styles, a line each, with where they come from; returns the exit status.
 
     Parameters
     ----------
-    arguments
+    given
         Nothing, or the family to list.
 
     Raises
@@ -121,7 +82,6 @@ def print_styles(arguments: Sequence[str]) -> int:
     ScriptError
         For an unknown family, or more than one argument.
     """
-    given = _without_options(arguments)
     if len(given) > 1:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=STYLES_USAGE)
     chosen = [_family(given[0])] if given else families()
@@ -129,32 +89,28 @@ def print_styles(arguments: Sequence[str]) -> int:
     for index, family in enumerate(chosen):
         if index:
             page.line()
-        page.title(_plural(family))
+        page.line(_plural(family), "bold")
         names = registry.names(family)
         origins = [registry.origin(family, name) for name in names]
-        widths = _longest(names), _longest(origins)
+        widths = [max(map(len, column), default=0) for column in (names, origins)]
         for name, origin in zip(names, origins, strict=True):
             page.row(name.ljust(widths[0]), origin.ljust(widths[1]), *_summary(family, name))
     return 0
 
 
-def print_help(arguments: Sequence[str]) -> int:
+def print_help(given: Sequence[str]) -> int:
     """Explain a command or a style; returns the exit status.
 
     Parameters
     ----------
-    arguments
-        Nothing (how to use it), the name of a command, style or family, or a family and a name.
+    given
+        The name of a command, style or family, or a family and a name.
 
     Raises
     ------
     ScriptError
         For an unknown name, or one that means several things.
     """
-    given = _without_options(arguments)
-    if not given:
-        print(HELP, end="")
-        return 0
     if len(given) > 2:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=HELP_USAGE)
     if len(given) == 2:
@@ -171,10 +127,6 @@ def print_help(arguments: Sequence[str]) -> int:
     if _singular(name) in families():
         return print_styles([name])
     raise _unknown("command or style", name, {n for f in families() for n in registry.names(f)})
-
-
-def _without_options(arguments: Sequence[str]) -> list[str]:
-    return [word for word in arguments if word != "--debug"]
 
 
 def _family(word: str) -> str:
@@ -198,11 +150,10 @@ def _plural(family: str) -> str:
 
 def _unknown(what: str, name: str, known: Iterable[str]) -> ScriptError:
     known = sorted(known)
-    close = nearest(name, known)
     return ScriptError(
         f"unknown {what} '{name}'",
         expected="one of " + ", ".join(known) if what == "family" else HELP_USAGE,
-        hint=f"did you mean '{close}'?" if close else "karamelo-py styles lists them all",
+        hint=meant(name, known) or "karamelo-py styles lists them all",
     )
 
 
@@ -219,12 +170,13 @@ def _summary(family: str, name: str) -> tuple[str, bool]:
 def _explain(family: str, name: str) -> int:
     help_ = help_of(family, name)
     page = _Page()
-    page.title(help_.name)
+    page.line(help_.name, "bold")
     page.line(f"from {registry.origin(family, name)}")
     page.line()
     page.line(f"  {help_.syntax}")
-    page.text(help_.summary)
-    page.text(help_.text)
+    for text in filter(None, (help_.summary, help_.text)):
+        page.line()
+        page.paragraph(text)
     if help_.parameters:
         page.heading("Parameters")
         for parameter in help_.parameters:
@@ -246,49 +198,31 @@ def _explain(family: str, name: str) -> int:
 # ---- how it looks -------------------------------------------------------------------------------
 
 
-def _longest(words: Iterable[str]) -> int:
-    return max(map(len, words), default=0)
-
-
 class _Page:
     """Lines on standard output: bold and coloured on a terminal, plain elsewhere."""
 
     def __init__(self) -> None:
-        self._rich: Any = None
-        if sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
-            from rich.console import Console
+        from rich.console import Console
 
-            self._rich = Console(highlight=False)
-        self._width = min(shutil.get_terminal_size().columns if self._rich else _WIDEST, _WIDEST)
+        if isinstance(sys.stdout, TextIOWrapper):  # older encodings get escapes
+            sys.stdout.reconfigure(errors="backslashreplace")
+        self._rich = Console(highlight=False, markup=False, emoji=False)
+        self._terminal = self._rich.is_terminal and not self._rich.is_dumb_terminal
+        self._width = min(self._rich.width if self._terminal else _WIDEST, _WIDEST)
 
-    def line(self, text: str = "", style: str | None = None) -> None:
+    def line(self, text: str = "", style: str = "") -> None:
         """A line as it is."""
-        if self._rich is not None:
-            self._rich.print(text, style=style, markup=False, soft_wrap=True)
-        else:
-            encoding = sys.stdout.encoding or "ascii"
-            print(text.encode(encoding, "backslashreplace").decode(encoding))
-
-    def title(self, text: str) -> None:
-        """What follows is about this."""
-        self.line(text, "bold")
+        self._rich.print(text, style=style if self._terminal else "", soft_wrap=True)
 
     def heading(self, text: str) -> None:
         """A part of a page."""
         self.line()
         self.line(text, "bold")
 
-    def text(self, text: str) -> None:
-        """A paragraph of its own, if there is any."""
-        if text:
-            self.line()
-            self.paragraph(text)
-
     def paragraph(self, text: str, indent: int = 0) -> None:
         """Running text, broken into lines; empty lines part paragraphs."""
         margin = " " * indent
-        text = text.replace("``", "")
-        for index, part in enumerate(text.split("\n\n") if text else ()):
+        for index, part in enumerate(text.replace("``", "").split("\n\n") if text else ()):
             if index:
                 self.line()
             for line in textwrap.wrap(" ".join(part.split()), self._width - indent):
@@ -296,11 +230,11 @@ class _Page:
 
     def row(self, name: str, origin: str, summary: str, broken: bool) -> None:
         """A line of a list; cut where a terminal ends."""
-        if self._rich is None:
-            self.line(f"  {name}  {origin}  {summary}".rstrip())
-            return
         from rich.text import Text
 
         text = Text.assemble("  ", (name, "cyan"), "  ", (origin, "dim"), "  ")
         text.append(summary, style="red" if broken else None)
-        self._rich.print(text, no_wrap=not broken, overflow="ellipsis")
+        if broken or not self._terminal:
+            self._rich.print(text, soft_wrap=True)
+        else:
+            self._rich.print(text, no_wrap=True, overflow="ellipsis")

@@ -6,7 +6,9 @@ import argparse
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
+from typing import Any, NoReturn
 
 from karamelo_py import __version__
 from karamelo_py.scene.hub import Hub
@@ -15,81 +17,51 @@ from karamelo_py.script.errors import ScriptError, nearest, render_message
 ERROR = 1
 INTERRUPTED = 130  # as a shell reports a program that SIGINT ended
 
-USAGE = """\
-karamelo-py SCRIPT [options]           run a script
-karamelo-py check SCRIPT [options]     read and build a scene, print what it needs, run nothing
-karamelo-py styles [FAMILY]            list commands and styles, and where they come from
-karamelo-py help [FAMILY] STYLE        explain a command or style
-karamelo-py bench [WORKLOAD ...]       measure the speed of this machine on known scenes
-karamelo-py sweep SCRIPT -var A=1,2    run a family of variants, and put them into one table
-karamelo-py chart TABLE                draw a table of runs: what accuracy costs
-karamelo-py advise SCRIPT -target E    find the cheapest variant that is accurate enough
-karamelo-py stability SCRIPT           map where a method is stable
-"""
-OPTIONS = """
-options:
-  -var NAME VALUE    (or -v) set a variable; the script's own assignment of it then yields
-  --threads N        threads to use (default: all cores where the scene is large enough)
-  --quiet            write warnings and errors only
-  --debug            show the traceback of an error
-"""
-RUN = f"""\
-karamelo-py SCRIPT [options]
-karamelo-py run SCRIPT [options]       where a script is called check, styles, help or bench
-
-Runs a script. The log goes to the terminal and to log.mpm; files are written to the current folder.
-{OPTIONS}"""
-CHECK = f"""\
-karamelo-py check SCRIPT [options]
-
-Reads a script, builds its scene, and prints what its first run needs: points and nodes, memory,
-the first time step and the stable one, the stages of a step. Mistakes further down are found, too.
-Nothing runs, and nothing is written.
-{OPTIONS}"""
-STYLES = """\
-karamelo-py styles [FAMILY]
-
-Lists commands and styles, all or those of a family (fix, compute, region, ...), with the packages
-they come from.
-"""
-
-STUDIES = ("sweep", "chart", "advise", "stability")
+RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
+CHECK = """\
+Prints what its first run needs: points and nodes, memory, the first time step and the stable one,
+the stages of a step. Mistakes further down are found, too. Nothing runs, and nothing is written."""
+HELP = """
+karamelo-py help COMMAND         explain a command: karamelo-py help solid
+karamelo-py help STYLE           explain a style: karamelo-py help body_force
+karamelo-py help FAMILY STYLE    where a name means several things:
+                                 karamelo-py help fix kinetic_energy
+karamelo-py styles [FAMILY]      list commands and styles"""
 RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
-    debug = "--debug" in arguments
     try:
         return _dispatch(arguments)
-    except ScriptError as error:
-        if debug:
-            traceback.print_exc()
-        _complain(error.render())
+    except SystemExit as done:  # argparse has shown what was asked for
+        return int(done.code or 0)
     except KeyboardInterrupt:
         _complain(render_message("error", "interrupted"))
         return INTERRUPTED
-    except MemoryError:
-        if debug:
-            traceback.print_exc()
-        hint = "a coarser grid, fewer points per cell, or precision(single)"
-        _complain(render_message("error", "the scene does not fit into memory", hint=hint))
     except BrokenPipeError:
         # Whoever read our output has gone; what was written stays.
         sys.stderr.close()
         return ERROR
-    except Exception as error:  # A fault of ours or of a plug-in: no traceback unless asked for.
-        if debug:
+    except Exception as error:
+        if "--debug" in arguments:
             traceback.print_exc()
-        _complain(
-            render_message(
-                "error",
-                f"internal error: {type(error).__name__}: {error}",
-                hint="run again with --debug to see where, and please report it",
-            )
-        )
+        _complain(_rendered(error))
     return ERROR
+
+
+def _rendered(error: Exception) -> str:
+    """What the user is told; no traceback, also where the fault is ours or of a plug-in."""
+    if isinstance(error, ScriptError):
+        return error.render()
+    if isinstance(error, MemoryError):
+        message = "the scene does not fit into memory"
+        hint = "a coarser grid, fewer points per cell, or precision(single)"
+    else:
+        message = f"internal error: {type(error).__name__}: {error}"
+        hint = "run again with --debug to see where, and please report it"
+    return render_message("error", message, hint=hint)
 
 
 def _complain(text: str) -> None:
@@ -97,71 +69,97 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
+# Subcommands with a module of their own, which is imported when it is asked for: its function
+# add_parser(subparsers) adds a parser whose default `act` takes the options.
+ELSEWHERE = {
+    "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
+    "sweep": ("karamelo_py.app.studies.sweep", "Run a family of variants into one table."),
+    "chart": ("karamelo_py.app.studies.chart", "Draw a table of runs: what accuracy costs."),
+    "advise": ("karamelo_py.app.studies.advise", "Find the cheapest variant that is good enough."),
+    "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
+}
+COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
+
+
 def _dispatch(arguments: list[str]) -> int:
-    if not arguments or arguments[0] in ("-h", "--help"):
-        version = "  --version          print the version\n"
-        title = f"karamelo-py {__version__}: the material point method"
-        print(f"{title}\n\n{USAGE}{OPTIONS}{version}", end="")
-        return 0
-    if arguments[0] == "--version":
-        print(f"karamelo-py {__version__}")
-        return 0
-    if arguments[0] in STUDIES:
-        return _study(arguments)
-    commands: dict[str, Callable[[list[str]], int]] = {
-        "run": _run,
-        "check": _check,
-        "styles": _styles,
-        "help": _help,
-        "bench": _bench,
-    }
-    if arguments[0] in commands:
-        if any(word in ("-h", "--help") for word in arguments[1:]):
-            print(_explanation(arguments[0]), end="")
-            return 0
-        return commands[arguments[0]](arguments[1:])
-    close = nearest(arguments[0], [*commands, *STUDIES])
-    if close and len(arguments) > 1 and not Path(arguments[0]).exists():
-        raise ScriptError(
-            f"there is no file {arguments[0]} and no such subcommand",
-            expected="a script, or one of " + ", ".join([*commands, *STUDIES]),
-            hint=f"did you mean 'karamelo-py {close}'?",
-        )
-    return _run(arguments)
-
-
-def _explanation(subcommand: str) -> str:
-    """What a subcommand does, and how it is called."""
-    if subcommand == "help":
-        from karamelo_py.app.catalogue import HELP
-
-        return HELP
-    if subcommand == "bench":
-        from karamelo_py.app.bench.command import explanation
-
-        return explanation()
-    return {"run": RUN, "check": CHECK, "styles": STYLES}[subcommand]
+    arguments = arguments or ["-h"]
+    first = arguments[0]
+    if first not in (*COMMANDS, "-h", "--help", "--version"):
+        close = nearest(first, COMMANDS)
+        if close and len(arguments) > 1 and not Path(first).exists():
+            raise ScriptError(
+                f"there is no file {first} and no such subcommand",
+                expected="a script, or one of " + ", ".join(COMMANDS),
+                hint=f"did you mean 'karamelo-py {close}'?",
+            )
+        arguments = ["run", *arguments]
+    if first == "help" and len(arguments) == 2 and arguments[1] in COMMANDS[1:]:
+        arguments = [arguments[1], "-h"]
+    options = _parser(arguments[0]).parse_args(arguments)
+    return options.act(options)
 
 
 class CommandLine(argparse.ArgumentParser):
     """A command line whose errors are messages in our own form."""
 
-    def error(self, message: str):
-        usage = self.format_usage().strip() if self.prog.split()[1:] else USAGE.rstrip()
-        raise ScriptError(message, expected=usage)
+    def __init__(self, **options: Any):
+        usual = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
+        super().__init__(**(usual | options))
+
+    def error(self, message: str) -> NoReturn:
+        raise ScriptError(message, expected=self.format_usage().removeprefix("usage: ").rstrip())
 
 
-def _script_parser() -> CommandLine:
-    parser = CommandLine(prog="karamelo-py", add_help=False, allow_abbrev=False)
-    parser.add_argument("script", nargs="?")
-    parser.add_argument("-i", "-in", dest="input")
-    parser.add_argument("-var", "--var", "-v", nargs=2, action="append", default=[])
-    parser.add_argument("--threads", type=threads_option)
-    parser.add_argument("--quiet", action="store_true")
-    parser.add_argument("--debug", action="store_true")
-    parser.add_argument("--version", action="store_true")
-    parser.add_argument("-h", "--help", action="store_true")
+def _parser(command: str) -> CommandLine:
+    """The command line; what only `command` needs is there only for it."""
+    parser = CommandLine(
+        prog="karamelo-py",
+        usage="karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--quiet] [--debug]\n"
+        "       karamelo-py COMMAND ...",
+        description=f"karamelo-py {__version__}: the material point method",
+        epilog="karamelo-py COMMAND -h explains a command. karamelo-py SCRIPT is short for\n"
+        "karamelo-py run SCRIPT.",
+    )
+    parser.add_argument("--version", action="version", version=f"karamelo-py {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", prog="karamelo-py")
+
+    def add(name: str, act: Callable[[Any], int], summary: str, text: str = "") -> CommandLine:
+        added = commands.add_parser(name, help=summary, description=f"{summary}\n{text}".strip())
+        added.add_argument("--debug", action="store_true", help="show the traceback of an error")
+        added.set_defaults(act=act)
+        return added
+
+    for name, summary, text in (
+        ("run", "Run a script.", RUN), ("check", "Build a scene and say what it needs.", CHECK)
+    ):  # fmt: skip
+        script = add(name, _run, summary, text)
+        script.set_defaults(checking=name == "check")
+        script.add_argument("script", metavar="SCRIPT", nargs="?")
+        script.add_argument("-i", "-in", dest="input", metavar="SCRIPT", help=argparse.SUPPRESS)
+        add_variables(script, "set a variable; the script's own assignment of it then yields")
+        script.add_argument(
+            "--threads", type=threads_option, metavar="N",
+            help="threads to use (default: all cores where the scene is large enough)",
+        )  # fmt: skip
+        script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
+    styles = add("styles", _styles, "List commands and styles, and where they come from.")
+    styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
+    explain = add("help", _help, "Explain a command or a style.", HELP)
+    explain.add_argument("words", metavar="WORD", nargs="*")
+    for name, (module, summary) in ELSEWHERE.items():
+        if name == command:
+            import_module(module).add_parser(commands)
+        else:
+            commands.add_parser(name, help=summary)
     return parser
+
+
+def add_variables(parser: CommandLine, text: str) -> None:
+    """Let a command line set variables of scripts."""
+    parser.add_argument(
+        "-var", "--var", "-v", nargs=2, action="append", default=[], metavar=("NAME", "VALUE"),
+        help=text,
+    )  # fmt: skip
 
 
 def threads_option(text: str) -> int | None:
@@ -173,10 +171,7 @@ def threads_option(text: str) -> int | None:
     return int(text)
 
 
-def _run(arguments: list[str], *, checking: bool = False) -> int:
-    options = _script_parser().parse_args(arguments)
-    if options.help or options.version:
-        return _dispatch(["--help" if options.help else "--version"])
+def _run(options: argparse.Namespace) -> int:
     script = options.input or options.script
     if script is None:
         raise ScriptError("no script is named", expected="karamelo-py SCRIPT")
@@ -188,7 +183,7 @@ def _run(arguments: list[str], *, checking: bool = False) -> int:
     hub = Hub(Console(quiet=options.quiet))
     hub.settings.threads = options.threads
     hub.settings.debug = options.debug
-    hub.checking = checking
+    hub.checking = options.checking
     interpreter = Interpreter(hub, presets=dict(options.var))
     hub.interpreter = interpreter
     try:
@@ -215,43 +210,18 @@ def _tell_of_no_run(hub: Hub, script: str) -> None:
         hub.warn(message, hint=RUN_COMMANDS)
 
 
-def _check(arguments: list[str]) -> int:
-    return _run(arguments, checking=True)
-
-
-def _styles(arguments: list[str]) -> int:
+def _styles(options: argparse.Namespace) -> int:
     from karamelo_py.app.catalogue import print_styles
 
-    return print_styles(arguments)
+    return print_styles(options.family)
 
 
-def _help(arguments: list[str]) -> int:
-    if len(arguments) == 1 and arguments[0] in STUDIES:
-        return _study([*arguments, "--help"])
-    if arguments in (["check"], ["styles"], ["help"], ["bench"]):
-        print(_explanation(arguments[0]), end="")
-        return 0
+def _help(options: argparse.Namespace) -> int:
     from karamelo_py.app.catalogue import print_help
 
-    return print_help(arguments)
-
-
-def _bench(arguments: list[str]) -> int:
-    from karamelo_py.app.bench.command import main as bench
-
-    return bench(arguments)
-
-
-def _study(arguments: list[str]) -> int:
-    from karamelo_py.app.studies import add_parsers
-
-    parser = CommandLine(prog="karamelo-py", allow_abbrev=False)
-    add_parsers(parser.add_subparsers(parser_class=CommandLine))
-    try:
-        options = parser.parse_args(arguments)
-    except SystemExit:  # Help is shown.
-        return 0
-    return options.act(options)
+    if not options.words:
+        return _dispatch(["help", "-h"])
+    return print_help(options.words)
 
 
 if __name__ == "__main__":

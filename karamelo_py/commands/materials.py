@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.hub import Catalogue, Hub
+from karamelo_py.scene.material import Material, Part
 
 
 def eos(hub: Hub, ID: str, style: StyleOf("eos"), *arguments: Argument) -> None:
@@ -28,7 +31,7 @@ def eos(hub: Hub, ID: str, style: StyleOf("eos"), *arguments: Argument) -> None:
     --------
     strength, material, material eos-strength
     """
-    define(hub, hub.eos, ID, style, arguments)
+    define(hub, hub.parts["eos"], ID, style, arguments)
 
 
 def strength(hub: Hub, ID: str, style: StyleOf("strength"), *arguments: Argument) -> None:
@@ -51,7 +54,7 @@ def strength(hub: Hub, ID: str, style: StyleOf("strength"), *arguments: Argument
     --------
     eos, damage, temperature, material, material eos-strength
     """
-    define(hub, hub.strengths, ID, style, arguments)
+    define(hub, hub.parts["strength"], ID, style, arguments)
 
 
 def damage(hub: Hub, ID: str, style: StyleOf("damage"), *arguments: Argument) -> None:
@@ -74,7 +77,7 @@ def damage(hub: Hub, ID: str, style: StyleOf("damage"), *arguments: Argument) ->
     --------
     strength, temperature, material, material eos-strength
     """
-    define(hub, hub.damages, ID, style, arguments)
+    define(hub, hub.parts["damage"], ID, style, arguments)
 
 
 def temperature(hub: Hub, ID: str, style: StyleOf("temperature"), *arguments: Argument) -> None:
@@ -97,16 +100,14 @@ def temperature(hub: Hub, ID: str, style: StyleOf("temperature"), *arguments: Ar
     --------
     strength, damage, material, material eos-strength
     """
-    define(hub, hub.temperatures, ID, style, arguments)
+    define(hub, hub.parts["temperature"], ID, style, arguments)
 
 
-def define(
-    hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: tuple[Argument, ...]
-) -> None:
+def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Sequence[Argument]):
     """File under `ID` what the style makes of the arguments; an ID in use is an error first."""
-    family = catalogue.kind
-    target = registry.find(family, style)
+    kind = catalogue.kind
+    target = registry.find(kind, style)
     catalogue.refuse(ID)
-    part = signature.call(target, hub, list(arguments), f"{family} {style}")
-    part.style = style
-    catalogue.add(ID, part)
+    made = signature.call(target, hub, list(arguments), f"{kind} {style}")
+    entry = Material if kind == "material" else Part
+    catalogue.add(ID, entry(kind, style, made))

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, get_type_hints
+from collections.abc import Container, Mapping, Sequence
+from contextlib import suppress
+from itertools import groupby
+from typing import Any
 
-from karamelo_py.language import registry
+from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.signature import Argument
-from karamelo_py.points.transfers.flip import FLIP
-from karamelo_py.points.transfers.tflip import TFLIP
+from karamelo_py.language.signature import Argument, Parameter
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError, nearest
-
-OPTIONS = ("mechanical", "thermo-mechanical", "gradient-enhanced")
+from karamelo_py.script.errors import ScriptError, meant
 
 
 def method(
@@ -33,11 +32,12 @@ def method(
     basis
         The functions of the nodes; with the cpdi methods ``linear``.
     options
-        What the transfer asks for (the share of FLIP from 0 to 1, the order of XPIC); then, in any
-        order, ``mechanical`` (the default) or ``thermo-mechanical`` (heat flows between points,
-        too), ``gradient-enhanced`` (FLIP maps the gradient of velocity too), and
-        the variant of the basis (cpgimp: ``det``, ``diagonal``, ``stretch`` or ``corners``; the
-        cpdi methods: ``R4``, ``Q4``, ``R8``, ``H8``, ``T3``, ``Tet4``).
+        The numbers that the transfer asks for (the share of FLIP, the order of XPIC), then those of
+        the basis and of the method; and, in any order, words that one of the three knows:
+        ``mechanical`` (the default) or ``thermo-mechanical`` (heat flows between points, too),
+        ``gradient-enhanced`` (FLIP maps the gradient of velocity too), the variant of cpgimp
+        (``det``, ``diagonal``, ``stretch`` or ``corners``), and the shape of the domains of the
+        cpdi methods (``R4``, ``Q4``, ``R8``, ``H8``, ``T3``, ``Tet4``). The page of each says more.
 
     Example
     -------
@@ -64,197 +64,19 @@ def method(
     scheme, solid, temperature, fix temperature_nodes, fix temperature_particles,
     fix heat_flux_particles, fix convection_particles
     """
-    method_class = registry.find("method", kind)
-    transfer_class = registry.find("transfer", transfer)
-    call = _Call(hub, kind, method_class, transfer_class, basis, options)
-    _refuse_shape(call)
-    basis_class = registry.find("basis", basis)
-    variants = _variants(method_class, basis_class)
-    words = list(options)
-    parameters = [_parameter(call, variants, name, words) for name in transfer_class._fields]
-    basis_class, chosen = _basis(call, basis_class, variants, words)
-    for argument in words:
-        word = argument.word() or argument.text
-        if chosen is not None and argument is not chosen and word in variants:
-            raise ScriptError(
-                f"'{chosen.text}' was chosen already", place=argument.place, expected="one of them"
-            )
-        if word == "gradient-enhanced":
-            transfer_class = _enhanced(transfer_class, argument)
-        elif argument is not chosen and word not in OPTIONS:
-            raise _unknown_option(call, variants, argument)
+    call = _Call(hub, kind, transfer, basis, options)
+    parts = call.parts()
     if hub.solids:
         raise ScriptError(
             "the method cannot change once there are solids",
             expected="method(...) before the first solid",
             hint=f"move it above line {next(iter(hub.solids.values())).place.line}",
         )
-    hub.update.method = method_class(hub, basis_class())
-    hub.update.method.place = hub.place
-    variant = next((name for name, other in variants.items() if other is basis_class), "")
-    hub.update.method.basis_name = f"{basis} {variant}".strip()
-    hub.update.transfer = transfer_class(*parameters)
-    hub.update.thermal = any(argument.word() == "thermo-mechanical" for argument in words)
-
-
-class _Call(NamedTuple):
-    """What was typed, for messages that say what to type instead."""
-
-    hub: Hub
-    kind: str
-    method_class: type
-    transfer_class: type
-    basis: str
-    options: tuple[Argument, ...]
-
-    @property
-    def dimension(self) -> int | None:
-        """That of the scene, where it is known already."""
-        domain = self.hub.domain
-        return domain.dimension if domain is not None else self.hub.announced_dimension
-
-    def fitting(self, variants: dict[str, type]) -> list[str]:
-        """Names of the variants for the dimension of the scene."""
-        d = self.dimension
-        return [n for n, v in variants.items() if d in (None, getattr(v, "dimension", d))]
-
-    def choice(self, variants: dict[str, type]) -> str:
-        """Which of the variants there are; those of each dimension as long as it is not known."""
-        names: dict[int | None, list[str]] = {}
-        for name in self.fitting(variants):
-            names.setdefault(getattr(variants[name], "dimension", None), []).append(name)
-        if len(names) == 1:
-            return "one of " + ", ".join(*names.values())
-        return "; ".join(f"in {d}D one of {', '.join(fit)}" for d, fit in names.items())
-
-    def instead(self, *, basis: str, option: str | None = None, kind: str | None = None) -> str:
-        """The same call with another basis, and with `option` at the end."""
-        numbers = [argument.text for argument in self.options if argument.word() is None]
-        names = self.transfer_class._fields
-        numbers = (numbers + ["1"] * len(names))[: len(names)]
-        kept = [argument.text for argument in self.options if argument.word() in OPTIONS]
-        last = [option] if option is not None else []
-        name = self.transfer_class.__name__
-        return f"method({', '.join([kind or self.kind, name, basis, *numbers, *kept, *last])})"
-
-
-def _variants(method_class: type, basis_class: type) -> dict[str, type]:
-    """Variants of the basis by name: those of the method (cpdi), or of the basis (cpgimp)."""
-    return getattr(method_class, "variants", None) or getattr(basis_class, "variants", {})
-
-
-def _refuse_shape(call: _Call) -> None:
-    """The shape of the domains in the place of the basis, as older scripts have it."""
-    variants = getattr(call.method_class, "variants", None) or {}
-    if call.basis not in variants:
-        return
-    fit = call.fitting(variants)
-    shape = call.basis if call.basis in fit or not fit else fit[0]
-    raise ScriptError(
-        f"'{call.basis}' is the shape of the domains, not a basis",
-        argument="basis",
-        expected=f"linear, and the shape at the end: {call.instead(basis='linear', option=shape)}",
-    )
-
-
-def _basis(
-    call: _Call, basis_class: type, variants: dict[str, type], words: list[Argument]
-) -> tuple[type, Argument | None]:
-    """The class of the basis, and the option that chose the variant."""
-    shaped = bool(getattr(call.method_class, "variants", None))
-    if shaped and call.basis != "linear":
-        raise ScriptError(
-            f"method {call.kind} maps the corners of domains by linear functions only",
-            argument="basis",
-            expected="linear",
-        )
-    if not variants:
-        return basis_class, None
-    fit = call.fitting(variants)
-    if not fit:
-        raise ScriptError(
-            f"method {call.kind} has no domains for {call.dimension} dimension",
-            hint=f"{call.instead(basis='cpgimp', kind='ulmpm')}: in one dimension that is the "
-            "same thing",
-        )
-    for argument in words:
-        if (word := argument.word()) in fit:
-            return variants[word], argument
-        if word in variants:
-            raise ScriptError(
-                f"domains of the shape {word} are for {variants[word].dimension} dimensions, and "
-                f"this scene has {call.dimension}",
-                place=argument.place,
-                expected="one of " + ", ".join(fit),
-            )
-    default = getattr(basis_class, "default_variant", None)
-    if default is not None and not shaped:
-        return variants[default], None
-    raise ScriptError(
-        f"method {call.kind} needs the shape of the domains",
-        expected=f"{call.choice(variants)}; at the end, as in "
-        + call.instead(basis=call.basis, option=fit[0]),
-    )
-
-
-def _unknown_option(call: _Call, variants: dict, argument: Argument) -> ScriptError:
-    """What is wrong with an option that nothing asks for."""
-    name, asked = call.transfer_class.__name__, call.transfer_class._fields
-    word = argument.word()
-    if word is None or isinstance(call.hub.interpreter.variables.get(word), float):
-        takes = f"{', '.join(asked)} and no further number" if asked else "no share of FLIP"
-        variant = next((o.word() for o in call.options if o.word() in variants), None)
-        return ScriptError(
-            f"{name} takes {takes}",
-            place=argument.place,
-            expected=call.instead(basis=call.basis, option=variant),
-        )
-    enhanced = [] if call.transfer_class is FLIP else ["gradient-enhanced"]
-    known = [option for option in OPTIONS if option not in enhanced]
-    known += call.fitting(variants)
-    close = nearest(word, known)
-    return ScriptError(
-        f"'{argument.text}' is not an option of method({call.kind}, {name}, {call.basis})",
-        place=argument.place,
-        expected="nothing more, or one of " + ", ".join(known),
-        hint=f"did you mean '{close}'?" if close else None,
-    )
-
-
-def _enhanced(transfer_class: type, argument: Argument) -> type:
-    """The transfer that maps the gradient of velocity, too."""
-    if transfer_class is not FLIP:
-        raise ScriptError(
-            f"gradient-enhanced goes with FLIP, not with {transfer_class.__name__}",
-            place=argument.place,
-            hint="TPIC is PIC with the gradient; affine transfers have it already",
-        )
-    return TFLIP
-
-
-def _parameter(call: _Call, variants: dict, name: str, words: list[Argument]) -> Any:
-    """The next number of a transfer: a share, or a whole number where the class says so."""
-    transfer = call.transfer_class
-    whole = get_type_hints(transfer)[name] is int
-    wanted = "a whole number from 1 to 20" if whole else "a number from 0 (PIC) to 1 (pure FLIP)"
-    first_word = words[0].word() if words else None
-    value = None
-    if words and first_word not in (*OPTIONS, *variants):
-        value = words[0].value(call.hub)
-    if not isinstance(value, (int, float)):
-        if words and first_word is None:
-            raise ScriptError(f"{name} is {words[0].text}", place=words[0].place, expected=wanted)
-        rest = [argument.text for argument in words]
-        typed = f"method({', '.join([call.kind, transfer.__name__, call.basis, name, *rest])}"
-        raise ScriptError(
-            f"{transfer.__name__} needs a number {name} after the basis",
-            expected=f"{typed}) with {name} {wanted}",
-        )
-    argument = words.pop(0)
-    in_range = 1 <= value <= 20 and value == int(value) if whole else 0 <= value <= 1
-    if not in_range:
-        raise ScriptError(f"{name} is {value}", place=argument.place, expected=wanted)
-    return int(value) if whole else float(value)
+    chosen = hub.update.method = parts["method"]
+    hub.update.transfer, chosen.basis = parts["transfer"], parts["basis"]
+    chosen.basis_name = f"{basis} {call.variant}".strip()
+    chosen.place = hub.place
+    hub.update.thermal = chosen.thermal
 
 
 def anti_volumetric_locking(hub: Hub, active: bool) -> None:
@@ -282,3 +104,190 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     method
     """
     hub.update.anti_locking = active
+
+
+FAMILIES = ("transfer", "basis", "method")
+
+
+class _Call:
+    """The three styles of a call, and which of their parameters each option is."""
+
+    def __init__(self, hub: Hub, kind: str, transfer: str, basis: str, options: Sequence[Argument]):
+        self.hub = hub
+        self.names = {"method": kind, "transfer": transfer, "basis": basis}
+        self.options = list(options)
+        self.variant = ""
+        domain = hub.domain
+        self.dimension = domain.dimension if domain is not None else hub.announced_dimension
+        self.styles = {f: registry.find(f, self.names[f]) for f in ("method", "transfer")}
+        # Domains have a shape, which chooses the class of the basis.
+        self.shapes = _variants(self.styles["method"])
+        self.variants = {"method": {}, "transfer": _variants(self.styles["transfer"])}
+        self.fit = [n for n, s in self.shapes.items() if self.dimension in (None, s.dimension)]
+        if basis in self.shapes:
+            shape = basis if basis in self.fit or not self.fit else self.fit[0]
+            instead = self.instead(shape, basis="linear")
+            raise ScriptError(
+                f"'{basis}' is the shape of the domains, not a basis",
+                argument="basis",
+                expected=f"linear, and the shape at the end: {instead}",
+            )
+        self.styles["basis"] = registry.find("basis", basis)
+        self.variants["basis"] = self.shapes or _variants(self.styles["basis"])
+
+    def parts(self) -> dict[str, Any]:
+        """Transfer, basis and method, made with the options that are theirs."""
+        if self.shapes:
+            self._check_shapes()
+        rest = self._choose("basis", self._choose("transfer", self.options))
+        slots = [(f, p) for f in FAMILIES for p in signature.parameters(self.styles[f])]
+        numbers = [slot for slot in slots if not slot[1].kind.words]
+        given: dict[str, dict[str, Argument]] = {family: {} for family in FAMILIES}
+        for argument in rest:
+            slot = next((s for s in slots if _word(argument, s[1].kind.words)), None)
+            if slot is None and not numbers:
+                raise self._unknown(argument, slots)
+            family, parameter = slot or numbers.pop(0)
+            if parameter.name in given[family]:
+                raise _chosen_twice(given[family][parameter.name], argument)
+            given[family][parameter.name] = argument
+        for family, parameter in slots:
+            if not parameter.optional and parameter.name not in given[family]:
+                word = next((a.text for a in self.options if a not in rest), None)
+                raise ScriptError(
+                    f"{self.names[family]} needs {parameter.name} after the basis",
+                    expected=f"{self.instead(word, by_name=True)} with {parameter.name} "
+                    + parameter.kind.text,
+                )
+        values: dict[str, dict[str, Any]] = {family: {} for family in FAMILIES}
+        for family, p in slots:
+            if p.name in given[family]:
+                values[family][p.name] = signature.convert(self.hub, p, given[family][p.name])
+        return {
+            family: signature.make(
+                style, self.hub, f"{family} {self.names[family]}", **values[family]
+            )
+            for family, style in self.styles.items()
+        }
+
+    def _check_shapes(self) -> None:
+        """Refuse functions that know no domains, and shapes for another dimension."""
+        kind, fit = self.names["method"], self.fit
+        if self.names["basis"] != "linear":
+            raise ScriptError(
+                f"method {kind} maps the corners of domains by linear functions only",
+                argument="basis",
+                expected="linear",
+            )
+        if not fit:
+            raise ScriptError(
+                f"method {kind} has no domains for {self.dimension} dimension",
+                hint=f"{self.instead(kind='ulmpm', basis='cpgimp')}: in one dimension that is the "
+                "same thing",
+            )
+        shapes = {shape: a for a in self.options if (shape := _word(a, self.shapes))}
+        for shape in (shape for shape in shapes if shape not in fit):
+            raise ScriptError(
+                f"domains of the shape {shape} are for {self.shapes[shape].dimension} "
+                f"dimensions, and this scene has {self.dimension}",
+                place=shapes[shape].place,
+                expected="one of " + ", ".join(fit),
+            )
+        if not shapes:
+            by_dimension = groupby(fit, lambda name: self.shapes[name].dimension)
+            choice = [f"in {d}D one of {', '.join(names)}" for d, names in by_dimension]
+            choice = choice if len(choice) > 1 else ["one of " + ", ".join(fit)]
+            raise ScriptError(
+                f"method {kind} needs the shape of the domains",
+                expected=f"{'; '.join(choice)}; at the end, as in {self.instead(fit[0])}",
+            )
+
+    def _choose(self, family: str, options: list[Argument]) -> list[Argument]:
+        """Put the variant that a word asks for in the place of the style; the other options."""
+        variants = self.variants[family]
+        words = [argument for argument in options if _word(argument, variants)]
+        if len(words) > 1:
+            raise _chosen_twice(*words[:2])
+        default = getattr(self.styles[family], "default_variant", None)
+        if word := _word(words[0], variants) if words else default:
+            style = variants[word]
+            self.styles[family] = registry.find(family, style) if isinstance(style, str) else style
+            self.variant = word if family == "basis" else self.variant
+        return [argument for argument in options if argument not in words]
+
+    def instead(
+        self,
+        option: str | None = None,
+        *,
+        kind: str | None = None,
+        basis: str | None = None,
+        by_name: bool = False,
+    ) -> str:
+        """The same call with another kind or basis, what it lacks, and `option` at the end."""
+        asked = [p for f in FAMILIES if f in self.styles for p in _numbers(self.styles[f])]
+        typed = [argument.text for argument in self.options if argument.word() is None]
+        lacking = [p for p in asked[len(typed) :] if not p.optional]
+        known = self._words("method", "transfer")
+        words = [
+            kind or self.names["method"], self.names["transfer"], basis or self.names["basis"],
+            *typed[: len(asked)], *(p.name if by_name else "1" for p in lacking),
+            *(argument.text for argument in self.options if _word(argument, known)),
+        ]  # fmt: skip
+        return f"method({', '.join(words if option in (None, *words) else [*words, option])})"
+
+    def _words(self, *families: str) -> list[str]:
+        """Words that some of the styles know."""
+        words = []
+        for family in families:
+            words += [w for p in signature.parameters(self.styles[family]) for w in p.kind.words]
+            words += self.fit if family == "basis" and self.shapes else self.variants[family]
+        return words
+
+    def _unknown(self, argument: Argument, slots: list[tuple[str, Parameter]]) -> ScriptError:
+        """What is wrong with an option that nothing asks for."""
+        word = argument.word()
+        if word is None or isinstance(self.hub.interpreter.variables.get(word), float):
+            asking = {p.name: self.names[f] for f, p in slots if not p.kind.words}
+            who = " with ".join(dict.fromkeys(asking.values())) or self.names["transfer"]
+            takes = f"{', '.join(asking)} and no further number" if asking else "no number"
+            chosen = next((a.text for a in self.options if _word(a, self.variants["basis"])), None)
+            return ScriptError(
+                f"{who} takes {takes}", place=argument.place, expected=self.instead(chosen)
+            )
+        for family in FAMILIES:
+            for name in registry.names(family):
+                with suppress(ScriptError):  # a broken plug-in is not what this is about
+                    if word in _variants(registry.find(family, name)):
+                        return ScriptError(
+                            f"{word} goes with {name}, not with {self.names[family]}",
+                            place=argument.place,
+                            expected=f"karamelo-py help {family} {name} explains it",
+                        )
+        known = self._words("method", "transfer", "basis")
+        return ScriptError(
+            f"'{argument.text}' is not an option of method({', '.join(self.names.values())})",
+            place=argument.place,
+            expected="nothing more, or one of " + ", ".join(known),
+            hint=meant(word, known),
+        )
+
+
+def _variants(style: type) -> Mapping[str, Any]:
+    """Words that choose another class (or style, by its name) in the place of a style."""
+    return getattr(style, "variants", {})
+
+
+def _numbers(style: type) -> list[Parameter]:
+    return [p for p in signature.parameters(style) if not p.kind.words]
+
+
+def _word(argument: Argument, known: Container[str]) -> str | None:
+    """The one of the `known` words that an argument is; a variable of that name is passed over."""
+    word = argument.text if argument.text in known else argument.word()
+    return word if word in known else None
+
+
+def _chosen_twice(first: Argument, second: Argument) -> ScriptError:
+    return ScriptError(
+        f"'{first.text}' was chosen already", place=second.place, expected="one of them"
+    )

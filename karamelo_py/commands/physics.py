@@ -16,13 +16,15 @@ from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS
 
 
-def scheme(hub: Hub, style: StyleOf("scheme")) -> None:
+def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
     """Choose when in a step the stress is updated.
 
     Parameters
     ----------
     style
         ``musl`` when there is no such command.
+    arguments
+        What the style asks for; those that come with the program ask for nothing.
 
     Example
     -------
@@ -32,7 +34,8 @@ def scheme(hub: Hub, style: StyleOf("scheme")) -> None:
     --------
     method
     """
-    hub.update.scheme = registry.find("scheme", style)()
+    target = registry.find("scheme", style)
+    hub.update.scheme = signature.call(target, hub, arguments, f"scheme {style}")
 
 
 def precision(hub: Hub, kind: Literal["double", "single"]) -> None:

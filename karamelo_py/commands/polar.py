@@ -99,7 +99,7 @@ populate_cylindrical_coordinates.syntax = (
 def _refuse_chosen(hub: Hub, solid: Solid) -> None:
     """Groups of points and contact know points by number, and the numbers from here on change."""
     for fix in hub.fixes.values():
-        if fix.puts_force_on_points:
+        if fix.point_fields:
             raise ScriptError(
                 f"fix '{fix.id}' was made for points that would be replaced or renumbered",
                 argument="solid",

@@ -1,91 +1,28 @@
-"""How the package compiles: a cache folder for each state of the sources, point functions.
-
-Numba does not notice when a function in *another* file changes, so the folder of its on-disk cache
-is named by a hash of every source that can end up in a kernel: this package's and every plug-in's.
-"""
+"""How the package compiles: kernels, and point functions that are chosen by type."""
 
 from __future__ import annotations
 
 import gc
-import hashlib
 import os
-import re
-import shutil
-import sys
 from collections.abc import Callable
-from importlib import metadata, util
-from pathlib import Path
 from typing import Any
 
 import numba
-from llvmlite import binding as llvm
 from llvmlite import ir
-from numba import cfunc, config, njit
+from numba import config, njit
 from numba.core import event
+from numba.core.ccallback import CFunc
 from numba.extending import intrinsic, overload
 
-import karamelo_py.compiler.melting  # noqa: F401  (has to be there before anything is compiled)
-
-_KEPT_CACHES = 6
-_COMPILED_PARTS = ("compiler", "points", "kernels", "schemes", "styles", "run")
-
-
-def _source_folders() -> list[Path]:
-    """What may end up in a kernel: parts of this package, and every package with a plug-in."""
-    here = Path(__file__).parents[1]
-    folders = [here / name for name in _COMPILED_PARTS]
-    points = metadata.entry_points()
-    groups = [group for group in points.groups if group.startswith("karamelo_py.")]
-    packages = {
-        entry.value.partition(":")[0].partition(".")[0]
-        for group in groups
-        for entry in points.select(group=group)
-    }
-    for package in packages - {"karamelo_py"}:
-        try:
-            origin = getattr(util.find_spec(package), "origin", None)
-        except (ImportError, ValueError):
-            continue
-        if origin:
-            path = Path(origin)
-            folders.append(path.parent if path.name == "__init__.py" else path)
-    return sorted(set(folders))
-
-
-def _sources_hash() -> str:
-    digest = hashlib.sha256(f"{sys.version}|{numba.__version__}".encode())
-    for folder in _source_folders():
-        for source in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder]:
-            digest.update(source.relative_to(folder.parent).as_posix().encode())
-            digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _use_cache_folder() -> Path:
-    """Point Numba's cache at the folder of these sources and forget the oldest of the others."""
-    import platformdirs
-
-    home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
-    root = Path(home) / "kernels"
-    folder = root / _sources_hash()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        folder.touch()
-        ours = [path for path in root.iterdir() if re.fullmatch("[0-9a-f]{16}", path.name)]
-        others = sorted(ours, key=lambda path: path.stat().st_mtime, reverse=True)
-        for old in others[_KEPT_CACHES:]:
-            shutil.rmtree(old, ignore_errors=True)
-    except OSError:
-        return folder  # Numba then keeps its cache beside the sources or in memory.
-    config.CACHE_DIR = str(folder)
-    return folder
-
-
-CACHE_FOLDER = _use_cache_folder()
-
-# The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in
-# registers and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
-llvm.set_option("", "--unroll-threshold=4000")
+from karamelo_py.compiler.cache import KernelCache
+from karamelo_py.compiler.fingerprint import (
+    SPELLED,
+    asks,
+    declare_point_function,
+    noting,
+    serves,
+    tag_class,
+)
 
 
 class _NoCollections(event.Listener):
@@ -128,23 +65,26 @@ def kernel(function: Callable | None = None, **options: Any) -> Callable:
     if function is None:
         return lambda f: kernel(f, **options)
     options = {"forceinline": False, "no_cfunc_wrapper": True} | options
-    return njit(cache=True, nogil=True, error_model="numpy", _nrt=False, **options)(function)
+    compiled = njit(nogil=True, error_model="numpy", _nrt=False, **options)(function)
+    if not config.DISABLE_JIT:
+        compiled._cache = KernelCache(function, options)
+    return compiled
 
 
 def by_type(function: Callable) -> Callable:
     """Decorate the chooser of what `function` is in a kernel, from the types of its arguments."""
-    return overload(function, _INLINED, strict=False)
+
+    def choose(chooser: Callable) -> Callable:
+        overload(function, _INLINED, strict=False)(noting(chooser))
+        return chooser
+
+    return choose
 
 
 def shared(function: Callable) -> Callable:
     """Mark a helper of point functions that needs no choice by type: kernels may call it."""
     by_type(function)(lambda *arguments: function)
     return function
-
-
-def tag_class(numba_type: Any) -> Any:
-    """The Python class that a Numba type stands for, as far as point functions select by it."""
-    return getattr(numba_type, "instance_class", None)
 
 
 def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
@@ -159,6 +99,7 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
     def declare(stub: Callable) -> Callable:
         table: dict[tuple[type, ...], Callable] = {}
         fallback: list[Callable] = []
+        memo: dict[Any, Callable] = {}  # what was found before, for speed where interpreted
 
         def find(classes: tuple) -> Callable | None:
             return table.get(classes) or (fallback[0] if fallback else None)
@@ -167,12 +108,23 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
             names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
             return f"{stub.__name__} is not defined for ({names})"
 
-        def dispatch(*arguments: Any) -> Any:
-            classes = tuple(type(a) for a in arguments[:tags])
+        def select(classes: tuple) -> Callable:
             chosen = find(classes)
             if chosen is None:
                 raise TypeError(missing(classes))
-            return chosen(*arguments)
+            memo[classes if tags > 1 else classes[0]] = chosen
+            return chosen
+
+        if tags == 1:
+
+            def dispatch(*arguments: Any) -> Any:
+                kind = arguments[0].__class__
+                return (memo.get(kind) or select((kind,)))(*arguments)
+        else:
+
+            def dispatch(*arguments: Any) -> Any:
+                classes = tuple([a.__class__ for a in arguments[:tags]])
+                return (memo.get(classes) or select(classes))(*arguments)
 
         dispatch.__name__ = stub.__name__
         dispatch.__qualname__ = stub.__qualname__
@@ -184,20 +136,33 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
 
         by_type(dispatch)(choose)
 
+        def added(implementation: Callable) -> Callable:
+            memo.clear()
+            serves(implementation, dispatch)
+            return implementation
+
         def on(*classes: type) -> Callable[[Callable], Callable]:
             def register(implementation: Callable) -> Callable:
                 table[classes] = implementation
-                return implementation
+                return added(implementation)
 
             return register
 
         def otherwise(implementation: Callable) -> Callable:
             fallback[:] = [implementation]
-            return implementation
+            return added(implementation)
 
+        dispatch.tags = tags
+        dispatch.find = find
+        declare_point_function(dispatch)
         dispatch.on = on
         dispatch.otherwise = otherwise
-        dispatch.defined = lambda *classes: classes in table
+
+        def defined(*classes: type) -> bool:
+            asks(dispatch, classes)
+            return classes in table
+
+        dispatch.defined = defined
         return dispatch
 
     return declare
@@ -254,6 +219,16 @@ def _fma(a, b, c):
     return lambda a, b, c: a * b + c
 
 
+def choose(condition: bool, a: float, b: float) -> float:
+    """`a` where `condition` holds, else `b`; both are computed, and nothing is branched over."""
+    return a if condition else b
+
+
+@by_type(choose)
+def _choose(condition, a, b):
+    return lambda condition, a, b: a if condition else b
+
+
 def index(i: int) -> int:
     """`i` as an array index that is known not to be negative.
 
@@ -306,7 +281,10 @@ def address_of(function: Callable, signature: numba.types.Type) -> int:
             _uncompiled.append(function)
             _addresses[function] = len(_uncompiled) - 1
         else:
-            compiled = cfunc(signature, cache=True, error_model="numpy")(function)
+            options = {"error_model": "numpy"}
+            compiled = CFunc(function, (signature.args, signature.return_type), {}, options)
+            compiled._cache = KernelCache(function, options)
+            compiled.compile()
             _keep_alive.append(compiled)
             _addresses[function] = compiled.address
     return _addresses[function]
@@ -339,5 +317,5 @@ def caller_of(signature: numba.types.Type) -> Callable:
 def define(parameters: str, *lines: str, **names: Any) -> Callable:
     """The function with these `parameters` and body `lines`, which may use `names`."""
     body = "\n    ".join(lines or ("pass",))
-    exec(f"def spelled({parameters}):\n    {body}", names)
+    exec(compile(f"def spelled({parameters}):\n    {body}", SPELLED, "exec"), names)
     return names["spelled"]

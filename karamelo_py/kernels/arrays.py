@@ -1,44 +1,80 @@
 """The arrays a run works on, as NamedTuples that kernels take.
 
 n is the number of points of a block, d the dimension, N the number of nodes, T the number of tiles.
+Arrays of points have the shape (components, n), those of nodes (N, components). Fields that not
+every scene has are declared by their owners (:mod:`karamelo_py.compiler.fields`).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.fields import name_of
+from karamelo_py.points.kinematics import dimension
+
 
 class Nodes(NamedTuple):
-    """Fields of the nodes of all grids, dense in node number; untouched pages cost no memory."""
+    """Fields of the nodes of all grids, dense in node number; untouched pages cost no memory.
+
+    Components are named by the functions below: ``nodes.sums[n, of_force(kin) + k]``.
+    """
 
     sums: np.ndarray  # (N, 1 + 2 d): mass, momentum, force, as the points give them
     update: np.ndarray  # (N, 2 d): v* after the momentum update, and v* - v
     velocity: np.ndarray  # (N, d): the velocity whose gradient deforms the points
-    normal: np.ndarray | None  # (N, d): sum of m grad N, for contact between solids
-    growth: np.ndarray | None  # (N, 2): volume after and before an increment, for F-bar
-    series: np.ndarray | None  # (N, 2 d): term of the series of XPIC, sum for the next
+    fields: tuple  # declared fields, (N, components)
+
+
+MASS = 0  # component of Nodes.sums
+
+
+@shared
+def of_momentum(kin):
+    """First component of the momentum in `Nodes.sums`."""
+    return 1
+
+
+@shared
+def of_force(kin):
+    """First component of the force in `Nodes.sums`."""
+    return 1 + dimension(kin)
+
+
+@shared
+def of_change(kin):
+    """First component of v* - v in `Nodes.update`; that of v* is 0."""
+    return dimension(kin)
 
 
 class Points(NamedTuple):
-    """What the points of one constitutive law carry, in the order of the tiles."""
+    """What the points of one constitutive law carry, in the order of the tiles.
 
-    v: np.ndarray  # (n, d) velocity
+    A place is a position (d numbers), followed by what the basis keeps of the shape of a point's
+    domain where weights follow the motion.
+    """
+
+    x: np.ndarray  # (2, w, n): places now and after the move; Clock.now says which
+    home: np.ndarray | None  # (w, n) reference places, where weights belong to them (total frame)
+    v: np.ndarray  # (d, n) velocity
     mass: np.ndarray  # (n,)
-    state: np.ndarray  # (n, s) state of the law
-    moment: np.ndarray | None  # (n, t) what the transfer keeps
+    state: np.ndarray  # (s, n) state of the law
     material: np.ndarray  # (n,) int32, row in the table of laws
-    deformation: np.ndarray | None  # (n, t) F, where the frame needs it and the law has none
-    force: np.ndarray | None  # (n, d) force that fixes put on the point
-    growth: np.ndarray | None  # (n,) ratio of volumes of the trial increment, for F-bar
-    echo: np.ndarray | None  # (n, d) term of the series of XPIC
-    bounces: np.ndarray | None  # (n, d) how often the edge of the domain has reflected the point
-    heat: np.ndarray | None  # (n, GRADIENT + d), see the columns below, where heat flows
+    grid: np.ndarray  # (n,) int32, the grid of each point
+    id: np.ndarray  # (n,) int64, 0-based number of each point in the scene
+    fields: tuple  # declared fields, (components, n)
 
 
-# Columns of Points.heat; behind them the gradient of temperature, which alone outlives a step.
-TEMPERATURE, CAPACITY, CONDUCTANCE, FACE, SUPPLY, SHARE, GRADIENT = range(7)
+def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
+    """Every array of the points, with its name; the points come last in its shape."""
+    for name, array in points._asdict().items():
+        if name != "fields" and array is not None:
+            yield name, array
+    for one in points.fields:
+        yield name_of(type(one)), one.array
 
 
 class Tiling(NamedTuple):
@@ -51,7 +87,7 @@ class Tiling(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where the points of a block are during a sweep: arrays (n, w) of places."""
+    """Where the points of a block are during a sweep: arrays (w, n) of places."""
 
     where: np.ndarray  # that the weights of the gather belong to
     x: np.ndarray  # before
@@ -59,30 +95,45 @@ class Places(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Points of one law, its parameters per material, and where each tile's points lie.
+    """Points of one law, its parameters per material, and where each tile's points lie."""
 
-    A place is a position (d numbers), followed by what the basis keeps of the shape of a point's
-    domain where weights follow the motion.
-    """
-
-    x: np.ndarray  # (2, n, w): places now and after the move; Control.whole[NOW] says which
-    home: np.ndarray | None  # (n, w) reference places, where weights belong to them (total frame)
     points: Points
     laws: NamedTuple  # the law's NamedTuple with an array (m,) for each parameter
     tiling: Tiling
-    id: np.ndarray  # (n,) int64, 0-based number of each point in the scene
-    grid: np.ndarray  # (n,) int32, the grid of each point
 
 
 class NoHooks(NamedTuple):
     """No fix acts in the compiled loop."""
 
 
+# One compiled hook of a fix, and the formula of one of its components.
+HOOK = np.dtype(
+    [
+        ("address", np.int64),
+        ("stage", np.int64),
+        ("begin", np.int64),  # range of members; -1: all
+        ("end", np.int64),
+        ("slot", np.int64),  # of the published total; -1: none
+        ("uses_before", np.int64),  # the value one step earlier
+        ("uses_share", np.int64),  # one over the number of members with mass
+    ]
+)
+PROGRAM = np.dtype(
+    [
+        ("begin", np.int64),  # range of code; -1: NULL
+        ("end", np.int64),
+        ("first", np.int64),  # range of constants
+        ("last", np.int64),
+    ]
+)
+
+
 class Hooks(NamedTuple):
     """Compiled hooks of the fixes, called by address at their stage (see kernels.hooks)."""
 
     evaluate: int  # address of the evaluator of formulas
-    table: np.ndarray  # (k, HOOK_COLUMNS) int64
+    table: np.ndarray  # (k,) HOOK
+    programs: np.ndarray  # (k, 3) PROGRAM, for each component
     members: np.ndarray  # int64: node numbers, or a 1 for each point that is a member
     code: np.ndarray  # (c, 2) int64: the programs of the formulas, one after another
     constants: np.ndarray  # (m,) float64
@@ -91,11 +142,6 @@ class Hooks(NamedTuple):
     scratch: np.ndarray  # (8 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack
 
 
-# Hooks.table: address; stage; range of members (-1: all); slot of the published total (-1: none);
-# whether the value one step earlier is used, whether the number of members with mass is used;
-# then, for each component, a range of code and one of constants (-1: NULL).
-ADDRESS, STAGE, FROM, TO, SLOT, USES_BEFORE, USES_SHARE, CODE = range(8)
-HOOK_COLUMNS = CODE + 12
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch
 
 # Stages of a step at which fixes act, in Karamelo's names.
@@ -110,28 +156,47 @@ POST_HEAT_TO_GRID = 7
 SUPPLY_HEAT = 8
 POST_UPDATE_GRID_HEAT = 9
 
+# Where in the node arrays a hook acts.
+ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
+
+CLOCK = np.dtype(
+    [
+        ("fixed_dt", np.float64),  # step of set_dt, or 0
+        ("dt_factor", np.float64),
+        ("end_time", np.float64),
+        ("rate", np.float64),  # of the fastest point, c + max |v_i|
+        ("new_rate", np.float64),  # of the last sweep
+        ("move", np.float64),  # of the point that went furthest in this step, in cells
+        ("new_move", np.float64),
+        ("drift", np.float64),  # since the points were sorted, in cells
+        ("drift_limit", np.float64),
+        ("spacing", np.float64),  # smallest cell size
+        ("lightest", np.float64),  # mass of the lightest point, where the basis has a steep edge
+        ("courant", np.float64),  # stable step over cell size / rate
+        ("heat_limit", np.float64),  # stable step of conduction, infinite where there is none
+        ("heat_reference", np.float64),  # the same in undeformed bodies
+        ("kept", np.float64),  # share of its own velocity that a point keeps (FLIP)
+        ("first_limit", np.float64),  # stable step at the start
+        ("limit", np.float64),  # stable step now
+        ("now", np.int64),  # which of the two arrays of places is the present one
+        ("wrong", np.int64),  # 1 when a point went wrong
+        ("over_limit", np.int64),  # steps above the stable limit, one after another
+        ("watch_limit", np.int64),  # whether to stop because of them
+    ]
+)
+TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values
+
 
 class Control(NamedTuple):
     """What the compiled loop reads and writes beside the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
-    real: np.ndarray  # (17,) float64, see the names below
-    whole: np.ndarray  # (4,) int64, see the names below
+    clock: np.ndarray  # (1,) CLOCK
 
 
-TIME, TIMESTEP, DT = 0, 1, 2
-# Control.real
-FIXED_DT, DT_FACTOR, END_TIME, RATE, NEW_RATE, MOVE, DRIFT, DRIFT_LIMIT, SPACING = range(9)
-LIGHTEST = 9  # mass of the lightest point, where the edge of the basis is steep
-NEW_MOVE = 10
-COURANT = 11  # stable step as a share of cell size over the fastest point's rate
-HEAT_LIMIT = 12  # stable step of conduction, infinite where there is none
-KEPT = 13  # share of its own velocity that a point keeps, and changes by what that of nodes does
-FIRST_LIMIT = 14  # stable step at the start
-LIMIT = 15  # stable step now
-HEAT_REFERENCE = 16  # stable step of conduction in undeformed bodies
-# Control.whole
-NOW, WRONG, OVER_LIMIT, WATCH_LIMIT = range(4)
+def new_clock() -> Any:
+    """A clock with zeros."""
+    return np.zeros(1, CLOCK).view(np.recarray)
 
 
 class Setup(NamedTuple):

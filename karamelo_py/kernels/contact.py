@@ -20,7 +20,9 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import kernel, point_function
-from karamelo_py.kernels.arrays import DT, TIMESTEP
+from karamelo_py.compiler.fields import field
+from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change
+from karamelo_py.kernels.p2g import Normal
 from karamelo_py.kernels.step import touch, touch_velocity
 from karamelo_py.points.kinematics import dimension
 
@@ -29,6 +31,8 @@ REPEATS = 16  # at most, where more than two fields meet; what remains falls by 
 
 class SeparateFields(NamedTuple):
     """Solids touch where their fields meet. F fields of equal grids, S solids."""
+
+    node_fields = (Normal,)
 
     stride: int  # from a node to the same place in the next field
     friction: np.ndarray  # (F, F) coefficient of each pair of fields; infinite: no slip
@@ -62,13 +66,14 @@ def _shares(contact, d, nodes, n, m):
     says little about the direction: the larger sum decides (after Lemiale, Nairn & Hurmane 2010),
     equal ones are averaged. A body that is held knows its surface best.
     """
+    normal = field(nodes.fields, Normal)
     of_n = 0.0
     of_m = 0.0
     held_n = False
     held_m = False
     for k in range(d):
-        of_n += nodes.normal[n, k] * nodes.normal[n, k]
-        of_m += nodes.normal[m, k] * nodes.normal[m, k]
+        of_n += normal[n, k] * normal[n, k]
+        of_m += normal[m, k] * normal[m, k]
         held_n = held_n or contact.held[n, k] != 0
         held_m = held_m or contact.held[m, k] != 0
     if not of_n + of_m > 0:
@@ -81,7 +86,7 @@ def _shares(contact, d, nodes, n, m):
 
 @kernel
 def _pair(contact, d, nodes, n, m):
-    per_a, per_b = 1.0 / nodes.sums[n, 0], 1.0 / nodes.sums[m, 0]
+    per_a, per_b = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     share_a, share_b = _shares(contact, d, nodes, n, m)
     return Pair(n, m, per_a, per_b, share_a, share_b)
 
@@ -97,7 +102,8 @@ def _yielding(contact, pair, k):
 @kernel
 def _outward(nodes, pair, k):
     """Component k of the common normal, not normalised, from the first body to the second."""
-    return pair.share_a * nodes.normal[pair.n, k] - pair.share_b * nodes.normal[pair.m, k]
+    normal = field(nodes.fields, Normal)
+    return pair.share_a * normal[pair.n, k] - pair.share_b * normal[pair.m, k]
 
 
 @kernel
@@ -138,11 +144,11 @@ def _meet(contact, nodes, n):
     """
     a = n // contact.stride
     for b in range(a):
-        if nodes.sums[n - (a - b) * contact.stride, 0] > 0:
+        if nodes.sums[n - (a - b) * contact.stride, MASS] > 0:
             return 0
     count = 0
     for b in range(a, contact.slot.size):
-        if nodes.sums[n + (b - a) * contact.stride, 0] > 0:
+        if nodes.sums[n + (b - a) * contact.stride, MASS] > 0:
             contact.meeting[count] = b
             count += 1
     return count
@@ -270,8 +276,9 @@ def _touch_pair(contact, d, nodes, values, i, j, place, share):
 
 
 @kernel
-def _touch_place(contact, d, nodes, values, place, count):
+def _touch_place(contact, kin, nodes, values, place, count):
     """Resolve contact where `count` fields meet."""
+    d = dimension(kin)
     contact.partners[:count] = 1  # whether a single pair approaches, it looks itself
     for _ in range(REPEATS if count > 2 else 1):
         if count > 2 and not _count_partners(Approaching(), contact, d, nodes, place, count):
@@ -284,13 +291,12 @@ def _touch_place(contact, d, nodes, values, place, count):
             n = _node(contact, place, i)
             for k in range(d):
                 nodes.update[n, k] += contact.change[i, k]
-                nodes.update[n, d + k] += contact.change[i, k]
+                nodes.update[n, of_change(kin) + k] += contact.change[i, k]
 
 
 @kernel
 def _touch_nodes(contact, kin, nodes, spans, values):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
-    d = dimension(kin)
     fields = contact.slot.size
     for a in range(fields):
         for k in range(3):
@@ -300,11 +306,11 @@ def _touch_nodes(contact, kin, nodes, spans, values):
                     values[contact.pair[a, b] + k] = 0.0
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
-            if not nodes.sums[n, 0] > 0:
+            if not nodes.sums[n, MASS] > 0:
                 continue
             count = _meet(contact, nodes, n)
             if count > 1:
-                _touch_place(contact, d, nodes, values, n % contact.stride, count)
+                _touch_place(contact, kin, nodes, values, n % contact.stride, count)
     for c in range(len(contact.copies)):
         for k in range(3):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
@@ -367,7 +373,7 @@ def _stay_nodes(contact, kin, nodes, spans, step):
     d = dimension(kin)
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
-            if not nodes.sums[n, 0] > 0:
+            if not nodes.sums[n, MASS] > 0:
                 continue
             count = _meet(contact, nodes, n)
             if count > 1:

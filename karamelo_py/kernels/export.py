@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from karamelo_py.compiler.compile import index, kernel, point_function
+from karamelo_py.compiler.compile import index, kernel
+from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.tuples import put_at, record, row, scale
-from karamelo_py.kernels.stages import place_at
+from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, reach, support
 from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
 from karamelo_py.points.laws import (
     cauchy_stress,
-    damage,
-    damage_initiation,
-    dissipated_energy,
     elastic_strain,
     energy_density,
     initial_state,
     jacobian,
-    plastic_strain,
+    shown,
     specific_volume,
-    temperature,
     with_stress,
 )
 
@@ -28,71 +23,12 @@ STRAIN, JACOBIAN, ENERGY = 6, 12, 13
 EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point
 
 
-class StoredEnergy(NamedTuple):
-    """Stored energy of a point."""
-
-
-class DissipatedEnergy(NamedTuple):
-    """Dissipated energy of a point."""
-
-
-class PlasticStrain(NamedTuple):
-    """Equivalent plastic strain."""
-
-
-class Damage(NamedTuple):
-    """Damage, from 0 to 1."""
-
-
-class DamageInitiation(NamedTuple):
-    """What grows to 1 before damage begins."""
-
-
-class Temperature(NamedTuple):
-    """Temperature."""
-
-
-@point_function()
-def measured(what, law, kin, state, volume):
-    """A number of a point with this reference volume."""
-
-
-@measured.on(StoredEnergy)
-def _(what, law, kin, state, volume):
-    return volume * energy_density(law, kin, state)
-
-
-@measured.on(DissipatedEnergy)
-def _(what, law, kin, state, volume):
-    return volume * dissipated_energy(law, kin, state)
-
-
-@measured.on(PlasticStrain)
-def _(what, law, kin, state, volume):
-    return plastic_strain(law, kin, state)
-
-
-@measured.on(Damage)
-def _(what, law, kin, state, volume):
-    return damage(law, kin, state)
-
-
-@measured.on(DamageInitiation)
-def _(what, law, kin, state, volume):
-    return damage_initiation(law, kin, state)
-
-
-@measured.on(Temperature)
-def _(what, law, kin, state, volume):
-    return temperature(law, kin, state)
-
-
 @kernel
 def export_state(kin, like, points, laws, out):
     """Fill ``out`` (n, EXPORTED) in the order of the points."""
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
-        state = row(points.state, p, 0, initial_state(law, kin, like))
+        state = load(points.state, p, initial_state(law, kin, like))
         put_at(out, p, 0, cauchy_stress(law, kin, state))
         put_at(out, p, STRAIN, elastic_strain(law, kin, state))
         out[p, JACOBIAN] = jacobian(law, kin, state)
@@ -101,12 +37,16 @@ def export_state(kin, like, points, laws, out):
 
 
 @kernel
-def export(what, kin, like, points, laws, out):
-    """One number ``out`` (n,) of each point, for laws that have it (`measured`)."""
+def export(what, times_volume, kin, like, points, laws, out):
+    """One number ``out`` (n,) of each point, declared by laws that have it (`columns_of`).
+
+    ``times_volume`` multiplies it by the reference volume: energies from their densities.
+    """
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
-        state = row(points.state, p, 0, initial_state(law, kin, like))
-        out[p] = measured(what, law, kin, state, points.mass[p] * specific_volume(law))
+        state = load(points.state, p, initial_state(law, kin, like))
+        number = shown(what, law, kin, state)
+        out[p] = points.mass[p] * specific_volume(law) * number if times_volume else number
 
 
 @kernel
@@ -119,29 +59,29 @@ def impose_stress(kin, like, points, laws, chosen, given, stress):
         if not chosen[p]:
             continue
         law = record(laws, points.material[p])
-        state = row(points.state, p, 0, initial_state(law, kin, like))
+        state = load(points.state, p, initial_state(law, kin, like))
         old = cauchy_stress(law, kin, state)
         for k in range(len(old)):
             if not given[k]:
                 stress[p, k] = old[k]
-        put_at(points.state, p, 0, with_stress(law, kin, state, row(stress, p, 0, old)))
+        store(points.state, p, with_stress(law, kin, state, row(stress, p, 0, old)))
 
 
 @kernel
 def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
-    """The moments ``out`` (n, d d) sum N v (X - x) of velocity fields with these gradients.
+    """The moments ``out`` (d d, n) sum N v (X - x) of velocity fields with these gradients.
 
-    ``where`` (n, w) are the places that the weights belong to, on the grids ``grid_of`` (n,).
+    ``where`` (w, n) are the places that the weights belong to, on the grids ``grid_of`` (n,).
     """
     flat = planar(kin)
-    for p in range(out.shape[0]):
+    for p in range(out.shape[1]):
         grid = record(grids, index(grid_of[p]))
         place = place_at(basis, kin, where, p)
         stencil = locate(basis, kin, grid, place)
         total = zero_tensor(flat, place[0])
-        gradient = row(gradients, p, 0, total)
+        gradient = load(gradients, p, total)
         for k in range(support(basis, kin)):
             weight = entry(basis, kin, grid, stencil, k)[1]
             arm = reach(basis, kin, grid, stencil, k)
             total = add_outer(flat, total, scale(weight, tensor_dot(flat, gradient, arm)), arm)
-        put_at(out, p, 0, total)
+        store(out, p, total)

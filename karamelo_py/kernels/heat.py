@@ -22,64 +22,44 @@ thermo-mechanical processes", for heat.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from karamelo_py.compiler.compile import (
     fma,
-    index,
     over_blocks,
     point_function,
     real,
     round_off,
     shared,
 )
-from karamelo_py.compiler.tuples import add_scaled, leading, put_at, record, row, scale, subtract
+from karamelo_py.compiler.fields import field, load, load_vector, scalar, store, vector
+from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
 from karamelo_py.kernels.arrays import (
-    CAPACITY,
-    CONDUCTANCE,
-    GRADIENT,
-    HEAT_LIMIT,
-    HEAT_REFERENCE,
-    NEW_RATE,
-    NOW,
+    ON_UPDATE,
+    ON_VELOCITY,
     POST_HEAT_TO_GRID,
     POST_UPDATE_GRID_HEAT,
-    SHARE,
-    SUPPLY,
     SUPPLY_HEAT,
-    TEMPERATURE,
     Hooks,
     Nodes,
     NoHooks,
 )
-from karamelo_py.kernels.hooks import ON_UPDATE, ON_VELOCITY, Warmth, node_hooks, point_hooks
-from karamelo_py.kernels.stages import (
-    AverageGrowth,
-    ClearGrowth,
-    ClearSums,
-    Nothing,
-    SumsToVelocity,
-    Update,
-    deformation_of,
-    empty,
-    gathered,
-    load,
-    restencil,
-    scattered,
-    settled,
-)
+from karamelo_py.kernels.g2p import NodalMean, empty, gathered, settled
+from karamelo_py.kernels.hooks import Warmth, node_hooks, point_hooks
+from karamelo_py.kernels.nodes import ClearMean, ClearSums, SumsToVelocity, TakeMean, Update
+from karamelo_py.kernels.p2g import load_of, scattered
 from karamelo_py.kernels.step import clear_totals, conduct, read_reports, step_size, visit_here
-from karamelo_py.kernels.sweep import sweep_nodes
+from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
+from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import drawn_back, thinning
 from karamelo_py.points.heat import face
-from karamelo_py.points.kinematics import Line, dimension, vector_at
+from karamelo_py.points.kinematics import Line, dimension
 from karamelo_py.points.laws import (
     conductivity,
     heat_capacity,
-    initial_state,
     jacobian,
     specific_volume,
     temperature,
@@ -87,24 +67,89 @@ from karamelo_py.points.laws import (
 )
 
 
+class Temperature(NamedTuple):
+    """Temperature of a point before the step."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+
+
+class Capacity(NamedTuple):
+    """Heat capacity of a point."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+
+
+class Conductance(NamedTuple):
+    """Conductivity times volume of a point."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+
+
+class Face(NamedTuple):
+    """Area that a point shows to what is around it."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+
+
+class Supply(NamedTuple):
+    """Heat per time that fixes bring to a point."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+    columns = ("gamma",)
+
+
+class Share(NamedTuple):
+    """Share of the change of the nodes' temperature that a point takes."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+
+
+class HeatGradient(NamedTuple):
+    """Gradient of temperature at a point."""
+
+    array: Any
+
+    shape = vector
+
+
 class Conducting(NamedTuple):
     """Heat flows through `nodes`, whose fields are those of velocities and of F-bar.
 
-    sums: capacity, heat, heat flow; update: T* and T* - T; velocity: T; growth: T weighted with
-    conductance, and conductance.
+    sums: capacity, heat, heat flow; update: T* and T* - T; velocity: T; mean: T weighted with
+    conductance.
     """
 
     nodes: Nodes
+
+    point_fields = (Temperature, Capacity, Conductance, Face, Supply, Share, HeatGradient)
 
 
 class HeatContent(NamedTuple):
     """Scatter heat capacity and heat, as if the points' gradients reached to the nodes."""
 
     sums: np.ndarray  # (N, 3)
-    levels: np.ndarray  # (N, 2)
+    mean: np.ndarray  # (N, 2)
 
-    reads = ("x", "mass", "state", "material", "heat")
-    writes = ("heat",)
+    says = "heat to grid"
+    reads = ("x", "mass", "state", "material", "heat gradient")
 
 
 class TemperatureGradient(NamedTuple):
@@ -112,8 +157,10 @@ class TemperatureGradient(NamedTuple):
 
     temperature: np.ndarray  # (N, 1)
 
+    strains = False
+    says = "gradient of temperature"
     reads = ("x",)
-    writes = ("heat",)
+    writes = ("heat gradient",)
 
 
 class HeatFlow(NamedTuple):
@@ -121,22 +168,24 @@ class HeatFlow(NamedTuple):
 
     sums: np.ndarray  # (N, 3)
 
-    reads = ("state", "material", "deformation", "heat")
-    writes = ()
+    says = "heat flow"
+    reads = ("state", "material", "deformation gradient", "heat gradient", "conductance")
 
 
 class Warming(NamedTuple):
     """Gather the change of the nodal temperature; settle the temperature of the point."""
 
     update: np.ndarray  # (N, 2)
-    levels: np.ndarray  # (N, 2)
+    mean: np.ndarray  # (N, 2)
 
-    reads = ("x", "state", "material", "heat")
+    strains = False
+    says = "temperature"
+    reads = ("x", "state", "material", "temperature", "capacity", "conductance", "share")
     writes = ("state",)
 
 
 @shared
-def held(weight):
+def at_least_round_off(weight):
     """`weight`, and next to nothing where it is nothing.
 
     A point that stands on a node has no weight at the next, but a gradient: that node needs the
@@ -148,117 +197,114 @@ def held(weight):
 # --- from points to nodes ---------------------------------------------------------------------
 
 
-@restencil.on(HeatContent)
-@restencil.on(HeatFlow)
-def _(scatter, w, stencil, p):
-    return stencil
-
-
-@load.on(HeatContent)
-def _(scatter, w, p, like):
-    law = record(w.laws, index(w.points.material[p]))
-    state = row(w.points.state, p, 0, initial_state(law, w.kin, like))
+@load_of.on(HeatContent)
+def _(quantity, w, p, like):
+    law = law_of(w, p)
+    state = state_of(w, law, p, like)
     mass = w.points.mass[p]
     volume = mass * specific_volume(law) * jacobian(law, w.kin, state)
     T = temperature(law, w.kin, state)
     capacity = mass * heat_capacity(law, like)
     conductance = volume * conductivity(law, like)
-    side = face(w.kin, volume, vector_at(w.kin, w.places.x, p))
+    fields = w.points.fields
+    field(fields, Temperature)[0, p] = T
+    field(fields, Capacity)[0, p] = capacity
+    field(fields, Conductance)[0, p] = conductance
+    field(fields, Face)[0, p] = face(w.kin, volume, load_vector(w.kin, w.places.x, p))
     # Fixes may supply heat, and reset what share of the change the point takes.
-    put_at(
-        w.points.heat,
-        p,
-        0,
-        (T, capacity, conductance, side, real(0, like), real(1, like)),
-    )
+    field(fields, Supply)[0, p] = real(0, like)
+    field(fields, Share)[0, p] = real(1, like)
     return capacity, conductance, T, _gradient(w, p)
 
 
 @shared
 def _gradient(w, p):
-    return row(w.points.heat, p, GRADIENT, vector_at(w.kin, w.points.v, p))
+    like = load_vector(w.kin, w.points.v, p)
+    return load(field(w.points.fields, HeatGradient), p, like)
 
 
 @scattered.on(HeatContent)
-def _(scatter, w, stencil, k, burden):
+def _(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    capacity, conductance, T, gradient = burden
-    weight = held(weight)
+    capacity, conductance, T, gradient = load
+    weight = at_least_round_off(weight)
     arm = reach(w.basis, w.kin, w.grid, stencil, k)
     for axis in range(len(gradient)):
         T = fma(gradient[axis], arm[axis], T)
     part = weight * capacity
-    scatter.sums[i, 0] += part
-    scatter.sums[i, 1] = fma(part, T, scatter.sums[i, 1])
+    quantity.sums[i, 0] += part
+    quantity.sums[i, 1] = fma(part, T, quantity.sums[i, 1])
     part = weight * conductance
-    scatter.levels[i, 0] = fma(part, T, scatter.levels[i, 0])
-    scatter.levels[i, 1] += part
+    quantity.mean[i, 0] = fma(part, T, quantity.mean[i, 0])
+    quantity.mean[i, 1] += part
 
 
-@load.on(HeatFlow)
-def _(scatter, w, p, like):
-    law = record(w.laws, index(w.points.material[p]))
-    state = row(w.points.state, p, 0, initial_state(law, w.kin, like))
+@load_of.on(HeatFlow)
+def _(quantity, w, p, like):
+    law = law_of(w, p)
+    state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     against = drawn_back(w.frame, w.kin, _gradient(w, p), f)
-    return scale(-w.points.heat[p, CONDUCTANCE], against), w.points.heat[p, SUPPLY]
+    fields = w.points.fields
+    return scale(-field(fields, Conductance)[0, p], against), field(fields, Supply)[0, p]
 
 
 @scattered.on(HeatFlow)
-def _(scatter, w, stencil, k, burden):
+def _(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-    flow, supply = burden
-    total = fma(held(weight), supply, scatter.sums[i, 2])
+    flow, supply = load
+    total = fma(at_least_round_off(weight), supply, quantity.sums[i, 2])
     for axis in range(len(flow)):
         total = fma(flow[axis], gradient[axis], total)
-    scatter.sums[i, 2] = total
+    quantity.sums[i, 2] = total
 
 
 # --- from nodes to points ---------------------------------------------------------------------
 
 
 @empty.on(TemperatureGradient)
-def _(gather, w, x):
+def _(task, w, x):
     return subtract(x, x)
 
 
 @gathered.on(TemperatureGradient)
-def _(gather, w, stencil, k, total):
+def _(task, w, stencil, k, total):
     i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     # An axisymmetric gradient has the part around the axis behind; a scalar has none there.
-    return add_scaled(total, gather.temperature[i, 0], leading(gradient, total))
+    return add_scaled(total, task.temperature[i, 0], leading(gradient, total))
 
 
 @settled.on(TemperatureGradient)
-def _(gather, w, stencil, p, dt, total, fastest):
-    put_at(w.points.heat, p, GRADIENT, total)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    store(field(w.points.fields, HeatGradient), p, total)
     return real(0, dt), fastest
 
 
 @empty.on(Warming)
-def _(gather, w, x):
+def _(task, w, x):
     zero = x[0] - x[0]
     return zero, zero
 
 
 @gathered.on(Warming)
-def _(gather, w, stencil, k, total):
+def _(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    return add_scaled(total, held(weight), (gather.update[i, 1], gather.levels[i, 0]))
+    return add_scaled(total, at_least_round_off(weight), (task.update[i, 1], task.mean[i, 0]))
 
 
 @settled.on(Warming)
-def _(gather, w, stencil, p, dt, total, fastest):
-    law = record(w.laws, index(w.points.material[p]))
-    state = row(w.points.state, p, 0, initial_state(law, w.kin, dt))
-    T = w.points.heat[p, TEMPERATURE]
-    capacity = w.points.heat[p, CAPACITY]
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    law = law_of(w, p)
+    state = state_of(w, law, p, dt)
+    fields = w.points.fields
+    T = field(fields, Temperature)[0, p]
+    capacity = field(fields, Capacity)[0, p]
     if capacity > 0:
-        rate = w.points.heat[p, CONDUCTANCE] / capacity * w.grid.inv_h * w.grid.inv_h
+        rate = field(fields, Conductance)[0, p] / capacity * w.grid.inv_h * w.grid.inv_h
         hidden = min(real(4 * dimension(w.kin), dt) * rate * dt, real(1, dt))
         change = total[0] + hidden * (total[1] - T)
-        T = fma(w.points.heat[p, SHARE], change, T)
-    put_at(w.points.state, p, 0, with_temperature(law, w.kin, state, T))
+        T = fma(field(fields, Share)[0, p], change, T)
+    store(w.points.state, p, with_temperature(law, w.kin, state, T))
     # By what factor conduction has become faster than in the undeformed body.
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     faster = jacobian(law, w.kin, state) * thinning(w.frame, w.kin, f, dt)
@@ -287,8 +333,18 @@ def _(hooks, stage, target, s):
 
 
 def _supply(block, s, hooks):
-    warmth = Warmth(block.points.heat, block.points.mass, block.x[s.control.whole[NOW]])
-    point_hooks(SUPPLY_HEAT, warmth, s.kin, block.id, hooks, s.control, step_size(s))
+    points = block.points
+    fields = points.fields
+    warmth = Warmth(
+        field(fields, Capacity),
+        field(fields, Temperature),
+        field(fields, Face),
+        field(fields, Supply),
+        field(fields, Share),
+        points.mass,
+        points.x[s.control.clock[0].now],
+    )
+    point_hooks(SUPPLY_HEAT, warmth, s.kin, points.id, hooks, s.control, step_size(s))
 
 
 _supply_blocks = over_blocks(_supply)
@@ -311,12 +367,19 @@ def _(hooks, s):
 
 
 @shared
+def content_and_warming(nodes):
+    """One loop for two visits: heat to the nodes, and temperature from them."""
+    mean = field(nodes.fields, NodalMean)
+    return Visit((Warming(nodes.update, mean),), (HeatContent(nodes.sums, mean),), OldWeights())
+
+
+@shared
 def map_heat(nodes, s, mode):
     """Heat capacity and heat of the nodes, from the points now."""
     dt = step_size(s)
     sweep_nodes(mode, ClearSums(), Line(), nodes, s.spans, dt)
-    sweep_nodes(mode, ClearGrowth(), Line(), nodes, s.spans, dt)
-    visit_here(s, mode, Nothing(), HeatContent(nodes.sums, nodes.growth), dt)
+    sweep_nodes(mode, ClearMean(), Line(), nodes, s.spans, dt)
+    visit_here(s, mode, content_and_warming(nodes), dt, False, True)
 
 
 @point_function()
@@ -342,13 +405,15 @@ def _(heat, s, mode, hooks):
     kin = Line()
     map_heat(nodes, s, mode)
     sweep_nodes(mode, SumsToVelocity(), kin, nodes, s.spans, dt)
-    sweep_nodes(mode, AverageGrowth(), kin, nodes, s.spans, dt)
+    sweep_nodes(mode, TakeMean(), kin, nodes, s.spans, dt)
     at_heat_nodes(hooks, POST_HEAT_TO_GRID, ON_VELOCITY, s)
     at_heated_points(hooks, s)
-    visit_here(s, mode, TemperatureGradient(nodes.velocity), HeatFlow(nodes.sums), dt)
+    flow = Visit((TemperatureGradient(nodes.velocity),), (HeatFlow(nodes.sums),), OldWeights())
+    visit_here(s, mode, flow, dt, True, True)
     sweep_nodes(mode, Update(), kin, nodes, s.spans, dt)
     at_heat_nodes(hooks, POST_UPDATE_GRID_HEAT, ON_UPDATE, s)
-    visit_here(s, mode, Warming(nodes.update, nodes.growth), Nothing(), dt)
+    visit_here(s, mode, content_and_warming(nodes), dt, True, False)
     # What `Warming` reports as a rate is by what factor conduction has become faster.
     read_reports(s)
-    s.control.real[HEAT_LIMIT] = s.control.real[HEAT_REFERENCE] / s.control.real[NEW_RATE]
+    clock = s.control.clock[0]
+    clock.heat_limit = clock.heat_reference / clock.new_rate

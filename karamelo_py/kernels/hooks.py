@@ -27,14 +27,12 @@ from numba import types
 from karamelo_py.compiler.compile import caller_of, kernel, point_function
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.kernels.arrays import (
-    ADDRESS,
     BEFORE,
-    CAPACITY,
-    CODE,
-    FACE,
     FINAL_INTEGRATE,
-    FROM,
     INITIAL_INTEGRATE,
+    MASS,
+    ON_SUMS,
+    ON_UPDATE,
     POST_ADVANCE_PARTICLES,
     POST_GRID_TO_POINT,
     POST_HEAT_TO_GRID,
@@ -42,26 +40,18 @@ from karamelo_py.kernels.arrays import (
     POST_UPDATE_GRID_HEAT,
     POST_UPDATE_GRID_STATE,
     POST_VELOCITIES_TO_GRID,
-    SHARE,
-    SLOT,
-    STAGE,
-    SUPPLY,
     SUPPLY_HEAT,
-    TEMPERATURE,
     TIME,
-    TO,
-    USES_BEFORE,
-    USES_SHARE,
     VALUE,
+    of_change,
+    of_force,
+    of_momentum,
 )
 from karamelo_py.points.kinematics import dimension
 
 _F8 = types.float64
 NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)
 POINT_FUNCTION = types.UniTuple(_F8, 3)(*[_F8] * 7)
-
-# Where in the node arrays a stage acts.
-ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 
 _call_node_function = caller_of(NODE_FUNCTION)
 _call_point_function = caller_of(POINT_FUNCTION)
@@ -123,17 +113,17 @@ def _evaluate(hooks, h, component, count, control, result, shift):
     """
     time = control.values[TIME]
     control.values[TIME] = time + shift
-    first = CODE + 4 * component
+    program = hooks.programs[h, component]
     call_evaluate(
         hooks.evaluate,
         hooks.code,
         hooks.constants,
         control.values,
         hooks.scratch,
-        hooks.table[h, first],
-        hooks.table[h, first + 1],
-        hooks.table[h, first + 2],
-        hooks.table[h, first + 3],
+        program.begin,
+        program.end,
+        program.first,
+        program.last,
         count,
         result,
     )
@@ -167,31 +157,31 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
     _locate_nodes(kin, grids, hooks, count)
     d = dimension(kin)
     for c in range(d):
-        if hooks.table[h, CODE + 4 * c] < 0:
+        if hooks.programs[h, c].begin < 0:
             continue
         _evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
-        if hooks.table[h, USES_BEFORE]:
+        if hooks.table[h].uses_before:
             _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -step_back)
         total = 0.0
         for q in range(count):
             n = hooks.chosen[q]
-            mass = nodes.sums[n, 0]
+            mass = nodes.sums[n, MASS]
             if target == ON_SUMS:
-                v = nodes.sums[n, 1 + c] / mass
+                v = nodes.sums[n, of_momentum(kin) + c] / mass
                 star = v
             elif target == ON_UPDATE:
                 star = nodes.update[n, c]
-                v = star - nodes.update[n, d + c]
+                v = star - nodes.update[n, of_change(kin) + c]
             else:
                 v = nodes.velocity[n, c]
                 star = v
             old = v
             v, star, force, part = _call_node_function(
-                hooks.table[h, ADDRESS],
+                hooks.table[h].address,
                 mass,
                 v,
                 star,
-                nodes.sums[n, 1 + d + c],
+                nodes.sums[n, of_force(kin) + c],
                 hooks.scratch[VALUE, q],
                 hooks.scratch[BEFORE, q],
                 dt,
@@ -202,13 +192,13 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
                 # Points that keep their velocity take the change v* - v: another v is an impulse.
                 total += kept * mass * (old - v) / dt
             if target == ON_SUMS:
-                nodes.sums[n, 1 + d + c] = force
+                nodes.sums[n, of_force(kin) + c] = force
             elif target == ON_UPDATE:
                 nodes.update[n, c] = star
-                nodes.update[n, d + c] = star - v
+                nodes.update[n, of_change(kin) + c] = star - v
             else:
                 nodes.velocity[n, c] = v
-        slot = hooks.table[h, SLOT]
+        slot = hooks.table[h].slot
         if slot >= 0:
             control.values[slot + c] += total
 
@@ -216,9 +206,9 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
 @kernel
 def clear_total(hooks, h, control):
     """The totals of a hook start from zero."""
-    slot = hooks.table[h, SLOT]
+    slot = hooks.table[h].slot
     for c in range(3):
-        if slot >= 0 and hooks.table[h, CODE + 4 * c] >= 0:
+        if slot >= 0 and hooks.programs[h, c].begin >= 0:
             control.values[slot + c] = 0.0
 
 
@@ -230,25 +220,25 @@ def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept
     """
     dt = float(dt)
     for h in range(len(hooks.table)):
-        if hooks.table[h, STAGE] != stage:
+        if hooks.table[h].stage != stage:
             continue
         clear_total(hooks, h, control)
         share = 1.0
         # The first pass only counts the members with mass, for those that share a total.
         for counting in (True, False):
-            if counting and not hooks.table[h, USES_SHARE]:
+            if counting and not hooks.table[h].uses_share:
                 continue
             heavy = 0
             count = np.int64(0)  # a bare 0 would be a type of its own
-            begin = hooks.table[h, FROM]
+            begin = hooks.table[h].begin
             everything = begin < 0
             ranges = spans[0, 0] if everything else 1
             for s in range(ranges):
                 low = spans[1 + s, 0] if everything else begin
-                high = spans[1 + s, 1] if everything else hooks.table[h, TO]
+                high = spans[1 + s, 1] if everything else hooks.table[h].end
                 for m in range(low, high):
                     n = m if everything else hooks.members[m]
-                    if not nodes.sums[n, 0] > 0:
+                    if not nodes.sums[n, MASS] > 0:
                         continue
                     heavy += 1
                     if counting:
@@ -274,9 +264,9 @@ class Motion(NamedTuple):
     Behind the d coordinates of a point, `y` has those of `corners` corners of its domain.
     """
 
-    v: np.ndarray
+    v: np.ndarray  # (d, n)
     mass: np.ndarray
-    x: np.ndarray
+    x: np.ndarray  # (w, n)
     y: np.ndarray
     corners: int
 
@@ -284,9 +274,13 @@ class Motion(NamedTuple):
 class Warmth(NamedTuple):
     """What heat functions change: the heat that points get."""
 
-    heat: np.ndarray
+    capacity: np.ndarray  # (1, n)
+    temperature: np.ndarray
+    face: np.ndarray
+    supply: np.ndarray
+    share: np.ndarray
     mass: np.ndarray
-    x: np.ndarray
+    x: np.ndarray  # (w, n)
 
 
 @point_function()
@@ -300,60 +294,59 @@ def _(what, kin, hooks, control, dt, h, count):
     step_back = min(dt, control.values[TIME])
     d = dimension(kin)
     for c in range(d):
-        if hooks.table[h, CODE + 4 * c] < 0:
+        if hooks.programs[h, c].begin < 0:
             continue
         _evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
-        if hooks.table[h, USES_BEFORE]:
+        if hooks.table[h].uses_before:
             _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -step_back)
         total = 0.0
         for q in range(count):
             p = hooks.chosen[q]
             velocity, place, part = _call_point_function(
-                hooks.table[h, ADDRESS],
+                hooks.table[h].address,
                 what.mass[p],
-                v[p, c],
-                what.x[p, c],
-                y[p, c],
+                v[c, p],
+                what.x[c, p],
+                y[c, p],
                 hooks.scratch[VALUE, q],
                 hooks.scratch[BEFORE, q],
                 dt,
             )
-            v[p, c] = velocity
+            v[c, p] = velocity
             # As far as a point moves, its corners do.
             for corner in range(what.corners):
-                y[p, d + d * corner + c] += place - y[p, c]
-            y[p, c] = place
+                y[d + d * corner + c, p] += place - y[c, p]
+            y[c, p] = place
             total += part
-        slot = hooks.table[h, SLOT]
+        slot = hooks.table[h].slot
         if slot >= 0:
             control.values[slot + c] += total
 
 
 @act_on_points.on(Warmth)
 def _(what, kin, hooks, control, dt, h, count):
-    heat = what.heat
     _evaluate(hooks, h, 0, count, control, np.int64(VALUE), 0.0)
-    if hooks.table[h, CODE + 4] >= 0:
+    if hooks.programs[h, 1].begin >= 0:
         _evaluate(hooks, h, 1, count, control, np.int64(BEFORE), 0.0)
     total = 0.0
     for q in range(count):
         p = hooks.chosen[q]
-        before = heat[p, SUPPLY]
+        before = what.supply[0, p]
         share, supply, T = _call_point_function(
-            hooks.table[h, ADDRESS],
-            heat[p, CAPACITY],
-            heat[p, TEMPERATURE],
-            heat[p, FACE],
+            hooks.table[h].address,
+            what.capacity[0, p],
+            what.temperature[0, p],
+            what.face[0, p],
             before,
             hooks.scratch[VALUE, q],
             hooks.scratch[BEFORE, q],
             dt,
         )
-        heat[p, SHARE] = min(heat[p, SHARE], share)
-        heat[p, SUPPLY] = supply
-        heat[p, TEMPERATURE] = T
+        what.share[0, p] = min(what.share[0, p], share)
+        what.supply[0, p] = supply
+        what.temperature[0, p] = T
         total += supply - before
-    slot = hooks.table[h, SLOT]
+    slot = hooks.table[h].slot
     if slot >= 0:
         control.values[slot] += total
 
@@ -365,7 +358,7 @@ def _apply_at_points(what, kin, ids, hooks, control, dt, h, count):
     for q in range(count):
         p = hooks.chosen[q]
         for c in range(dimension(kin)):
-            where[c, q] = what.x[p, c]
+            where[c, q] = what.x[c, p]
             where[3 + c, q] = hooks.x0[ids[p], c]
     act_on_points(what, kin, hooks, control, dt, h, count)
 
@@ -374,7 +367,7 @@ def _apply_at_points(what, kin, ids, hooks, control, dt, h, count):
 def clear_totals(stage, hooks, control):
     """Totals of point functions start from zero: they are summed over the blocks."""
     for h in range(len(hooks.table)):
-        if hooks.table[h, STAGE] == stage:
+        if hooks.table[h].stage == stage:
             clear_total(hooks, h, control)
 
 
@@ -386,10 +379,10 @@ def point_hooks(stage, what, kin, ids, hooks, control, dt):
         for q in range(BLOCK):
             hooks.scratch[axis, q] = 0.0
     for h in range(len(hooks.table)):
-        if hooks.table[h, STAGE] != stage:
+        if hooks.table[h].stage != stage:
             continue
         count = np.int64(0)
-        begin = hooks.table[h, FROM]
+        begin = hooks.table[h].begin
         for p in range(ids.size):
             if begin >= 0 and hooks.members[begin + ids[p]] == 0:
                 continue

@@ -1,4 +1,4 @@
-"""Laws of materials as a run needs them: in its precision, in tables, told apart by their types.
+"""Laws of materials as a run needs them: in its precision, and in tables.
 
 A law is a NamedTuple of numbers, or of parts that are NamedTuples of numbers
 (:mod:`karamelo_py.points.laws`).
@@ -6,19 +6,10 @@ A law is a NamedTuple of numbers, or of parts that are NamedTuples of numbers
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-
-
-def law_kind(law: NamedTuple) -> tuple[type, ...]:
-    """The classes of a law and of its parts: laws of one kind share kernels and arrays.
-
-    A table of laws (`law_table`) is of the kind of its laws.
-    """
-    parts = [law_kind(part) for part in law if isinstance(part, tuple)]
-    return type(law), *(kind for part in parts for kind in part)
 
 
 def law_in(law: NamedTuple, real: type) -> NamedTuple:
@@ -55,8 +46,3 @@ def law_on(law: NamedTuple, h: float, T0: float | None) -> NamedTuple:
 def elastic_law(law: NamedTuple) -> NamedTuple:
     """The law that makes the stress, of one that adds a temperature to it."""
     return getattr(law, "elastic", law)
-
-
-def can(law: NamedTuple, function: Callable) -> bool:
-    """Whether a point function is defined for a law, or for one of its parts."""
-    return any(function.defined(kind) for kind in law_kind(law))

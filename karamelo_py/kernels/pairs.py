@@ -12,7 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import kernel
-from karamelo_py.compiler.tuples import record, row, subtract
+from karamelo_py.compiler.fields import field, load
+from karamelo_py.compiler.tuples import record, subtract
+from karamelo_py.kernels.p2g import Force
 from karamelo_py.points.kinematics import dimension, vector_at
 from karamelo_py.points.laws import initial_state, jacobian, specific_volume
 from karamelo_py.points.pairs import force_between, radius
@@ -41,8 +43,9 @@ class Cells(NamedTuple):
 
 
 @kernel
-def collect(kin, x, points, laws, ids, begin1, end1, begin2, end2, bodies):
+def collect(kin, x, points, laws, begin1, end1, begin2, end2, bodies):
     """Take from a block the points whose ids lie in one of the two ranges."""
+    ids = points.id
     for p in range(ids.size):
         if begin1 <= ids[p] < end1:
             i = ids[p] - begin1
@@ -52,19 +55,20 @@ def collect(kin, x, points, laws, ids, begin1, end1, begin2, end2, bodies):
             continue
         law = record(laws, points.material[p])
         mass = points.mass[p]
-        state = row(points.state, p, 0, initial_state(law, kin, mass))
+        state = load(points.state, p, initial_state(law, kin, mass))
         volume = mass * specific_volume(law) * jacobian(law, kin, state)
         bodies.mass[i] = mass
         for k in range(dimension(kin)):
-            bodies.x[i, k] = x[p, k]
-            bodies.v[i, k] = points.v[p, k]
+            bodies.x[i, k] = x[k, p]
+            bodies.v[i, k] = points.v[k, p]
             bodies.force[i, k] = 0.0
         bodies.radius[i] = radius(kin, float(volume), vector_at(kin, bodies.x, i))
 
 
 @kernel
-def distribute(kin, points, ids, begin1, end1, begin2, end2, bodies):
+def distribute(kin, points, begin1, end1, begin2, end2, bodies):
     """Add the forces to the points of a block."""
+    ids = points.id
     for p in range(ids.size):
         if begin1 <= ids[p] < end1:
             i = ids[p] - begin1
@@ -73,7 +77,7 @@ def distribute(kin, points, ids, begin1, end1, begin2, end2, bodies):
         else:
             continue
         for k in range(dimension(kin)):
-            points.force[p, k] += bodies.force[i, k]
+            field(points.fields, Force)[k, p] += bodies.force[i, k]
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from karamelo_py.compiler.compile import kernel
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.stages import place_at
+from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
@@ -12,7 +12,7 @@ from karamelo_py.points.kinematics import dimension
 
 @kernel
 def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
-    """Stable counting sort of places `x` (n, w) by tile.
+    """Stable counting sort of places `x` (w, n) by tile.
 
     Tiles have `size` cells a direction; grid g has ``tiles[g]`` of them (g, 3), numbered from
     ``first[g]``. `of` (n,) is the grid of each point. `tile` (n,) takes the tile of each point,
@@ -20,21 +20,21 @@ def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
     of tile t + 1.
     """
     start[:] = 0
-    for p in range(len(x)):
+    for p in range(x.shape[1]):
         g = of[p]
         grid = record(grids, g)
         number = 0
         for k in range(dimension(kin)):
             last = cells_along(grid, k) - 1
             # Clamped, since a hook may have put a point anywhere: the next sweep finds it.
-            cell = min(max(int(in_cells(grid, k, x[p, k])), 0), last)
+            cell = min(max(int(in_cells(grid, k, x[k, p])), 0), last)
             number = number * tiles[g, k] + cell // size
         number += first[g]
         tile[p] = number
         start[number + 1] += 1
     for t in range(start.size - 1):
         start[t + 1] += start[t]
-    for p in range(len(x)):
+    for p in range(x.shape[1]):
         t = tile[p]
         order[start[t]] = p
         start[t] += 1
@@ -44,6 +44,6 @@ def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
 def widest(kin, basis, grids, x, of):
     """How far from its point a corner of a domain is at most, in cells."""
     far = 0.0
-    for p in range(len(x)):
+    for p in range(x.shape[1]):
         far = max(far, extent(basis, kin, record(grids, of[p]), place_at(basis, kin, x, p)))
     return far

@@ -1,83 +1,73 @@
-"""The parts of a step that schemes put together, and the loop over steps.
+"""A step from the table of its scheme, and the loop over steps.
 
-Every part takes a :class:`~karamelo_py.kernels.arrays.Setup` and runs over all its blocks. The
-same source serves two drivers: compiled, where many steps run in one call, and plain Python, where
-hooks that are written in Python are called between the parts.
+The same source serves two drivers: compiled, where many steps run in one call, and plain Python,
+where hooks that are written in Python are called between the rows.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import kernel, over_blocks, point_function, real, shared
-from karamelo_py.compiler.tuples import record, row, subtract
+from karamelo_py.compiler.compile import (
+    by_type,
+    define,
+    kernel,
+    over_blocks,
+    point_function,
+    real,
+    shared,
+)
+from karamelo_py.compiler.fields import load, load_vector
+from karamelo_py.compiler.tuples import record, subtract
+from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import (
-    COURANT,
-    DRIFT,
-    DRIFT_LIMIT,
     DT,
-    DT_FACTOR,
-    END_TIME,
-    FIRST_LIMIT,
-    FIXED_DT,
-    HEAT_LIMIT,
-    KEPT,
-    LIGHTEST,
-    LIMIT,
-    MOVE,
-    NEW_MOVE,
-    NEW_RATE,
-    NOW,
-    OVER_LIMIT,
+    MASS,
+    ON_SUMS,
+    ON_UPDATE,
     POST_ADVANCE_PARTICLES,
     POST_GRID_TO_POINT,
     POST_PARTICLES_TO_GRID,
     POST_UPDATE_GRID_STATE,
-    RATE,
-    SPACING,
     TIME,
     TIMESTEP,
-    WATCH_LIMIT,
-    WRONG,
     Hooks,
     NoHooks,
-    Places,
 )
-from karamelo_py.kernels.hooks import (
-    ON_SUMS,
-    ON_UPDATE,
-    Motion,
-    clear_totals,
-    node_hooks,
-    point_hooks,
-)
-from karamelo_py.kernels.stages import (
-    AveragedGradient,
-    AveragedSecondGradient,
-    AveragedVelocityAndGradient,
-    AverageGrowth,
-    ClearGrowth,
+from karamelo_py.kernels.g2p import FBar, Move, SeriesTerm, TrialStrain
+from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks
+from karamelo_py.kernels.nodes import (
+    ClearMean,
     ClearSums,
-    Echo,
+    ClearVelocity,
     ExtendSeries,
-    Gradient,
-    Growth,
-    Nothing,
-    SecondGradient,
-    Series,
+    MomentumToVelocity,
     StartSeries,
-    Trial,
+    TakeMean,
     Update,
-    Velocity,
-    VelocityAndGradient,
-    deformation_of,
+    UpdateToVelocity,
 )
-from karamelo_py.kernels.sweep import sweep_nodes, sweep_tiles
+from karamelo_py.kernels.p2g import (
+    InternalForce,
+    MassMomentum,
+    MomentumAgain,
+    SeriesBack,
+    Volumes,
+)
+from karamelo_py.kernels.sweep import (
+    OldWeights,
+    PresentWeights,
+    Visit,
+    sweep_nodes,
+    sweep_points,
+)
+from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.points.basis import placed
-from karamelo_py.points.frames import Total, Updated, follows, thinning
+from karamelo_py.points.frames import follows, thinning
 from karamelo_py.points.grid import inside
-from karamelo_py.points.kinematics import dimension, largest_component, vector_at
+from karamelo_py.points.kinematics import dimension, largest_component
 from karamelo_py.points.laws import initial_state, wave_speed_squared
 from karamelo_py.points.transfers.xpic import XPIC
 
@@ -90,54 +80,28 @@ class Staged(NamedTuple):
     """One visit for each stage, so that hooks on points can act in between."""
 
 
-@point_function(tags=2)
-def step(scheme, visits, mode, s, hooks, more):
-    """One step of `scheme`. With `more`, a fused step leaves the next step's sums on the nodes."""
+# --- visits -----------------------------------------------------------------------------------
 
 
-# --- parts ------------------------------------------------------------------------------------
-
-
-@point_function()
-def places_of(frame, block, now, then):
-    """Where the weights of a sweep belong, and where the points are before and after it."""
-
-
-@places_of.on(Updated)
-def _(frame, block, now, then):
-    return Places(block.x[now], block.x[now], block.x[then])
-
-
-@places_of.on(Total)
-def _(frame, block, now, then):
-    return Places(block.home, block.x[now], block.x[then])
-
-
-def _sweep(block, s, mode, gather, scatter, dt):
-    now = s.control.whole[NOW]
-    sweep_tiles(mode, gather, scatter, s, block, places_of(s.frame, block, now, 1 - now), dt)
-
-
-def _sweep_here(block, s, mode, gather, scatter, dt):
-    now = s.control.whole[NOW]
-    sweep_tiles(mode, gather, scatter, s, block, places_of(s.frame, block, now, now), dt)
+def _sweep(block, s, mode, visit, then, gathers, scatters, dt):
+    sweep_points(mode, visit, s, block, then, gathers, scatters, dt)
 
 
 _sweep_blocks = over_blocks(_sweep)
-_sweep_blocks_here = over_blocks(_sweep_here)
 
 
 @kernel
 def _read_reports(tiling, control):
+    clock = control.clock[0]
     rate = 0.0
     moved = 0.0
     for t in range(tiling.colour[-1]):
         moved = max(moved, tiling.report[t, 0])
         rate = max(rate, tiling.report[t, 1])
         if tiling.report[t, 2] > 0:
-            control.whole[WRONG] = 1
-    control.real[NEW_MOVE] = max(control.real[NEW_MOVE], moved)
-    control.real[NEW_RATE] = max(control.real[NEW_RATE], rate)
+            clock.wrong = 1
+    clock.new_move = max(clock.new_move, moved)
+    clock.new_rate = max(clock.new_rate, rate)
 
 
 def _survey(block, s):
@@ -150,58 +114,49 @@ _survey_blocks = over_blocks(_survey)
 @shared
 def read_reports(s):
     """Gather what the tiles reported: largest rate and move, and whether a point went wrong."""
-    s.control.real[NEW_RATE] = 0.0
-    s.control.real[NEW_MOVE] = 0.0
+    clock = s.control.clock[0]
+    clock.new_rate = 0.0
+    clock.new_move = 0.0
     _survey_blocks(s)
 
 
 @shared
-def _survey_all(s):
-    """Take over what the tiles reported; whether all points went well."""
+def visit_here(s, mode, visit, dt, gathers, scatters):
+    """Visit all points at their places now, where nothing can go wrong."""
+    _sweep_blocks(s, mode, visit, s.control.clock[0].now, gathers, scatters, dt)
+
+
+@shared
+def sweep(s, mode, visit, dt, gathers, scatters, moves):
+    """Visit all points; whether all went well. With `moves` new places go to the other array."""
+    clock = s.control.clock[0]
+    then = 1 - clock.now if moves else clock.now
+    _sweep_blocks(s, mode, visit, then, gathers, scatters, dt)
     read_reports(s)
     # Points move in one sweep of a step, and their domains may grow in another.
-    s.control.real[MOVE] += s.control.real[NEW_MOVE]
-    if s.control.real[NEW_RATE] > 0:
-        s.control.real[RATE] = s.control.real[NEW_RATE]
-    return s.control.whole[WRONG] == 0
-
-
-@shared
-def visit_here(s, mode, gather, scatter, dt):
-    """Visit all points at their positions now, where nothing can go wrong."""
-    _sweep_blocks_here(s, mode, gather, scatter, dt)
-
-
-@shared
-def sweep(s, mode, gather, scatter, dt):
-    """Visit all points, moving from the positions now to the next; whether all went well."""
-    _sweep_blocks(s, mode, gather, scatter, dt)
-    return _survey_all(s)
-
-
-@shared
-def sweep_here(s, mode, gather, scatter, dt):
-    """Visit all points at their positions now; whether all went well."""
-    _sweep_blocks_here(s, mode, gather, scatter, dt)
-    return _survey_all(s)
+    clock.move += clock.new_move
+    if clock.new_rate > 0:
+        clock.rate = clock.new_rate
+    return clock.wrong == 0
 
 
 @kernel
-def _look_at_moves(frame, kin, grids, x, of, tiling, control):
-    now = control.whole[NOW]
-    for p in range(x.shape[1]):
-        grid = record(grids, of[p])
-        y = vector_at(kin, x[1 - now], p)
-        step = largest_component(kin, subtract(y, vector_at(kin, x[now], p)))
+def _look_at_moves(frame, kin, grids, points, tiling, control):
+    clock = control.clock[0]
+    now = clock.now
+    for p in range(points.mass.size):
+        grid = record(grids, points.grid[p])
+        y = load_vector(kin, points.x[1 - now], p)
+        step = largest_component(kin, subtract(y, load_vector(kin, points.x[now], p)))
         cells = step * grid.inv_h
-        control.real[MOVE] = max(control.real[MOVE], cells)
+        clock.move = max(clock.move, cells)
         if not (cells <= 1 and (inside(grid, kin, y) or not follows(frame))):
-            control.whole[WRONG] = 1
+            clock.wrong = 1
             tiling.report[0, 2] = p + 1
 
 
 def _check_moves(block, s):
-    _look_at_moves(s.frame, s.kin, s.grids, block.x, block.grid, block.tiling, s.control)
+    _look_at_moves(s.frame, s.kin, s.grids, block.points, block.tiling, s.control)
 
 
 _check_moves_of_blocks = over_blocks(_check_moves)
@@ -211,13 +166,16 @@ _check_moves_of_blocks = over_blocks(_check_moves)
 def check_moves(s):
     """Look at the new positions again, after hooks that may have changed them."""
     _check_moves_of_blocks(s)
-    return s.control.whole[WRONG] == 0
+    return s.control.clock[0].wrong == 0
+
+
+# --- time -------------------------------------------------------------------------------------
 
 
 @shared
 def step_size(s):
     """dt of the present step, in the precision of the run."""
-    return real(s.control.values[DT], s.nodes.sums[0, 0])
+    return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 @kernel
@@ -228,14 +186,13 @@ def choose_dt(control):
     impulses that do not vanish with its length: in a last step that is a small part of the others,
     forces (impulses over dt) would be many times what they are before.
     """
-    real_, whole = control.real, control.whole
-    limit = real_[COURANT] * real_[SPACING] / real_[RATE] if real_[RATE] > 0 else inf
-    limit = min(limit, real_[HEAT_LIMIT])
-    real_[LIMIT] = limit
-    fixed = real_[FIXED_DT]
-    dt = fixed if fixed > 0 else real_[DT_FACTOR] * limit
-    whole[OVER_LIMIT] = whole[OVER_LIMIT] + 1 if dt > limit else 0
-    remaining = real_[END_TIME] - control.values[TIME]
+    clock = control.clock[0]
+    limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
+    limit = min(limit, clock.heat_limit)
+    clock.limit = limit
+    dt = clock.fixed_dt if clock.fixed_dt > 0 else clock.dt_factor * limit
+    clock.over_limit = clock.over_limit + 1 if dt > limit else 0
+    remaining = clock.end_time - control.values[TIME]
     # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end.
     if 0 < remaining <= dt * (1 + 1e-9):
         dt = remaining
@@ -247,19 +204,19 @@ def choose_dt(control):
 @kernel
 def finish(control):
     """End of a step: the points are where they moved to, time goes on, the next dt is chosen."""
-    control.whole[NOW] = 1 - control.whole[NOW]
+    clock = control.clock[0]
+    clock.now = 1 - clock.now
     dt = control.values[DT]
     time = control.values[TIME] + dt
-    end = control.real[END_TIME]
     # Exactly the end, when this step was shortened to reach it.
-    control.values[TIME] = end if end - control.values[TIME] == dt else time
+    control.values[TIME] = clock.end_time if clock.end_time - control.values[TIME] == dt else time
     control.values[TIMESTEP] += 1
-    control.real[DRIFT] += control.real[MOVE]
-    control.real[MOVE] = 0.0
+    clock.drift += clock.move
+    clock.move = 0.0
     choose_dt(control)
 
 
-# --- hooks ------------------------------------------------------------------------------------
+# --- fixes ------------------------------------------------------------------------------------
 
 
 @point_function()
@@ -275,7 +232,7 @@ def _(hooks, stage, target, s):
 @at_nodes.on(Hooks)
 def _(hooks, stage, target, s):
     dt = step_size(s)
-    kept = s.control.real[KEPT]
+    kept = s.control.clock[0].kept
     node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, dt, kept)
 
 
@@ -286,11 +243,9 @@ def corners_that_move(s):
 
 
 def _point_hooks(block, s, hooks, stage, now, then):
-    x = block.x[now]
-    y = block.x[then]
     points = block.points
-    motion = Motion(points.v, points.mass, x, y, corners_that_move(s))
-    point_hooks(stage, motion, s.kin, block.id, hooks, s.control, step_size(s))
+    motion = Motion(points.v, points.mass, points.x[now], points.x[then], corners_that_move(s))
+    point_hooks(stage, motion, s.kin, points.id, hooks, s.control, step_size(s))
 
 
 hook_points = over_blocks(_point_hooks)
@@ -309,48 +264,11 @@ def _(hooks, stage, then, s):
 @at_points.on(Hooks)
 def _(hooks, stage, then, s):
     clear_totals(stage, hooks, s.control)
-    now = s.control.whole[NOW]
+    now = s.control.clock[0].now
     hook_points(s, hooks, stage, now, 1 - now if then else now)
 
 
-@shared
-def light_node(s):
-    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of the lightest point.
-
-    Less than one: a share below m / m_p would be less than what comes back to the node through the
-    points' velocities, and the strain of the node would run ahead of its stress.
-    """
-    courant = s.control.real[RATE] * s.control.values[DT] / s.control.real[SPACING]
-    masses = min(dimension(s.kin) * courant * courant, 1.0)
-    return real(masses * s.control.real[LIGHTEST], s.nodes.sums[0, 0])
-
-
-# --- stages that schemes share ----------------------------------------------------------------
-
-
-@shared
-def map_to_nodes(s, mode, scatter):
-    """Fresh sums on the nodes, from the positions now; whether all points are on the grid."""
-    dt = step_size(s)
-    sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    return sweep_here(s, mode, Nothing(), scatter, dt)
-
-
-@shared
-def accelerate_nodes(s, mode, hooks):
-    """v* = v + dt f / m, with what the fixes add and prescribe; and heat flows."""
-    conduct(s.heat, s, mode, hooks)
-    at_nodes(hooks, POST_PARTICLES_TO_GRID, ON_SUMS, s)
-    sweep_nodes(mode, Update(), s.kin, s.nodes, s.spans, step_size(s))
-    at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_UPDATE, s)
-    touch(s.contact, s)
-
-
-@shared
-def update_nodes(s, mode, hooks):
-    """All of the nodes' update: what points gather is ready then."""
-    accelerate_nodes(s, mode, hooks)
-    sum_series(s.transfer, s, mode)
+# --- what only some scenes have ---------------------------------------------------------------
 
 
 class Insulated(NamedTuple):
@@ -406,79 +324,222 @@ def _(transfer, s, mode):
     dt = step_size(s)
     order = transfer.order
     factor = float(order)
+    visit = Visit((SeriesTerm(),), (SeriesBack(),), OldWeights())
     sweep_nodes(mode, StartSeries(real(factor - 1, dt)), s.kin, s.nodes, s.spans, dt)
     for k in range(2, order + 1):
-        visit_here(s, mode, Series(), Echo(), dt)
+        visit_here(s, mode, visit, dt, True, True)
         factor *= -float(order - k + 1) / k
         sweep_nodes(mode, ExtendSeries(real(factor, dt)), s.kin, s.nodes, s.spans, dt)
 
 
-class PointByPoint(NamedTuple):
-    """Every point has its own change of volume."""
-
-
-class FBar(NamedTuple):
-    """Changes of volume are averaged over the surroundings, against volumetric locking."""
-
-
 @point_function()
-def averaged(gather):
-    """The gather that takes the averaged change of volume."""
+def average_volumes(averaging, s, mode, dt):
+    """Average the change of volume of the strain to come at the nodes; by default it is not."""
 
 
-@averaged.on(Gradient)
-def _(gather):
-    return AveragedGradient()
+@average_volumes.otherwise
+def _(averaging, s, mode, dt):
+    return None
 
 
-@averaged.on(SecondGradient)
-def _(gather):
-    return AveragedSecondGradient()
-
-
-@averaged.on(VelocityAndGradient)
-def _(gather):
-    return AveragedVelocityAndGradient()
-
-
-@point_function()
-def strain(averaging, s, mode, gather, scatter, dt):
-    """Gather and settle, the gradient among it; whether all went well."""
-
-
-@strain.on(PointByPoint)
-def _(averaging, s, mode, gather, scatter, dt):
-    return sweep(s, mode, gather, scatter, dt)
-
-
-@strain.on(FBar)
-def _(averaging, s, mode, gather, scatter, dt):
-    sweep_nodes(mode, ClearGrowth(), s.kin, s.nodes, s.spans, dt)
-    visit_here(s, mode, Trial(), Growth(), dt)
-    sweep_nodes(mode, AverageGrowth(), s.kin, s.nodes, s.spans, dt)
-    return sweep(s, mode, averaged(gather), scatter, dt)
+@average_volumes.on(FBar)
+def _(averaging, s, mode, dt):
+    sweep_nodes(mode, ClearMean(), s.kin, s.nodes, s.spans, dt)
+    visit_here(s, mode, Visit((TrialStrain(),), (Volumes(),), OldWeights()), dt, True, True)
+    sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.spans, dt)
 
 
 @shared
-def move_points(s, mode, hooks):
-    """New velocities and positions, stage by stage; whether all points are on the grid."""
-    if not sweep(s, mode, Velocity(), Nothing(), step_size(s)):
-        return False
-    at_points(hooks, POST_GRID_TO_POINT, 1, s)
-    at_points(hooks, POST_ADVANCE_PARTICLES, 1, s)
-    return check_moves(s)
+def light_node(s):
+    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of the lightest point.
+
+    Less than one: a share below m / m_p would be less than what comes back to the node through the
+    points' velocities, and the strain of the node would run ahead of its stress.
+    """
+    clock = s.control.clock[0]
+    courant = clock.rate * s.control.values[DT] / clock.spacing
+    masses = min(dimension(s.kin) * courant * courant, 1.0)
+    return UpdateToVelocity(real(masses * clock.lightest, s.nodes.sums[0, MASS]))
+
+
+light_node.goes_through = UpdateToVelocity.goes_through
+
+
+def _call(text: str, says: Callable[[Any], str | None]) -> table.Call:
+    """A row that is the call `text`; `says` tells what it does in a scene."""
+    function = define("s, mode, hooks", text, **globals())
+    shared(function)
+    function.says = says
+    return table.Call(function)
+
+
+HEAT = _call(
+    "conduct(s.heat, s, mode, hooks)",
+    lambda s: (
+        None
+        if isinstance(s.heat, Insulated)
+        else "heat to the nodes, its flow, temperature of the points"
+    ),
+)
+CONTACT = _call(
+    "touch(s.contact, s)",
+    lambda s: "contact of v*" if touch.defined(type(s.contact)) else None,
+)
+CONTACT_BEFORE = _call("touch_velocity(s.contact, s, 0)", lambda s: None)
+CONTACT_AFTER = _call("touch_velocity(s.contact, s, 1)", lambda s: None)
+SERIES = _call(
+    "sum_series(s.transfer, s, mode)",
+    lambda s: "series of XPIC" if isinstance(s.transfer, XPIC) else None,
+)
+
+SUMS = table.Scatter((MassMomentum(), InternalForce()), PresentWeights(), ClearSums())
+MASS_AND_MOMENTUM = table.Scatter((MassMomentum(),), PresentWeights(), ClearSums())
+FORCE = table.Scatter((InternalForce(),), OldWeights())
+# v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
+ACCELERATE = (
+    HEAT,
+    table.AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS),
+    table.Nodes(Update()),
+    table.AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE),
+    CONTACT,
+)
+MOVE = (
+    table.Gather(Move()),
+    table.AtPoints(POST_GRID_TO_POINT, 1),
+    table.AtPoints(POST_ADVANCE_PARTICLES, 1),
+    table.Check(),
+)
+# The velocity of the moved points, at the nodes once more.
+MOMENTUM_AGAIN = (
+    table.Scatter((MomentumAgain(),), OldWeights(), ClearVelocity()),
+    table.Nodes(MomentumToVelocity()),
+)
+
+
+# --- a step -----------------------------------------------------------------------------------
+
+
+class _Spelled:
+    """Text of a function that takes the rows of a table in turn."""
+
+    def __init__(self) -> None:
+        self.names: dict[str, Any] = dict(globals())
+        self.lines = ["dt = step_size(s)"]
+
+    def name(self, thing: Any, stem: str) -> str:
+        """A name for something that the text refers to."""
+        name = f"{stem}{len(self.names)}"
+        self.names[name] = thing
+        return name
+
+    def tag(self, tag: NamedTuple) -> str:
+        """An expression that makes a tag without numbers, or a tuple of such."""
+        if type(tag) is tuple:
+            return f"({''.join(self.tag(one) + ', ' for one in tag)})"
+        made = self.name(type(tag), "tag")
+        return f"{made}({', '.join(self.tag(part) for part in tag)})"
+
+    def clear(self, task: NamedTuple, indent: str = "") -> None:
+        """The fields that a scatter adds to start from zero."""
+        self.lines.append(
+            f"{indent}sweep_nodes(mode, {self.tag(task)}, s.kin, s.nodes, s.spans, dt)"
+        )
+
+    def row(self, row: Any) -> None:
+        """One row of the table."""
+        add = self.lines.append
+        if isinstance(row, table.AtPoints):
+            add(f"at_points(hooks, {row.stage}, {row.then}, s)")
+        elif isinstance(row, table.AtNodes):
+            add(f"at_nodes(hooks, {row.stage}, {row.target}, s)")
+        elif isinstance(row, table.Call):
+            add(f"{self.name(row.function, 'call')}(s, mode, hooks)")
+        elif isinstance(row, table.Check):
+            add("if not check_moves(s): return False")
+        elif isinstance(row, table.Nodes):
+            made = callable(row.task)
+            task = f"{self.name(row.task, 'make')}(s)" if made else self.tag(row.task)
+            add(f"sweep_nodes(mode, {task}, s.kin, s.nodes, s.spans, dt)")
+        else:
+            self.sweep(row)
+
+    def sweep(self, row: table.Sweep) -> None:
+        """A visit of the points, and what comes before it."""
+        add = self.lines.append
+        if row.clears is not None:
+            if row.only_if_more:
+                add("if more:")
+            self.clear(row.clears, "    " if row.only_if_more else "")
+        length = "dt" if row.share == 1 else f"real({row.share}, dt) * dt"
+        if row.gathers and any(tag.strains for tag in row.visit.tasks):
+            add(f"average_volumes(s.averaging, s, mode, {length})")
+        scatters = "more" if row.only_if_more else str(row.scatters)
+        add(
+            f"if not sweep(s, mode, {self.tag(row.visit)}, {length}, {row.gathers}, {scatters}, "
+            f"{row.moves}): return False"
+        )
+
+
+def rows_of(scheme: type, visits: type) -> list[Any]:
+    """The rows of a step of `scheme`."""
+    return table.fused(scheme.rows) if visits is Fused else table.staged(scheme.rows)
+
+
+_steps: dict[tuple[type, type], Callable] = {}
+
+
+def _spelled_step(scheme: type, visits: type) -> Callable:
+    """One step, row after row."""
+    key = scheme, visits
+    if key not in _steps:
+        text = _Spelled()
+        for row in rows_of(scheme, visits):
+            text.row(row)
+        names = "scheme, visits, mode, s, hooks, more"
+        _steps[key] = define(names, *text.lines, "return True", **text.names)
+    return _steps[key]
+
+
+def step(scheme, visits, mode, s, hooks, more):
+    """One step of `scheme`. With `more`, a fused step leaves the next step's sums on the nodes.
+
+    Returns whether all points went well.
+    """
+    return _spelled_step(type(scheme), type(visits))(scheme, visits, mode, s, hooks, more)
+
+
+@by_type(step)
+def _step(scheme, visits, mode, s, hooks, more):
+    return _spelled_step(scheme.instance_class, visits.instance_class)
+
+
+_begins: dict[tuple[type, type], Callable] = {}
+
+
+def _spelled_begin(scheme: type, visits: type) -> Callable:
+    """Fused steps expect the sums on the nodes: the scatter of the last visit, alone."""
+    key = scheme, visits
+    if key not in _begins:
+        text = _Spelled()
+        if visits is Fused:
+            last = rows_of(scheme, Fused)[-1]
+            text.row(last._replace(gathers=False, only_if_more=False, moves=False))
+        names = "scheme, visits, mode, s"
+        _begins[key] = define(names, *text.lines, "return True", **text.names)
+    return _begins[key]
+
+
+def begin(scheme, visits, mode, s):
+    """Before the first of several steps; returns whether all points are on the grid."""
+    return _spelled_begin(type(scheme), type(visits))(scheme, visits, mode, s)
+
+
+@by_type(begin)
+def _begin(scheme, visits, mode, s):
+    return _spelled_begin(scheme.instance_class, visits.instance_class)
 
 
 # --- loop -------------------------------------------------------------------------------------
-
-
-@point_function(tags=2)
-def begin(scheme, visits, mode, s):
-    """Before the first of several steps: fused steps expect the sums on the nodes.
-
-    Returns whether all points are on the grid.
-    """
-
 
 DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK = range(5)
 PATIENCE = 50  # steps above the stable limit before a run is stopped
@@ -493,20 +554,21 @@ def run_steps(scheme, visits, mode, s, hooks, count):
     one can have left the surroundings of its tile. When that is depends on the points only, never
     on where a run is interrupted.
     """
-    control = s.control
+    values = s.control.values
+    clock = s.control.clock[0]
     if not begin(scheme, visits, mode, s):
         return STOPPED
     for n in range(count):
-        time = control.values[TIME] + control.values[DT]
-        last = n + 1 == count or time >= control.real[END_TIME]
+        time = values[TIME] + values[DT]
+        last = n + 1 == count or time >= clock.end_time
         if not step(scheme, visits, mode, s, hooks, not last):
             return STOPPED
-        finish(control)
-        if control.whole[WATCH_LIMIT] > 0 and control.whole[OVER_LIMIT] >= PATIENCE:
+        finish(s.control)
+        if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
             return ABOVE_LIMIT
-        if control.real[LIMIT] < SMALLEST * control.real[FIRST_LIMIT]:
+        if clock.limit < SMALLEST * clock.first_limit:
             return SHRUNK
-        if control.real[DRIFT] > control.real[DRIFT_LIMIT]:
+        if clock.drift > clock.drift_limit:
             return SORT
         if last:
             break
@@ -518,15 +580,16 @@ advance = kernel(run_steps)
 
 @kernel
 def _fastest(frame, kin, points, laws, control):
+    clock = control.clock[0]
     rate = 0.0
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
         mass = points.mass[p]
-        state = row(points.state, p, 0, initial_state(law, kin, mass))
+        state = load(points.state, p, initial_state(law, kin, mass))
         f = deformation_of(frame, kin, law, state, points, p)
         speed = sqrt(wave_speed_squared(law, kin, state) * thinning(frame, kin, f, mass))
-        rate = max(rate, speed + largest_component(kin, vector_at(kin, points.v, p)))
-    control.real[RATE] = max(control.real[RATE], rate)
+        rate = max(rate, speed + largest_component(kin, load_vector(kin, points.v, p)))
+    clock.rate = max(clock.rate, rate)
 
 
 def _measure(block, s):
@@ -539,5 +602,5 @@ measure_blocks = over_blocks(_measure)
 @shared
 def measure(s):
     """The rate of the present state, for the first dt."""
-    s.control.real[RATE] = 0.0
+    s.control.clock[0].rate = 0.0
     measure_blocks(s)

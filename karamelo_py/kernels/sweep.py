@@ -7,26 +7,23 @@ points, whatever the number of threads.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from math import inf
+from typing import Any, NamedTuple
 
-from numba import prange
+from numba import prange, types
+from numba.extending import overload
 
-from karamelo_py.compiler.compile import index, kernel, point_function
+from karamelo_py.compiler.compile import by_type, define, index, kernel, point_function, real
+from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.stages import (
-    Work,
-    at_node,
-    empty,
-    gathered,
-    load,
-    place_at,
-    restencil,
-    scattered,
-    settled,
-)
+from karamelo_py.kernels.arrays import Places
+from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
+from karamelo_py.kernels.nodes import at_node
+from karamelo_py.kernels.p2g import load_all, scattered_all
+from karamelo_py.kernels.visit import Work, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
-from karamelo_py.points.kinematics import vector_at
-from karamelo_py.points.laws import assemble, separate
+from karamelo_py.points.frames import Total, Updated, follows
+from karamelo_py.points.grid import inside
 
 
 class Serial(NamedTuple):
@@ -37,102 +34,196 @@ class Threaded(NamedTuple):
     """All threads that Numba was given."""
 
 
+class Visit(NamedTuple):
+    """What a visit of the points does: tags of its tasks, then of what it scatters."""
+
+    tasks: tuple
+    quantities: tuple
+    weights: NamedTuple  # of the scatter
+
+
+class Context(NamedTuple):
+    """What of a setup a sweep over the points needs."""
+
+    frame: NamedTuple
+    kin: NamedTuple
+    basis: NamedTuple
+    transfer: NamedTuple
+    averaging: NamedTuple
+    grids: NamedTuple
+    nodes: NamedTuple
+    now: int
+
+
+class OldWeights(NamedTuple):
+    """The weights of the gather, of the place before the move."""
+
+
+class PresentWeights(NamedTuple):
+    """The weights of the place after the move."""
+
+
+@point_function()
+def restencil(weights, w, stencil, p):
+    """The stencil of the scatter."""
+
+
+@restencil.on(OldWeights)
+def _(weights, w, stencil, p):
+    return stencil
+
+
+@restencil.on(PresentWeights)
+def _(weights, w, stencil, p):
+    return present_stencil(w.frame, w, stencil, p)
+
+
+@point_function()
+def places_of(frame, points, now, then):
+    """Where the weights of a sweep belong, and where the points are before and after it."""
+
+
+@places_of.on(Updated)
+def _(frame, points, now, then):
+    return Places(points.x[now], points.x[now], points.x[then])
+
+
+@places_of.on(Total)
+def _(frame, points, now, then):
+    return Places(points.home, points.x[now], points.x[then])
+
+
 @kernel
-def sweep_tile(
-    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling, places, dt, t
-):
-    """Visit the points of the t-th occupied tile of a block."""
-    grid = record(grids, tiling.grid[t])
-    w = Work(frame, kin, basis, grid, transfer, nodes, points, laws, places)
+def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
+    """Visit the points of the t-th occupied tile of a block in the context `s`.
+
+    With `gathers` the tasks of the visit are done, with `scatters` its quantities scattered: one
+    loop serves a scheme's fused and its single stages. `then` says which of the two arrays of
+    places takes the new ones.
+    """
+    points, tiling = block.points, block.tiling
+    grid = record(s.grids, tiling.grid[t])
+    places = places_of(s.frame, points, s.now, then)
+    w = Work(
+        s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, s.nodes, points, block.laws, places
+    )
     furthest = dt - dt
     fastest = dt - dt
     wrong = 0
     for q in range(tiling.range[t, 0], tiling.range[t, 1]):
         p = index(q)
-        x = vector_at(kin, places.x, p)
-        stencil = locate(basis, kin, grid, place_at(basis, kin, places.where, p))
-        total = empty(gather, w, x)
-        for k in range(support(basis, kin)):
-            total = gathered(gather, w, stencil, k, total)
-        moved, rate = settled(gather, w, stencil, p, dt, total, fastest)
+        stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
+        moved = real(0, dt)
+        rate = fastest
+        if gathers:
+            totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
+            for k in range(support(s.basis, s.kin)):
+                totals = gathered_all(visit.tasks, w, stencil, k, totals)
+            moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
+        elif follows(s.frame) and not inside(grid, s.kin, load_vector(s.kin, places.x, p)):
+            moved = real(inf, dt)
         if not (moved <= 1 and rate < 1e300):  # so written, NaN counts as wrong too
             wrong = q + 1
             continue
         furthest = max(furthest, moved)
         fastest = rate
-        stencil = restencil(scatter, w, stencil, p)
-        burden = load(scatter, w, p, dt)
-        for k in range(support(basis, kin)):
-            scattered(scatter, w, stencil, k, burden)
+        if scatters:
+            stencil = restencil(visit.weights, w, stencil, p)
+            loads = load_all(visit.quantities, w, p, dt)
+            for k in range(support(s.basis, s.kin)):
+                scattered_all(visit.quantities, w, stencil, k, loads)
     tiling.report[t, 0] = furthest
     tiling.report[t, 1] = fastest
     tiling.report[t, 2] = wrong
 
 
 @kernel
-def _tiles_serial(
-    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling, places, dt
-):
-    for t in range(tiling.colour[-1]):
-        sweep_tile(
-            gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling,
-            places, dt, t,
-        )  # fmt: skip
-
-
-@kernel(parallel=True)
-def _tiles_threaded(
-    gather, scatter, frame, kin, basis, grids, transfer, nodes, points, law, first, second, third,
-    fourth, fifth, tiling, places, dt,
-):  # fmt: skip
-    for c in range(tiling.colour.size - 1):
-        for t in prange(tiling.colour[c], tiling.colour[c + 1]):
-            laws = assemble(law, first, second, third, fourth, fifth)
-            sweep_tile(
-                gather, scatter, frame, kin, basis, grids, transfer, nodes, points, laws, tiling,
-                places, dt, t,
-            )  # fmt: skip
-
-
-@point_function()
-def sweep_tiles(mode, gather, scatter, s, block, places, dt):
-    """Sweep over the points of one block of the setup `s`."""
-
-
-@sweep_tiles.on(Serial)
-def _(mode, gather, scatter, s, block, places, dt):
-    _tiles_serial(
-        gather, scatter, s.frame, s.kin, s.basis, s.grids, s.transfer, s.nodes, block.points,
-        block.laws, block.tiling, places, dt,
-    )  # fmt: skip
-
-
-@sweep_tiles.on(Threaded)
-def _(mode, gather, scatter, s, block, places, dt):
-    law, parts = separate(block.laws)
-    _tiles_threaded(
-        gather, scatter, s.frame, s.kin, s.basis, s.grids, s.transfer, s.nodes, block.points, law,
-        parts[0], parts[1], parts[2], parts[3], parts[4], block.tiling, places, dt,
-    )  # fmt: skip
-
-
-@kernel
-def visit_span(task, kin, nodes, spans, dt, s):
-    """Do `task` at the nodes of the s-th span."""
-    for n in range(spans[s, 0], spans[s, 1]):
+def visit_nodes(task, kin, nodes, spans, dt, t):
+    """Do `task` at the nodes of the t-th span."""
+    for n in range(spans[1 + t, 0], spans[1 + t, 1]):
         at_node(task, kin, nodes, index(n), dt)
 
 
-@kernel
-def _spans_serial(task, kin, nodes, spans, dt):
-    for s in range(1, 1 + spans[0, 0]):
-        visit_span(task, kin, nodes, spans, dt, s)
+# --- threads ----------------------------------------------------------------------------------
 
 
-@kernel(parallel=True)
-def _spans_threaded(task, kin, nodes, spans, dt):
-    for s in prange(1, 1 + spans[0, 0]):
-        visit_span(task, kin, nodes, spans, dt, s)
+def _leaves(numba_type: Any, path: str, names: dict[str, Any], leaves: dict[str, str]) -> str:
+    """An expression that makes a tuple of this type again from the numbers and arrays in it."""
+    if not isinstance(numba_type, types.BaseTuple):
+        leaf = f"v{len(leaves)}"
+        leaves[leaf] = path
+        return leaf
+    items = [_leaves(t, f"{path}[{k}]", names, leaves) for k, t in enumerate(numba_type)]
+    if isinstance(numba_type, types.BaseNamedTuple):
+        make = f"make{len(names)}"
+        names[make] = numba_type.instance_class
+        return f"{make}({', '.join(items)})"
+    return f"({''.join(item + ', ' for item in items)})"
+
+
+def in_threads(function: Any, parameters: str) -> Any:
+    """Make ``f(mode, begin, end, ...)``: ``function(..., t)`` for each t from begin to end.
+
+    Numba hands tuples of arrays to threads, but no tuples of such tuples: they are taken apart
+    before and put together again in each thread.
+    """
+
+    def loop(mode, begin, end, *arguments):
+        for t in range(begin, end):
+            function(*arguments, t)
+
+    def written_out(mode, begin, end, *arguments):
+        names = {"function": function, "prange": prange}
+        threaded = mode.instance_class is Threaded
+        leaves: dict[str, str] = {}
+        again = [
+            _leaves(t, name, names, leaves) if threaded else name
+            for t, name in zip(arguments, parameters.split(", "), strict=True)
+        ]
+        return define(
+            f"mode, begin, end, {parameters}",
+            *(f"{leaf} = {path}" for leaf, path in leaves.items()),
+            f"for t in {'prange' if threaded else 'range'}(begin, end):",
+            f"    function({', '.join(again)}, t)",
+            **names,
+        )
+
+    def threaded(mode, begin, end, *arguments):
+        if mode.instance_class is Threaded:
+            return written_out(mode, begin, end, *arguments)
+        return None
+
+    def serial(mode, begin, end, *arguments):
+        if mode.instance_class is Threaded:
+            return None
+        return written_out(mode, begin, end, *arguments)
+
+    options = {"parallel": True, "nogil": True, "error_model": "numpy"}
+    overload(loop, options, strict=False)(threaded)
+    by_type(loop)(serial)
+    return loop
+
+
+_visit_tiles = in_threads(visit_tile, "visit, s, block, then, gathers, scatters, dt")
+_visit_spans = in_threads(visit_nodes, "task, kin, nodes, spans, dt")
+
+
+@point_function()
+def sweep_points(mode, visit, s, block, then, gathers, scatters, dt):
+    """Sweep over the points of one block of the setup `s`."""
+
+
+@sweep_points.on(Serial)
+@sweep_points.on(Threaded)
+def _(mode, visit, s, block, then, gathers, scatters, dt):
+    colour = block.tiling.colour
+    context = Context(
+        s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.control.clock[0].now
+    )
+    for c in range(colour.size - 1):
+        _visit_tiles(
+            mode, colour[c], colour[c + 1], visit, context, block, then, gathers, scatters, dt
+        )
 
 
 @point_function()
@@ -141,10 +232,6 @@ def sweep_nodes(mode, task, kin, nodes, spans, dt):
 
 
 @sweep_nodes.on(Serial)
-def _(mode, task, kin, nodes, spans, dt):
-    _spans_serial(task, kin, nodes, spans, dt)
-
-
 @sweep_nodes.on(Threaded)
 def _(mode, task, kin, nodes, spans, dt):
-    _spans_threaded(task, kin, nodes, spans, dt)
+    _visit_spans(mode, 0, spans[0, 0], task, kin, nodes, spans, dt)

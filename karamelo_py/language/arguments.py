@@ -120,3 +120,25 @@ class Argument:
             return None
         start = self._raw.source.text.index("=", self._raw.start) + 1
         return match[1], Argument(Raw(self._raw.source, start, self._raw.end), self._interpreter)
+
+
+def look_up(catalogue: Any, argument: Argument):
+    """The part of the scene that `argument` names.
+
+    Raises
+    ------
+    ScriptError
+        When it is not a name, or an unknown one.
+    """
+    word = argument.word()
+    if word is None:
+        article = "an" if catalogue.kind[0] in "aeiou" else "a"
+        raise ScriptError(
+            f"'{argument.text}' is not the ID of {article} {catalogue.kind}", place=argument.place
+        )
+    try:
+        return catalogue[word]
+    except ScriptError as error:
+        if error.place is None:
+            error.place = argument.place
+        raise

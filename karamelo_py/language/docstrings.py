@@ -8,15 +8,10 @@ import re
 
 def sections(doc: str) -> tuple[str, dict[str, str]]:
     """The head of a docstring, and its sections by title."""
-    pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}$", doc, flags=re.MULTILINE)
+    pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}$", inspect.cleandoc(doc), flags=re.MULTILINE)
     titles = [title.replace("Examples", "Example") for title in pieces[1::2]]
     texts = (text.strip("\n") for text in pieces[2::2])
     return pieces[0].strip(), dict(zip(titles, texts, strict=True))
-
-
-def documented(doc: str) -> dict[str, str]:
-    """Parameters that a docstring describes: name to description."""
-    return descriptions(sections(inspect.cleandoc(doc))[1].get("Parameters", ""))
 
 
 def descriptions(section: str) -> dict[str, str]:

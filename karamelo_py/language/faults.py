@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import re
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from numba.core.errors import NumbaError
 
 from karamelo_py.language import registry
 from karamelo_py.script.errors import Place, Quit, ScriptError
@@ -40,7 +43,11 @@ def told(name: str, where: str, code: Any, place: Place | None) -> Iterator[None
         family, style = (family, style) if style else ("command", family)
         known = registry.knows(family, style)
         package = f" (of {registry.origin(family, style)})" if known else ""
-        what = f"{type(error).__name__}: {error}{_line(error, code)}"
+        what = (
+            _cannot_compile(error, code)
+            if isinstance(error, NumbaError)
+            else f"{type(error).__name__}: {error}{_line(error, code)}"
+        )
         fault = ScriptError(
             f"{name}{package}: {where}: {what}",
             place=place,
@@ -48,6 +55,19 @@ def told(name: str, where: str, code: Any, place: Place | None) -> Iterator[None
         )
         fault.complete = True
         raise fault from error
+
+
+def _cannot_compile(error: NumbaError, code: Any) -> str:
+    """The cause that Numba gives, in one line, and where it sees it."""
+    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
+    place = re.search(r'File "(.*?)", line (\d+)', text)
+    if place:
+        file, line = place.groups()
+    else:
+        file, line = inspect.getsourcefile(code) or "", inspect.getsourcelines(code)[1]
+    causes = (line.strip() for line in text.splitlines() if not line.startswith("Failed in "))
+    cause = next(filter(None, causes), type(error).__name__)
+    return f"Numba cannot compile it: {cause} ({Path(file).name}:{line})"
 
 
 def _line(error: Exception, code: Any) -> str:

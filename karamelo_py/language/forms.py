@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 
 # Karamelo's own stand-in for infinity; scripts that write it mean INF.
 _HUGE = 1e20
@@ -111,12 +111,11 @@ class Forms:
         word, known = argument.word(), self.words[name]
         if word in known:
             return word
-        close = nearest(word, known) if word else None
         raise ScriptError(
             f"{name} must be one of {', '.join(known)}",
             place=argument.place,
             expected=self.line(dimension),
-            hint=f"did you mean '{close}'?" if close else None,
+            hint=meant(word, known) if word else None,
         )
 
 

@@ -28,6 +28,7 @@ from karamelo_py.script.syntax import (
     Statement,
 )
 
+_WORD = r"[^\W\d]\w*"
 _LARGEST_SCRIPT = 100_000_000
 MEANINGS = {
     "time": "the time of the run",
@@ -95,9 +96,7 @@ class Interpreter:
 
     def include(self, name: str) -> None:
         """Run another script at this place; the name is relative to the script that asks."""
-        path = self.folder / name
-        if not path.is_file() and (self._working_folder / name).is_file():
-            path = self._working_folder / name
+        path = self._included(name, self.folder)
         if any(frame.path and _same(frame.path, path) for frame in self._frames):
             raise ScriptError(
                 f"{name} includes itself",
@@ -113,6 +112,11 @@ class Interpreter:
         self._frames.append(_Frame(parse(text, str(path)), path))
         self._go_on(self._frames[-1])
         self._frames.pop()
+
+    def _included(self, name: str, folder: Path) -> Path:
+        path = folder / name
+        elsewhere = self._working_folder / name
+        return elsewhere if elsewhere.is_file() and not path.is_file() else path
 
     def rehearse(self, hub: Any) -> None:
         """Run all that comes after the statement in progress on another hub.
@@ -149,9 +153,10 @@ class Interpreter:
         return getattr(self.hub, "folder", None) or Path.cwd()
 
     def _run(self, statements: list[Statement], path: Path | None) -> None:
-        self._warn_of_unused_presets(statements)
         self._frames.append(_Frame(statements, path))
         try:
+            if self._presets:
+                self._refuse_unused_presets(statements)
             self._go_on(self._frames[-1])
         except Quit:
             return
@@ -225,10 +230,7 @@ class Interpreter:
                 "from here on it means the variable that is assigned here",
                 hint="choose another name",
             )
-        value = self._right_hand_side(statement.node, statement.right)
-        self.variables[name] = value
-        if getattr(self.hub, "verbose", False) and not getattr(self.hub, "rehearsing", False):
-            self.hub.console.say(f"{name} = {shown(value)}")
+        self.variables[name] = self._right_hand_side(statement.node, statement.right)
 
     def _right_hand_side(self, node: Node, raw: Raw) -> Value:
         try:
@@ -266,21 +268,43 @@ class Interpreter:
             if present is not None:
                 self.variables[name] = present
 
-    def _warn_of_unused_presets(self, statements: list[Statement]) -> None:
-        if not self._presets or not statements:
+    def _refuse_unused_presets(self, statements: list[Statement]) -> None:
+        """A variable of the command line that nothing reads or assigns is a slip of the pen."""
+        words = set(re.findall(_WORD, " ".join(self._presets.values())))
+        assigned: dict[str, None] = {}
+        if not self._collect(statements, self.folder, words, assigned, []):
             return
-        text = statements[0].raw.source.text
-        words = set(re.findall(r"[^\W\d]\w*", re.sub(r"#[^\n]*", "", text)))
-        if "include" in words:
-            return
-        assigned = [s.name for s in statements if isinstance(s, Assignment)]
         for name in self._presets:
             if name not in words:
                 close = nearest(name, assigned)
-                self._warn(
+                raise ScriptError(
                     f"-var {name}: the script has no variable '{name}'",
+                    expected=f"one of those that it assigns ({_listed(assigned)})",
                     hint=f"did you mean '{close}'?" if close else None,
                 )
+
+    def _collect(
+        self, statements: list[Statement], folder: Path, words: set, assigned: dict, seen: list
+    ) -> bool:
+        """Add the words and assigned names of statements and of all scripts that they include.
+
+        False where a script that is included cannot be told before it is.
+        """
+        code = statements[0].raw.source.text if statements else ""
+        words.update(re.findall(_WORD, re.sub(r'"[^"\n]*"|#[^\n]*', " ", code)))
+        for statement in statements:
+            if isinstance(statement, Assignment):
+                assigned[statement.name] = None
+            elif isinstance(statement, Call) and statement.name == "include":
+                if not statement.arguments:
+                    return False
+                path = self._included(statement.arguments[0].code.strip(' "'), folder)
+                if path in seen or not path.is_file():
+                    return False
+                inner = parse(read_script(path), str(path))
+                if not self._collect(inner, path.parent, words, assigned, [*seen, path]):
+                    return False
+        return True
 
     def _warn(self, message: str, hint: str | None = None) -> None:
         warn = getattr(self.hub, "warn", None)

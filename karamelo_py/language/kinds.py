@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import NULL, NUMBER, Argument
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import Place, ScriptError, nearest
+from karamelo_py.script.errors import Place, ScriptError, meant
 from karamelo_py.script.expressions import Expression, Formula, Value, number_text
 from karamelo_py.script.functions import WORDS
 
@@ -74,13 +74,12 @@ class InputFile:
                 return path
         here = folders[-1] / name
         siblings = [p.name for p in here.parent.iterdir()] if here.parent.is_dir() else []
-        close = nearest(here.name, siblings)
         what = "is a folder, not a file" if here.is_dir() else "does not exist"
         raise ScriptError(
             f"the file {name} {what}",
             place=argument.place,
             expected="a file in the current folder or beside the script",
-            hint=f"did you mean {close}?" if close else None,
+            hint=meant(here.name, siblings),
         )
 
 
@@ -155,8 +154,6 @@ def _shown(value: Value) -> str:
 
 
 def _to_number(hub: Any, argument: Argument) -> float:
-    if argument.is_null:
-        raise Unfit(NULL)
     if argument.text.lstrip("+-") in WORDS and argument.text not in argument._interpreter.variables:
         raise Unfit(argument.text)
     value = argument.value(hub)
@@ -184,8 +181,6 @@ def _to_integer(hub: Any, argument: Argument) -> int:
 
 
 def _to_text(hub: Any, argument: Argument) -> str:
-    if argument.is_null:
-        raise Unfit(NULL)
     word = argument.words()
     if word == argument.text:
         if NUMBER.fullmatch(word):
@@ -215,8 +210,6 @@ class StyleOf:
 
 
 def _to_expression(hub: Any, argument: Argument) -> Expression:
-    if argument.is_null:
-        raise Unfit(NULL)
     value = argument.value(hub)
     if isinstance(value, str):
         raise Unfit(_shown(value))
@@ -227,11 +220,7 @@ def _of_words(words: tuple[str, ...]) -> Callable[[Any, Argument], str]:
     def convert(hub: Any, argument: Argument) -> str:
         word = argument.words(words)
         if word not in words:
-            close = nearest(word, words)
-            raise Unfit(
-                f"'{word}'" if word != NULL else NULL,
-                hint=f"did you mean '{close}'?" if close else None,
-            )
+            raise Unfit(f"'{word}'", hint=meant(word, words))
         return word
 
     return convert
@@ -314,19 +303,13 @@ def _union(kinds: list[Kind]) -> Kind:
     nullable = any(kind.nullable for kind in kinds)
     words = tuple(word for kind in kinds for word in kind.words)
     # Words first: a literal word that is known wins over a variable of that name.
-    others = [kind for kind in kinds if not kind.words and kind.text != NULL]
-    choosers = [kind for kind in kinds if kind.words]
+    tried = sorted((kind for kind in kinds if kind.text != NULL), key=lambda kind: not kind.words)
 
     def convert(hub: Any, argument: Argument) -> Any:
         if nullable and argument.is_null:
             return None
         last: Exception | None = None
-        for kind in choosers:
-            try:
-                return kind.convert(hub, argument)
-            except (Unfit, ScriptError) as error:
-                last = error
-        for kind in others:
+        for kind in tried:
             try:
                 return kind.convert(hub, argument)
             except (Unfit, ScriptError) as error:

@@ -18,7 +18,7 @@ from typing import Any
 
 from karamelo_py import __version__
 from karamelo_py.script.elsewhere import instead
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 
 PREFIX = "karamelo_py."
 BUILT_IN = Path(__file__).parents[1] / "styles.toml"
@@ -71,11 +71,11 @@ def knows(family: str, name: str) -> bool:
 
 
 def name_of(family: str, style: type) -> str:
-    """What a script calls a class; the name of the class where it calls it nothing."""
-    value = f"{style.__module__}:{style.__qualname__}"
-    for name, entries in _families().get(family, {}).items():
-        if any(entry.value == value for entry in entries):
-            return name
+    """What a script calls a class, or the style beside it in its file; else the class's name."""
+    for value in (f"{style.__module__}:{style.__qualname__}", f"{style.__module__}:"):
+        for name, entries in _families().get(family, {}).items():
+            if any(entry.value.startswith(value) for entry in entries):
+                return name
     return style.__name__
 
 
@@ -120,8 +120,7 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
     styles = _families().get(family, {})
     if name in styles:
         return styles[name]
-    close = nearest(name, styles)
-    hint = instead(family, name) or (f"did you mean '{close}'?" if close else None)
+    hint = instead(family, name) or meant(name, styles)
     others = [other for other in families() if other != "command" and knows(other, name)]
     if hint is None and others:
         hint = f"'{name}' is a style of {' and of '.join(others)}"

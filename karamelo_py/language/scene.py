@@ -19,6 +19,7 @@ class Scene(Protocol):
     domain: Any
     regions: Any
     materials: Any
+    parts: Any
     solids: Any
     groups: Any
     fixes: Any

@@ -18,12 +18,12 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any, Literal, get_type_hints
 
 from karamelo_py.language import docstrings, registry
 from karamelo_py.language.arguments import NULL, Argument
-from karamelo_py.language.docstrings import documented
 from karamelo_py.language.faults import told
 from karamelo_py.language.kinds import (
     AtLeast,
@@ -38,26 +38,11 @@ from karamelo_py.language.kinds import (
     is_raw,
     kind_of,
 )
-from karamelo_py.script.errors import Place, ScriptError, nearest
+from karamelo_py.script.errors import Place, ScriptError, meant
 
 __all__ = [
-    "Argument",
-    "AtLeast",
-    "Constraint",
-    "Help",
-    "In",
-    "InputFile",
-    "NonNegative",
-    "OutputFile",
-    "Parameter",
-    "Positive",
-    "call",
-    "describe",
-    "documented",
-    "kind_of",
-    "parameters",
-    "syntax",
-]
+    "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
+]  # fmt: skip
 
 # Two words with nothing but blanks between them.
 _GAP = re.compile(r'[\w)"]\s+["\w.]')
@@ -87,45 +72,48 @@ class Parameter:
         return self.name
 
 
-_signatures: dict[Any, list[Parameter]] = {}
-
-
+@cache
 def parameters(target: Callable) -> list[Parameter]:
-    """The parameters of a command or style, without the hub.
+    """The parameters of a command or style, without the hub; of a record, its fields.
 
     Raises
     ------
     TypeError
         If the signature cannot be understood (a fault of whoever wrote it).
     """
-    if target not in _signatures:
-        function = target.__init__ if inspect.isclass(target) else target
-        function = inspect.unwrap(function)
-        found = list(inspect.signature(function).parameters.values())
-        skipped = 2 if inspect.isclass(target) else 1  # self and hub
-        _signatures[target] = [_parameter(p, function) for p in found[skipped:]]
-    return _signatures[target]
+    record = is_record(target)
+    try:
+        if record and not hasattr(target, "given"):
+            hints = get_type_hints(target, include_extras=True)
+            empty, defaults = inspect.Parameter.empty, target._field_defaults
+            return [_parameter(n, hints[n], defaults.get(n, empty)) for n in target._fields]
+        function = target.given if record else target
+        found = list(inspect.signature(function, eval_str=True).parameters.values())
+    except TypeError:
+        raise
+    except Exception as error:
+        raise TypeError(f"an annotation cannot be evaluated ({error})") from error
+    return [_parameter(p.name, p.annotation, p.default, p.kind) for p in found[not record :]]
 
 
-def _parameter(parameter: inspect.Parameter, function: Any) -> Parameter:
-    annotation = parameter.annotation
-    if isinstance(annotation, str):
-        # One by one: types that are imported for checking only may stand elsewhere.
-        try:
-            annotation = eval(annotation, function.__globals__)
-        except Exception as error:
-            raise TypeError(
-                f"the annotation {annotation!r} of {parameter.name} cannot be evaluated ({error}); "
-                "import it outside of TYPE_CHECKING"
-            ) from error
-    optional = parameter.default is not parameter.empty
+def is_record(target: Any) -> bool:
+    """Whether a style is a NamedTuple, a tag that needs no hub.
+
+    Its fields are its arguments, or those of its classmethod ``given`` where it has one. A method
+    ``checked`` returns what is used in its place.
+    """
+    return inspect.isclass(target) and issubclass(target, tuple)
+
+
+def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Parameter:
+    optional = default is not inspect.Parameter.empty
     return Parameter(
-        parameter.name,
+        name,
         kind_of(annotation),
-        variadic=parameter.kind is parameter.VAR_POSITIONAL,
-        keyword=parameter.kind is parameter.KEYWORD_ONLY,
+        variadic=kind is inspect.Parameter.VAR_POSITIONAL,
+        keyword=kind is inspect.Parameter.KEYWORD_ONLY,
         optional=optional,
-        default=parameter.default if optional else None,
+        default=default if optional else None,
     )
 
 
@@ -154,17 +142,16 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         raise ScriptError(f"{name} is broken: {error}") from error
     bound: dict[str, list[Argument]] = {}
     try:
-        positional, keywords = _bind(target, expected, arguments, name, bound)
+        _bind(target, expected, arguments, name, bound)
         values, named = [], {}
-        for number, (parameter, argument) in enumerate(positional, 1):
-            values.append(_convert(hub, parameter, argument, number))
-        for parameter, argument in keywords:
-            named[parameter.name] = _convert(hub, parameter, argument, None)
+        for parameter in expected:
+            for argument in bound.get(parameter.name, ()):
+                if parameter.keyword:
+                    named[parameter.name] = convert(hub, parameter, argument)
+                else:
+                    values.append(convert(hub, parameter, argument, len(values) + 1))
         try:
-            if not inspect.isclass(target):
-                return target(hub, *values, **named)
-            with told(name, "__init__", target, getattr(hub, "place", None)):
-                return target(hub, *values, **named)
+            return make(target, hub, name, *values, **named)
         except OSError as error:
             what = f"{error.filename}: " if error.filename else ""
             raise ScriptError(f"{what}{error.strerror or error}") from error
@@ -184,39 +171,42 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         raise
 
 
+def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:
+    """Call a command or make a style with values; a fault of its author is told as such."""
+    if not inspect.isclass(target):
+        return target(hub, *values, **named)
+    with told(name, "__init__", target, getattr(hub, "place", None)):
+        if not is_record(target):
+            return target(hub, *values, **named)
+        made = getattr(target, "given", target)(*values, **named)
+        return made.checked() if hasattr(made, "checked") else made
+
+
 def _bind(
     target: Callable,
     expected: list[Parameter],
     arguments: Sequence[Argument],
     name: str,
     bound: dict[str, list[Argument]],
-) -> tuple[list[tuple[Parameter, Argument]], list[tuple[Parameter, Argument]]]:
-    """Pair arguments with parameters by position, and by name where a name is given."""
+) -> None:
+    """Add to `bound` the arguments of each parameter: by position, or by name where it is given."""
     by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
     variadic = next((p for p in slots if p.variadic), None)
-    positional: list[tuple[Parameter, Argument]] = []
-    keywords: list[tuple[Parameter, Argument]] = []
     given = []
-    variadic = next((p for p in slots if p.variadic), None)
+    # Raw arguments are passed on to a style, which knows the names.
+    passed_on = variadic is not None and is_raw(variadic.kind)
     for argument in arguments:
         pair = argument.keyword()
-        # Raw arguments are passed on to a style, which knows the names.
-        passed_on = variadic is not None and is_raw(variadic.kind)
         if pair is None or (passed_on and pair[0] not in by_name):
             given.append(argument)
             continue
         word, value = pair
         if word not in by_name:
-            if variadic is not None and is_raw(variadic.kind):
-                # For the style that the command passes its arguments on to.
-                given.append(argument)
-                continue
             raise _unknown_keyword(word, argument, expected, by_name)
         if word in bound:
             raise ScriptError(f"{word} is given twice", place=argument.place)
         bound[word] = [value]
-        keywords.append((by_name[word], value))
     needed = sum(1 for p in slots if not p.optional and not p.variadic)
     missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
@@ -235,20 +225,16 @@ def _bind(
         )
     for k, argument in enumerate(given):
         parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic
-        assert parameter is not None
-        positional.append((parameter, argument))
         bound.setdefault(parameter.name, []).append(argument)
-    return positional, keywords
 
 
 def _unknown_keyword(
     word: str, argument: Argument, expected: list[Parameter], by_name: dict
 ) -> ScriptError:
-    close = nearest(word, by_name)
     if any(p.name == word for p in expected):
         hint: str | None = f"arguments are given by position: leave out '{word} ='"
     else:
-        hint = f"did you mean '{close}'?" if close else f"leave out '{word} ='; == compares"
+        hint = meant(word, by_name) or f"leave out '{word} ='; == compares"
     known = ", ".join(f"{name}=..." for name in by_name)
     return ScriptError(
         f"there is no argument to be given as '{word} = ...'",
@@ -258,7 +244,14 @@ def _unknown_keyword(
     )
 
 
-def _convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None) -> Any:
+def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
+    """What an argument, the one of this number, stands for as the value of a parameter.
+
+    Raises
+    ------
+    ScriptError
+        With its place if it is of another kind.
+    """
     if argument.is_null and not parameter.kind.nullable and not is_raw(parameter.kind):
         raise _misfit(parameter, argument, number, Unfit(NULL))
     try:
@@ -315,28 +308,42 @@ def _joined(expected: list[Parameter]) -> str:
     return text + "]" * open_brackets
 
 
-def _arguments(target: Callable) -> str:
-    """The arguments as they are written: the target's own `syntax`, or from its signature."""
-    own = getattr(target, "syntax", None)
-    return own if isinstance(own, str) else _joined(parameters(target))
+# The commands that name styles of families without a command of their own.
+_HOMES = {"transfer": "method", "basis": "method"}
 
 
 def syntax(target: Callable, name: str) -> str:
     """The line that shows how a command or style is called."""
-    own = _arguments(target)
+    own = getattr(target, "syntax", None)
+    if not isinstance(own, str):
+        own = _joined(told_of(target))
     family, _, style = name.partition(" ")
     if not style:
         return f"{name}({own})"
-    before = []
-    if registry.knows("command", family):
-        outer = [p for p in parameters(registry.find("command", family)) if not p.variadic]
-        # The last of the command's own arguments is the one that names the style.
-        before = [p.shown for p in outer[:-1] if not p.keyword]
+    command = _HOMES.get(family, family)
+    before = [style]
+    if registry.knows("command", command):
+        outer = parameters(registry.find("command", command))
+        outer = [p for p in outer if not p.variadic and not p.keyword]
+        before = [style if p.kind.family == family else p.shown for p in outer]
     if own.startswith("["):
         own = own.replace("[", "[, ", 1)
     elif own:
         own = ", " + own
-    return f"{family}({', '.join([*before, style])}{own})"
+    return f"{command}({', '.join(before)}{own})"
+
+
+def told_of(target: Callable) -> list[Parameter]:
+    """Parameters for help: with the word that chooses a variant of a style."""
+    variants = getattr(target, "variants", None)
+    if not variants:
+        return parameters(target)
+    # A method chooses by it the shape of domains, which must have one.
+    needed = not is_record(target)
+    default = getattr(target, "default_variant", None)
+    kind = kind_of(Literal[tuple(variants)])
+    variant = Parameter("variant", kind, optional=not needed, default=default)
+    return [variant, *parameters(target)] if needed else [*parameters(target), variant]
 
 
 # ---- help ---------------------------------------------------------------------------------------
@@ -373,16 +380,14 @@ class Help:
 
 def describe(target: Callable, name: str) -> Help:
     """Help about a command or style, from its signature and its docstring."""
-    doc = inspect.cleandoc(target.__doc__ or "")
-    if inspect.isclass(target) and "Parameters\n---" not in doc and target.__init__.__doc__:
-        doc = doc + "\n\n" + inspect.cleandoc(target.__init__.__doc__)
-    head, sections = docstrings.sections(doc)
+    head, sections = docstrings.sections(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
     descriptions = docstrings.descriptions(sections.pop("Parameters", ""))
-    described = [
-        Parameter(**{**vars(p), "description": descriptions.get(p.name, "")})
-        for p in parameters(target)
-    ]
+    if inspect.isclass(target):
+        inner = docstrings.sections(target.__init__.__doc__ or "")[1]
+        descriptions = docstrings.descriptions(inner.pop("Parameters", "")) | descriptions
+        sections = inner | sections
+    described = [replace(p, description=descriptions.get(p.name, "")) for p in told_of(target)]
     return Help(
         name, syntax(target, name), " ".join(summary.split()), text.strip(), described, sections
     )

@@ -11,6 +11,7 @@ import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, TextIO
 
 # Seconds between two redraws of the bar, and between two plain progress lines in a pipe.
@@ -49,14 +50,10 @@ class Console:
         self._err = err
         self._terminal = terminal
         self.quiet = quiet
-        self._broken = False
+        self._broken = self._running = False
         self._progress: Any = None
-        self._task: Any = None
-        self._rich: Any = None
-        self._running = False
-        self._started = self._shown = 0.0
-        self._begin_step = 0
-        self._begin_fraction = 0.0
+        self._begin = 0.0, 0, 0.0  # clock, step and fraction
+        self._shown = 0.0
         self._waiting: list[str] = []
         self._burst = 0
         self._last_line = self._released = 0.0
@@ -81,14 +78,16 @@ class Console:
 
     # Lines
 
-    def say(self, text: str = "") -> None:
-        """Write a line (or several)."""
+    def say(self, text: str = "", style: str | None = None) -> None:
+        """Write a line (or several); on a terminal in a style of Rich."""
         if self.quiet:
             return
         self._release()
         if self._progress is not None:
             # Rich writes it above the bar.
             self._progress.console.out(text, highlight=False)
+        elif style and self.terminal:
+            self._rich.out(text, style=style, highlight=False)
         else:
             self._write(text)
 
@@ -99,12 +98,8 @@ class Console:
 
     def log_line(self, text: str, header: bool = False) -> None:
         """Write a line of the log."""
-        if header and self.terminal and not self.quiet and self._progress is None:
-            self._rich_console().print(
-                text, style="bold", markup=False, highlight=False, soft_wrap=True
-            )
-        elif self._progress is None or self.quiet:
-            self.say(text)
+        if self._progress is None or self.quiet:
+            self.say(text, "bold" if header else None)
         else:
             now = time.perf_counter()
             self._burst = self._burst + 1 if now - self._last_line < QUICK else 0
@@ -115,7 +110,10 @@ class Console:
 
     def banner(self, title: str, facts: Mapping[str, Any]) -> None:
         """Write what is about to run: a title and facts, one line each."""
-        self._table(title, [(name, (show(value),)) for name, value in facts.items()])
+        names = max(map(len, facts), default=0)
+        rows = [f"  {name.ljust(names)}  {show(value)}" for name, value in facts.items()]
+        self.say(title, "bold")
+        self.say("\n".join(rows))
 
     def summary(
         self,
@@ -132,32 +130,29 @@ class Console:
         stages
             Name and seconds of each part of the run.
         """
-        rows = [(name, (show(value),)) for name, value in facts.items()]
-        total = sum(seconds for _, seconds in stages)
-        for name, seconds in stages:
-            share = f"{100 * seconds / total:.0f} %" if total > 0 else ""
-            rows.append((f"  {name}", (f"{seconds:.3g} s", share)))
-        self._table(title, rows)
+        total = sum(seconds for _, seconds in stages) or 1.0
+        parts = {
+            f"  {name}": f"{f'{seconds:.3g} s':>8}  {f'{100 * seconds / total:.0f} %':>8}"
+            for name, seconds in stages
+        }
+        self.banner(title, {**facts, **parts})
 
     # Progress
 
     def begin_run(self, step: int = 0, fraction: float = 0.0) -> None:
         """Start to measure a run's progress from `step`."""
-        self._started = self._shown = time.perf_counter()
-        self._begin_step, self._begin_fraction = step, fraction
+        self._shown = time.perf_counter()
+        self._begin = self._shown, step, fraction
         self._running = True
         if self.terminal and not self.quiet:
             from rich.progress import BarColumn, Progress, TextColumn
 
+            # Redrawn from `progress`: a thread of its own would wait for compiled loops anyway.
             self._progress = Progress(
-                BarColumn(bar_width=30),
-                TextColumn("{task.description}"),
-                console=self._rich_console(),
-                # Redrawn from `progress`: a thread of its own would wait for compiled loops anyway.
-                auto_refresh=False,
-                transient=True,
-            )
-            self._task = self._progress.add_task("", total=1.0, completed=fraction)
+                BarColumn(bar_width=30), TextColumn("{task.description}"),
+                console=self._rich, auto_refresh=False, transient=True,
+            )  # fmt: skip
+            self._progress.add_task("", total=1.0, completed=fraction)
             self._progress.start()
 
     def progress(self, step: int, time_: float, fraction: float | None = None) -> None:
@@ -171,18 +166,17 @@ class Console:
             Share of the run done, or None where nobody knows (run_until, run_while).
         """
         now = time.perf_counter()
-        if (
-            now - self._shown < (REDRAW if self._progress is not None else REPORT)
-            or not self._running
-        ):
+        pause = REDRAW if self._progress is not None else REPORT
+        if now - self._shown < pause or not self._running:
             return
         self._shown = now
         self._release()
         text = self._describe(step, time_, fraction, now)
         if self._progress is not None:
-            total = 1.0 if fraction is not None else None
+            (task,) = self._progress.tasks
+            task.total = 1.0 if fraction is not None else None
             self._progress.update(
-                self._task, total=total, completed=fraction or 0.0, description=text, refresh=True
+                task.id, completed=fraction or 0.0, description=text, refresh=True
             )
         else:
             self.say(f"# {text}")
@@ -196,15 +190,13 @@ class Console:
             progress.stop()
 
     def _describe(self, step: int, time_: float, fraction: float | None, now: float) -> str:
-        elapsed = max(now - self._started, 1e-9)
-        rate = (step - self._begin_step) / elapsed
-        parts = [f"step {step}", f"time {time_:.6g}", f"{rate:.3g} steps/s"]
+        begun, first, share = self._begin
+        elapsed = max(now - begun, 1e-9)
+        parts = [f"step {step}", f"time {time_:.6g}", f"{(step - first) / elapsed:.3g} steps/s"]
         if fraction is not None:
             parts.insert(0, f"{100 * fraction:3.0f} %")
-            done = fraction - self._begin_fraction
-            if done > 0:
-                left = max(0.0, elapsed * (1 - fraction) / done)
-                parts.append(f"{duration(left)} left")
+            if fraction > share:
+                parts.append(f"{duration(elapsed * (1 - fraction) / (fraction - share))} left")
         return ", ".join(parts)
 
     # How it gets there
@@ -216,38 +208,11 @@ class Console:
             self._released = time.perf_counter()
             self.say("\n".join(lines))
 
-    def _table(self, title: str, rows: Sequence[tuple[str, tuple[str, ...]]]) -> None:
-        if self.quiet:
-            return
-        if self.terminal and self._progress is None:
-            from rich.table import Table
-            from rich.text import Text
+    @cached_property
+    def _rich(self) -> Any:
+        from rich.console import Console as RichConsole
 
-            table = Table(
-                title=Text(title, style="bold"), show_header=False, box=None, title_justify="left"
-            )
-            width = max((len(cells) for _, cells in rows), default=1)
-            table.add_column(style="cyan", no_wrap=True)
-            for _ in range(width):
-                table.add_column(justify="left" if width == 1 else "right")
-            for name, cells in rows:
-                padded = [*cells, *[""] * (width - len(cells))]
-                table.add_row(Text(name), *(Text(cell) for cell in padded))
-            self._rich_console().print(table)
-            return
-        names = max((len(name) for name, _ in rows), default=0)
-        lines = [title]
-        for name, cells in rows:
-            rest = "  ".join(cell.rjust(8) if len(cells) > 1 else cell for cell in cells)
-            lines.append(f"  {name.ljust(names)}  {rest}")
-        self.say("\n".join(lines))
-
-    def _rich_console(self) -> Any:
-        if self._rich is None:
-            from rich.console import Console as RichConsole
-
-            self._rich = RichConsole(file=self._out, force_terminal=True if self._out else None)
-        return self._rich
+        return RichConsole(file=self._out, force_terminal=True if self._out else None)
 
     def _write(self, text: str) -> None:
         if self._broken:

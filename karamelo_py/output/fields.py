@@ -8,27 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import SUPPLY
+from karamelo_py.compiler import fields
+from karamelo_py.kernels.arrays import MASS, of_force
 from karamelo_py.kernels.export import (
     ENERGY,
     EXPORTED,
     JACOBIAN,
     STRAIN,
-    Damage,
-    DamageInitiation,
-    DissipatedEnergy,
-    PlasticStrain,
-    StoredEnergy,
-    Temperature,
     export,
     export_state,
     export_velocity_moment,
 )
-from karamelo_py.kernels.laws import can
 from karamelo_py.language.scene import Scene
-from karamelo_py.points.laws import dissipated_energy, energy_density, plastic_strain
-from karamelo_py.points.laws.damages import damage_begun
-from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density
+from karamelo_py.points.transfers import Moment
 
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
@@ -57,13 +50,6 @@ ABSENT_AT_POINTS = (
     "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
 )  # fmt: skip
 
-# What only some materials have: the number, and the function that shows that a law has it.
-OF_SOME = {
-    "ep": (PlasticStrain(), plastic_strain),
-    "damage": (Damage(), damage_begun),
-    "damage_init": (DamageInitiation(), damage_begun),
-    "T": (Temperature(), initial_heat),
-}
 ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez")
 
 
@@ -134,24 +120,28 @@ class Fields:
     def velocity_moment(self) -> np.ndarray | None:
         """(N, d d) moment of velocity, sum N v (X - x), of transfers that keep it, or None."""
         simulation = self._simulation
-        if simulation.setup.blocks[0].points.moment is None:
+        if simulation.declared(Moment) is None:
             return None
-        return simulation.by_id(self._velocity_moment)
+        return simulation.by_id(self._velocity_moment).T
 
-    def _velocity_moment(self, block: Any) -> np.ndarray:
+    def _velocity_moment(self, points: Any) -> np.ndarray:
         s = self._simulation.setup
-        kept = block.points.moment
+        kept = fields.field(points.fields, Moment)
         if not getattr(s.transfer, "keeps_gradient", False):
             return kept
-        where = block.x[self._simulation.now] if block.home is None else block.home
+        where = points.x[self._simulation.now] if points.home is None else points.home
         moment = np.zeros_like(kept)
-        export_velocity_moment(s.basis, s.kin, s.grids, block.grid, where, kept, moment)
+        export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
         return moment
 
     @property
-    def has_point_forces(self) -> bool:
-        """Whether a fix puts forces on points."""
-        return self._simulation.setup.blocks[0].points.force is not None
+    def declared(self) -> dict[str, tuple[type, int]]:
+        """Column -> the declared field of the points that shows it, and the component."""
+        return {
+            column: (kind, k)
+            for kind in self._simulation.point_fields
+            for k, column in enumerate(fields.columns_of(kind))
+        }
 
     def members(self, group: Any) -> np.ndarray:
         """Ids (0-based) of a particle group."""
@@ -165,30 +155,36 @@ class Fields:
 
     def strain_energy(self, group: Any) -> float:
         """Stored energy of a particle group."""
-        return self._energy(group, StoredEnergy(), energy_density)
+        return self._energy(group, energy_density)
 
     def dissipated_energy(self, group: Any) -> float:
         """Dissipated energy of a particle group."""
-        return self._energy(group, DissipatedEnergy(), dissipated_energy)
+        return self._energy(group, dissipated_energy)
 
-    def _energy(self, group: Any, what: Any, function: Any) -> float:
-        energy = self._cached(type(what).__name__, lambda s: _measured(s, what, function))
+    def _energy(self, group: Any, density: Callable) -> float:
+        energy = self._cached(density.__name__, lambda s: _energies(s, density))
         return float(energy.sum() if group.all else energy[group.ids].sum())
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
-        return list(PARTICLE_NAMES)
+        return list(dict.fromkeys([*PARTICLE_NAMES, *sorted(self._of_laws())]))
 
     def node_names(self) -> list[str]:
         """Names that `node` knows."""
         return list(NODE_NAMES)
 
+    def _of_laws(self) -> set[str]:
+        """Names of what the laws of the materials declare."""
+        laws = [material.law for material in self.hub.materials.values()]
+        return {name for law in laws for name in columns_of(law)}
+
     def absent_at_points(self) -> list[str]:
         """Names that `particle` knows, but that are 0 because no material has them."""
-        laws = [material.law for material in self.hub.materials.values()]
-        present = {name for name, (_, has) in OF_SOME.items() if any(can(law, has) for law in laws)}
+        present = self._of_laws()
         if self.hub.update.thermal:
             present.add("gamma")
+        kinds = fields.declared(self.hub.fixes.values(), "point_fields")
+        present.update(column for kind in kinds for column in fields.columns_of(kind))
         return [name for name in ABSENT_AT_POINTS if name not in present]
 
     def absent_at_nodes(self) -> list[str]:
@@ -223,17 +219,16 @@ class Fields:
             return self.reference_volume * self._exported[:, JACOBIAN]
         if name == "ienergy":
             return self._exported[:, ENERGY].copy()
-        if name in OF_SOME:
-            return self._cached(name, lambda s: _measured(s, *OF_SOME[name])).copy()
+        if name in self._of_laws():
+            return self._cached(name, lambda s: _shown(s, name)).copy()
         if name == "seq":
             return _von_mises(self._exported[:, :STRAIN])
         if name[:1] in "se" and name[1:] in COMPONENTS:
             first = 0 if name[0] == "s" else STRAIN
             return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
-        if name in ("bx", "by", "bz") and self.has_point_forces:
-            return _column(simulation.by_id(lambda b: b.points.force), AXES.index(name[1]))
-        if name == "gamma" and self.hub.update.thermal:
-            return _column(simulation.by_id(lambda b: b.points.heat), SUPPLY)
+        if name in self.declared:
+            kind, k = self.declared[name]
+            return _column(simulation.declared(kind), k)
         return np.zeros(simulation.count)
 
     def node(self, name: str) -> np.ndarray:
@@ -241,7 +236,7 @@ class Fields:
         self._simulation.show_on_nodes()
         nodes = self._simulation.setup.nodes
         d = self.hub.domain.dimension
-        mass = nodes.sums[:, 0].astype(float)
+        mass = nodes.sums[:, MASS].astype(float)
         if name == "id":
             return np.arange(self.node_count)
         if name == "type":
@@ -254,7 +249,7 @@ class Fields:
             return mass
         if name == "T" and self.hub.update.thermal:
             heat = self._simulation.setup.heat.nodes
-            return np.where(heat.sums[:, 0] > 0, heat.velocity[:, 0], 0.0)
+            return np.where(heat.sums[:, MASS] > 0, heat.velocity[:, 0], 0.0)
         if name in ABSENT_AT_NODES:
             return np.zeros(self.node_count)
         axis = AXES.index(name[1])
@@ -263,7 +258,7 @@ class Fields:
         field = {
             "v": nodes.velocity[:, axis],
             "u": nodes.update[:, axis],
-            "f": nodes.sums[:, 1 + d + axis],
+            "f": nodes.sums[:, of_force(self._simulation.setup.kin) + axis],
         }["u" if name.endswith("_update") else name[0]]
         return np.where(mass > 0, field, 0.0)
 
@@ -272,31 +267,40 @@ class Fields:
         return self._cached("exported", _exported_state)
 
 
-def _of_points(
-    simulation: Any, fill: Callable, *columns: int, has: Callable = lambda laws: True
-) -> np.ndarray:
-    """What `fill(kin, like, points, laws, rows)` says of all points, by id, (N, *columns).
+def _of_points(simulation: Any, filler: Callable, *columns: int) -> np.ndarray:
+    """What `filler(laws)(kin, like, points, laws, rows)` says of all points, by id, (N, *columns).
 
-    Points are left at 0 where the scene's laws do not have it.
+    Points are left at 0 where their laws do not have it, and `filler(laws)` is false.
     """
     s = simulation.setup
     out = np.zeros((simulation.count, *columns))
     for block in s.blocks:
-        if has(block.laws):
-            rows = np.zeros((len(block.id), *columns))
-            fill(s.kin, s.nodes.sums[0, 0], block.points, block.laws, rows)
-            out[block.id] = rows
+        if fill := filler(block.laws):
+            rows = np.zeros((len(block.points.id), *columns))
+            fill(s.kin, s.nodes.sums[0, MASS], block.points, block.laws, rows)
+            out[block.points.id] = rows
     return out
 
 
 def _exported_state(simulation: Any) -> np.ndarray:
     # A kinematics fills its own components: in the plane the fourth is 12, as in space.
-    return _of_points(simulation, export_state, EXPORTED)
+    return _of_points(simulation, lambda laws: export_state, EXPORTED)
 
 
-def _measured(simulation: Any, what: Any, function: Any) -> np.ndarray:
-    """A number of all points (`kernels.export.measured`)."""
-    return _of_points(simulation, partial(export, what), has=lambda laws: can(laws, function))
+def _energies(simulation: Any, density: Callable) -> np.ndarray:
+    """Energy of each point, from its density."""
+    fill = partial(export, density.tag, True)
+    return _of_points(simulation, lambda laws: fill if can(laws, density) else None)
+
+
+def _shown(simulation: Any, name: str) -> np.ndarray:
+    """A number of each point that its law declares, 0 of laws that do not."""
+
+    def fill(laws: Any) -> Callable | None:
+        what = columns_of(laws).get(name)
+        return None if what is None else partial(export, what, False)
+
+    return _of_points(simulation, fill)
 
 
 def _column(field: np.ndarray, k: int) -> np.ndarray:

@@ -8,9 +8,10 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.output.fields import PARTICLE_NAMES
 from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.expressions import POINT_SEEDS
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
-PER_POINT = frozenset({"x", "y", "z", "x0", "y0", "z0"})
+PER_POINT = frozenset(POINT_SEEDS)
 
 
 class Quantity:

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import by_type, define, point_function, real, shared
+from karamelo_py.compiler.fields import vector
 from karamelo_py.compiler.tuples import multiply_each
 from karamelo_py.points.grid import Grid, in_cells, pick
+
+
+class Bounces(NamedTuple):
+    """How often the edge of the domain has reflected a point, in each direction."""
+
+    array: Any
+
+    shape = vector
 
 
 class ReflectingGrid(Grid):
     """A grid that puts points back which have come beyond its edge."""
 
     __slots__ = ()
+    point_fields = (Bounces,)
 
 
 @point_function()

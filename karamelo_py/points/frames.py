@@ -7,15 +7,12 @@ needs the deformation gradient F of the points.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.fields import tensor
 from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
 from karamelo_py.points.kinematics import (
-    Axisymmetric,
-    Line,
-    PlaneStrain,
-    Space,
     add_symmetric_dot,
     add_tensor_dot,
     identity,
@@ -27,6 +24,8 @@ from karamelo_py.points.kinematics import (
     planar,
     zero_tensor,
 )
+from karamelo_py.points.kinematics.components import Number, formula
+from karamelo_py.points.laws import deformation
 
 
 class Updated(NamedTuple):
@@ -35,10 +34,29 @@ class Updated(NamedTuple):
     moves = True
 
 
+class DeformationGradient(NamedTuple):
+    """F, of laws whose state does not hold it."""
+
+    array: Any
+
+    shape = tensor
+
+    @staticmethod
+    def start(kin: Any) -> tuple[float, ...]:
+        """The unit tensor."""
+        return identity(kin, 1.0)
+
+    @staticmethod
+    def needed(law: type) -> bool:
+        """Whether a law has no F of its own."""
+        return not deformation.defined(law)
+
+
 class Total(NamedTuple):
     """Weights belong to the reference positions and never change (total Lagrangian)."""
 
     moves = False
+    point_fields = (DeformationGradient,)
 
 
 @point_function()
@@ -142,25 +160,10 @@ def _(frame, kin, dl, f, ratio):
     return add_scaled(scale(s, dl), s - real(1, s), f)
 
 
-@point_function()
-def stretched_share(kin, like):
+@formula()
+def stretched_share(kin, like: Number):
     """One over the number of directions that can stretch."""
-
-
-@stretched_share.on(Line)
-def _(kin, like):
-    return real(1, like)
-
-
-@stretched_share.on(PlaneStrain)
-def _(kin, like):
-    return real(0.5, like)
-
-
-@stretched_share.on(Axisymmetric)
-@stretched_share.on(Space)
-def _(kin, like):
-    return real(1 / 3, like)
+    return 1 / len(kin.axes)
 
 
 @point_function()

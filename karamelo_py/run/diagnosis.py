@@ -109,7 +109,7 @@ def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     """What is wrong with the first point that went wrong, and what can be done."""
-    wrong = [(int(block.id[p]), block, p) for block, p in simulation.wrong_points()]
+    wrong = [(int(block.points.id[p]), block, p) for block, p in simulation.wrong_points()]
     if not wrong and hub.update.thermal:
         return (
             "the temperature of a point is not a number",
@@ -120,12 +120,12 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     number, block, p = min(wrong, key=lambda item: item[0])
     now = simulation.now
     d = hub.domain.dimension
-    old, new = (block.x[k][p, :d].astype(float) for k in (now, 1 - now))
+    old, new = (block.points.x[k][:d, p].astype(float) for k in (now, 1 - now))
     name = _named(hub, simulation, number)
     smaller = _smaller_step(hub, simulation)
     if not np.isfinite(old).all():
         return f"{name} has no position (NaN)", f"look for a formula that gives NaN; {smaller}"
-    if not np.isfinite(new).all() or not np.isfinite(block.points.v[p]).all():
+    if not np.isfinite(new).all() or not np.isfinite(block.points.v[:, p]).all():
         return (
             f"{name} at {_place(old)} gets a velocity that is not a number",
             f"look for a formula that gives NaN, such as a division by zero; else {smaller}",
@@ -141,7 +141,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
             "make the domain larger, hold the point back with fix velocity_nodes at the wall, let "
             f"it go with boundary(delete), or, if it should not have got there, {smaller}",
         )
-    move = float(np.abs(new - old).max()) / hub.lattices[block.grid[p]].h
+    move = float(np.abs(new - old).max()) / hub.lattices[block.points.grid[p]].h
     if move > 1:
         return (
             f"{name} at {_place(old)} moves by {move:.3g} cells in one step",
@@ -167,8 +167,8 @@ def _tangled(simulation: Simulation, block: Block, p: int) -> str | None:
     s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return None
-    grid = record(s.grids, int(block.grid[p]))
-    place = tuple(float(a) for a in block.x[1 - simulation.now][p])
+    grid = record(s.grids, int(block.points.grid[p]))
+    place = tuple(float(a) for a in block.points.x[1 - simulation.now][:, p])
     return None if np.isfinite(extent(s.basis, s.kin, grid, place)) else type(s.basis).__name__
 
 

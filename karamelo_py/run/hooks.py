@@ -8,14 +8,17 @@ import numpy as np
 
 from karamelo_py.compiler.compile import address_of
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, MAX_DEPTH, STACK, evaluate_in_table
-from karamelo_py.kernels.arrays import HOOK_COLUMNS, Hooks, NoHooks
+from karamelo_py.kernels.arrays import HOOK, PROGRAM, Hooks, NoHooks
 from karamelo_py.kernels.hooks import (
     NODE_FUNCTION,
     POINT_FUNCTION,
     STAGES,
     CompiledHook,
 )
+from karamelo_py.language.faults import told
 from karamelo_py.scene.hub import Hub
+
+NO_PROGRAM = (-1, -1, -1, -1)
 
 
 def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
@@ -26,13 +29,14 @@ def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
     for fix in fixes:
         for name, hook in fix.hooks().items():
             if isinstance(hook, CompiledHook):
-                builder.add(fix, STAGES[name], hook)
+                builder.add(fix, name, hook)
     if not builder.rows:
         return NoHooks()
     x0 = np.concatenate([s.x0 for s in hub.solids.values()]) if builder.on_points else None
     return Hooks(
         evaluate=address_of(evaluate_in_table, EVALUATE),
-        table=np.array(builder.rows, np.int64).reshape(-1, HOOK_COLUMNS),
+        table=np.array(builder.rows, HOOK).view(np.recarray),
+        programs=np.array(builder.programs, PROGRAM).view(np.recarray),
         members=np.concatenate([np.empty(0, np.int64), *builder.members]),
         code=np.concatenate([np.empty((0, 2), np.int64), *builder.code]),
         constants=np.concatenate([np.empty(0), *builder.constants]),
@@ -49,13 +53,14 @@ class _Builder:
         self.hub = hub
         self.points = points
         self.on_points = False
-        self.rows: list[list[int]] = []
+        self.rows: list[tuple] = []
+        self.programs: list[list[tuple]] = []
         self.members: list[np.ndarray] = []
         self.code: list[np.ndarray] = []
         self.constants: list[np.ndarray] = []
 
-    def add(self, fix: Any, stage: int, hook: CompiledHook) -> None:
-        """Add one compiled hook of a fix."""
+    def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
+        """Add one compiled hook of a fix, which acts at `moment` of a step."""
         begin, end = self._members(fix.group, hook)
         slot = -1
         if hook.publishes and fix.published:
@@ -63,14 +68,14 @@ class _Builder:
             first = "x" if "x" in fix.published else fix.published[0]
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         signature = NODE_FUNCTION if hook.on_nodes else POINT_FUNCTION
-        address = address_of(hook.function, signature)
-        row = [address, stage, begin, end, slot, int(hook.uses_before), int(hook.uses_share)]
-        for formula in fix.formulas:
-            row += self._program(formula)
-        if len(row) > HOOK_COLUMNS:
+        if len(fix.formulas) > 3:
             raise ValueError(f"fix '{fix.id}' has more formulas than there are directions, three")
-        row += [-1] * (HOOK_COLUMNS - len(row))
-        self.rows.append(row)
+        with told(f"fix {fix.style}", moment, hook.function, fix.place):
+            address = address_of(hook.function, signature)
+        uses = int(hook.uses_before), int(hook.uses_share)
+        self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
+        programs = [self._program(formula) for formula in fix.formulas]
+        self.programs.append(programs + [NO_PROGRAM] * (3 - len(programs)))
         self.on_points |= not hook.on_nodes
 
     def _members(self, group: Any, hook: CompiledHook) -> tuple[int, int]:
@@ -85,13 +90,13 @@ class _Builder:
         self.members.append(members)
         return begin, begin + len(members)
 
-    def _program(self, formula: Any) -> list[int]:
+    def _program(self, formula: Any) -> tuple:
         if formula is None:
-            return [-1, -1, -1, -1]
+            return NO_PROGRAM
         program = formula.program(self.hub.values)
         ranges = []
         for pieces, piece in ((self.code, program.code), (self.constants, program.constants)):
             begin = sum(len(p) for p in pieces)
             pieces.append(piece)
             ranges += [begin, begin + len(piece)]
-        return ranges
+        return tuple(ranges)

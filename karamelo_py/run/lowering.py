@@ -11,61 +11,54 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import (
-    DRIFT,
-    GRADIENT,
-    HEAT_LIMIT,
-    HEAT_REFERENCE,
-    KEPT,
-    LIGHTEST,
-    SPACING,
     Block,
     Control,
     Nodes,
     Points,
     Setup,
+    arrays_of,
+    new_clock,
 )
+from karamelo_py.kernels.g2p import NodalMean
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.laws import can, elastic_law, law_in, law_kind, law_on, law_table
-from karamelo_py.kernels.step import FBar, Insulated
+from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
+from karamelo_py.kernels.step import Insulated
+from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried, deformed
 from karamelo_py.points.boundary import ReflectingGrid
-from karamelo_py.points.kinematics import identity, planar
+from karamelo_py.points.kinematics import Line
 from karamelo_py.points.laws import (
+    can,
     conductivity,
-    deformation,
-    driven,
+    constrained_velocity,
     heat_capacity,
     initial_state,
+    law_kind,
     specific_volume,
     with_temperature,
 )
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.points.transfers import terms
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table
-from karamelo_py.scene.modify import puts_force_on_points
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.methods.base import NoContact
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 SERIAL_UP_TO = 20_000  # points; below, waking threads costs more than they save
 
 
 class State(NamedTuple):
-    """Fields of all points in the order of their ids, between two lowerings."""
+    """What outlives a run, of all points in the order of their ids; arrays (components, N)."""
 
     count: int  # number of points, N
-    x: np.ndarray  # (N, w) places
-    v: np.ndarray  # (N, d)
-    laws: dict[tuple, np.ndarray]  # (N, s) state for each kind of law
-    moment: np.ndarray | None  # (N, t) what the transfer keeps
-    deformation: np.ndarray | None  # (N, t) F, where it has an array of its own
     present: np.ndarray  # (N,) bool, False for points that were deleted
-    bounces: np.ndarray | None  # (N, d) reflections, where they are counted
-    heat: np.ndarray | None  # (N, ...) what points keep of heat, where it flows
+    places: np.ndarray
+    v: np.ndarray
+    laws: dict[tuple, np.ndarray]  # state for each kind of law
+    fields: dict[type, np.ndarray]  # declared fields that are kept
     contact: NamedTuple  # how solids touch, with what it remembers
 
 
@@ -103,7 +96,7 @@ def check_rigid(hub: Hub) -> None:
     if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
         return
     for solid in hub.solids.values():
-        if can(solid.material.law, driven):
+        if can(solid.material.law, constrained_velocity):
             raise ScriptError(
                 f"solid '{solid.id}' is rigid, and the domains of its points would deform",
                 place=solid.place,
@@ -179,80 +172,61 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
-    control = Control(hub.values.array, np.zeros(17), np.zeros(4, np.int64))
-    control.real[SPACING] = min(lattice.h for lattice in lattices)
-    control.real[[HEAT_LIMIT, HEAT_REFERENCE]] = stable_conduction(hub)
-    control.real[KEPT] = getattr(transfer, "alpha", 0)
-    control.real[DRIFT] = np.inf  # the points are not sorted yet
-    needs = Needs(
-        moment=transfer.keeps_moment,
-        force=puts_force_on_points(hub),
-        growth=isinstance(method.averaging(hub), FBar),
-        series=terms(transfer) > 1,
-        normal=not isinstance(contact, NoContact),
-        bounces=hub.update.boundary == "reflect",
-        heat=hub.update.thermal,
-    )
-    count = sum(lattice.node_count for lattice in lattices)
+    control = Control(hub.values.array, new_clock())
+    clock = control.clock[0]
+    clock.spacing = min(lattice.h for lattice in lattices)
+    clock.heat_limit = clock.heat_reference = stable_conduction(hub)
+    clock.kept = getattr(transfer, "alpha", 0)
+    clock.drift = np.inf  # the points are not sorted yet
     grids = table(lattices, real)
+    if hub.update.boundary == "reflect":
+        grids = ReflectingGrid(*grids)
+    count = sum(lattice.node_count for lattice in lattices)
+    averaging = method.averaging(hub)
+    heat = Insulated()
+    if hub.update.thermal:
+        heat = Conducting(lower_nodes((NodalMean,), Line(), count, real))
+    owners = [method.frame, transfer, averaging, contact, heat, grids]
+    owners += [*hub.fixes.values(), hub.update.scheme, basis, method]
     setup = Setup(
         frame=method.frame,
         kin=kin,
         basis=basis,
         transfer=transfer,
-        averaging=method.averaging(hub),
+        averaging=averaging,
         contact=contact,
-        grids=ReflectingGrid(*grids) if needs.bounces else grids,
-        nodes=lower_nodes(count, kin.dimension, needs, real),
-        heat=Conducting(lower_nodes(count, 1, OF_HEAT, real)) if needs.heat else Insulated(),
-        blocks=lower_blocks(hub, kin, needs, tiles, real, previous),
+        heat=heat,
+        grids=grids,
+        nodes=lower_nodes(fields.declared(owners, "node_fields"), kin, count, real),
+        blocks=lower_blocks(
+            hub, kin, fields.declared(owners, "point_fields"), tiles, real, previous
+        ),
         spans=tiles.empty_spans(),
         control=control,
     )
     if basis.steep_edge:
-        lightest = min(float(s.mass.astype(real).min()) for s in hub.solids.values())
-        control.real[LIGHTEST] = lightest
+        clock.lightest = min(float(s.mass.astype(real).min()) for s in hub.solids.values())
     return setup, tiles
 
 
-class Needs(NamedTuple):
-    """Which fields that not every scene has this one needs."""
-
-    moment: bool
-    force: bool
-    growth: bool
-    series: bool
-    normal: bool
-    bounces: bool
-    heat: bool
-
-
-# Nodes of heat have levels in the place of volumes.
-OF_HEAT = Needs(*(False for _ in Needs._fields))._replace(growth=True)
-
-
-def lower_nodes(count: int, d: int, needs: Needs, real: type) -> Nodes:
-    """Fields of `count` nodes with vectors of `d` components, zero.
-
-    The system gives memory to pages only when they are touched.
-    """
+def lower_nodes(kinds: tuple[type, ...], kin: NamedTuple, count: int, real: type) -> Nodes:
+    """Fields of `count` nodes, zero: the system gives memory to pages only when touched."""
+    d = kin.dimension
     return Nodes(
         sums=np.zeros((count, 1 + 2 * d), real),
         update=np.zeros((count, 2 * d), real),
         velocity=np.zeros((count, d), real),
-        normal=np.zeros((count, d), real) if needs.normal else None,
-        growth=np.zeros((count, 2), real) if needs.growth else None,
-        series=np.zeros((count, 2 * d), real) if needs.series else None,
+        fields=tuple(fields.at_nodes(kind, kin, count, real) for kind in kinds),
     )
 
 
-def lower_blocks(hub, kin, needs: Needs, tiles: Tiles, real: type, previous: State | None) -> tuple:
+def lower_blocks(hub, kin, kinds: tuple, tiles: Tiles, real: type, previous: State | None) -> tuple:
     """One block for each kind of law, in the order in which the solids use them."""
     solids: dict[tuple, list] = {}
     for solid in hub.solids.values():
         solids.setdefault(law_kind(solid.material.law), []).append(solid)
     return tuple(
-        lower_block(hub, members, kin, needs, tiles, real, previous) for members in solids.values()
+        lower_block(hub, members, kin, kinds, tiles, real, previous) for members in solids.values()
     )
 
 
@@ -263,92 +237,73 @@ def start(law, T0: float | None, kin, real: type) -> np.ndarray:
 
 
 def lower_block(
-    hub, solids, kin, needs: Needs, tiles: Tiles, real: type, previous: State | None
+    hub: Scene,
+    solids: list,
+    kin: NamedTuple,
+    kinds: tuple[type, ...],
+    tiles: Tiles,
+    real: type,
+    previous: State | None,
 ) -> Block:
     """The points of all solids whose law is of one kind."""
     method = hub.update.method
     known = [law_on(s.material.law, s.h, s.T0) for s in solids]
     laws_of_solids = list(dict.fromkeys(known))
     laws = law_table(laws_of_solids, real)
-    kind = law_kind(laws)
-    n = sum(len(s.x0) for s in solids)
-    d = kin.dimension
+
+    def each(values: list, dtype: type) -> np.ndarray:
+        """(n,): the value of its solid for each point."""
+        return np.repeat(np.array(values, dtype), [len(s.x0) for s in solids])
+
     ids = np.concatenate([np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids])
-    state = np.concatenate(
-        [
-            np.tile(start(law_in(k, real), s.T0, kin, real), (len(s.x0), 1))
-            for s, k in zip(solids, known, strict=True)
-        ]
-    )
-    moment = np.zeros((n, planar(kin).tensor_size), real) if needs.moment else None
-    stores_f = not method.frame.moves and not can(elastic_law(laws), deformation)
-    unit = np.array(identity(kin, real(1)), real)
-    f = np.tile(unit, (n, 1)) if stores_f else None
+    states = [start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True)]
+    counts = [len(s.x0) for s in solids]
     places = np.concatenate([method.places(kin, s, real) for s in solids])
-    here = places if method.frame.moves else places[:, :d]
-    x = np.stack([here, here])
-    v = np.zeros((n, d), real)
-    bounces = np.zeros((n, d), real) if needs.bounces else None
-    heat = np.zeros((n, GRADIENT + d), real) if needs.heat else None
-    present = np.ones(n, np.bool_)
-    if previous is not None:
-        old = ids < previous.count
-        kept = previous.x.shape[1]
-        x[:, old, :kept] = previous.x[ids[old]][:, : x.shape[2]]
-        v[old] = previous.v[ids[old]]
-        if kind in previous.laws:
-            state[old] = previous.laws[kind][ids[old]]
-        if moment is not None and previous.moment is not None:
-            moment[old] = previous.moment[ids[old]]
-        if f is not None and previous.deformation is not None:
-            f[old] = previous.deformation[ids[old]]
-        if bounces is not None and previous.bounces is not None:
-            bounces[old] = previous.bounces[ids[old]]
-        if heat is not None and previous.heat is not None:
-            heat[old] = previous.heat[ids[old]]
-        present[old] = previous.present[ids[old]]
+    places = np.ascontiguousarray(places.T)
+    here = places if method.frame.moves else places[: kin.dimension]
+    elastic = type(elastic_law(laws))
+    own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
     points = Points(
-        v=v,
-        mass=np.concatenate([s.mass for s in solids]).astype(real),
-        state=state,
-        moment=moment,
-        material=np.concatenate(
-            [
-                np.full(len(s.x0), laws_of_solids.index(law), np.int32)
-                for s, law in zip(solids, known, strict=True)
-            ]
-        ),
-        deformation=f,
-        force=np.zeros((n, d), real) if needs.force else None,
-        growth=np.ones(n, real) if needs.growth else None,
-        echo=np.zeros((n, d), real) if needs.series else None,
-        bounces=bounces,
-        heat=heat,
-    )
-    block = Block(
-        x=x,
+        x=np.stack([here, here]),
         home=None if method.frame.moves else places,
-        points=points,
-        laws=laws,
-        tiling=tiles.empty_tiling(),
+        v=np.zeros((kin.dimension, len(ids)), real),
+        mass=np.concatenate([s.mass for s in solids]).astype(real),
+        state=np.repeat(np.array(states, real).T, counts, axis=1),
+        material=each([laws_of_solids.index(law) for law in known], np.int32),
+        grid=each([method.lattice_of(hub, s) for s in solids], np.int32),
         id=ids.astype(np.int64),
-        grid=np.concatenate(
-            [np.full(len(s.x0), method.lattice_of(hub, s), np.int32) for s in solids]
-        ),
+        fields=tuple(fields.at_points(kind, kin, len(ids), real) for kind in own),
     )
+    block = Block(points, laws, tiles.empty_tiling())
+    return block if previous is None else resumed(block, previous)
+
+
+def resumed(block: Block, previous: State) -> Block:
+    """The block with what its points had before, as far as they were there."""
+    points = block.points
+    old = points.id < previous.count
+    ids = points.id[old]
+
+    def take(array: np.ndarray, before: np.ndarray | None) -> None:
+        if before is not None:
+            rows = min(array.shape[-2], len(before))
+            array[..., :rows, old] = before[:rows, ids]
+
+    take(points.x, previous.places)
+    take(points.v, previous.v)
+    take(points.state, previous.laws.get(law_kind(block.laws)))
+    for one in points.fields:
+        take(one.array, previous.fields.get(type(one)))
+    present = np.ones(len(points.id), np.bool_)
+    present[old] = previous.present[ids]
     return block if present.all() else chosen(block, present)
 
 
 def chosen(block: Block, keep: np.ndarray) -> Block:
     """The block with the points where `keep` (n,) is true; they are to be sorted anew."""
-    rows = {
-        name: None if field is None else field[keep]
-        for name, field in block.points._asdict().items()
-    }
-    return block._replace(
-        x=np.compress(keep, block.x, axis=1),  # contiguous: another layout would be compiled for
-        home=None if block.home is None else block.home[keep],
-        points=Points(**rows),
-        id=block.id[keep],
-        grid=block.grid[keep],
-    )
+    points = block.points
+    # Contiguous: another layout would be compiled for.
+    kept = {name: np.compress(keep, a, axis=-1) for name, a in arrays_of(points)}
+    own = tuple(type(one)(kept[fields.name_of(type(one))]) for one in points.fields)
+    rest = {name: kept.get(name) for name in points._fields if name != "fields"}
+    return block._replace(points=Points(**rest, fields=own))

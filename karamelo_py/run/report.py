@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import inf
 from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.fields import name_of
+from karamelo_py.kernels.arrays import arrays_of
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.laws import law_kind
-from karamelo_py.kernels.step import Fused, Staged
+from karamelo_py.kernels.step import Fused, Staged, rows_of
+from karamelo_py.kernels.table import says
+from karamelo_py.points.laws import law_kind
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
@@ -47,7 +51,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
             say(f"  {name:<30}  {shape:<10} {size:>6}")
             of_one += size
         say(f"  {'together':<30}  {'':<10} {of_one:>6}")
-        total += of_one * len(block.id)
+        total += of_one * len(block.points.id)
     say("fields of a node")
     per_node = 0
     for name, array in node_fields(s):
@@ -64,8 +68,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
 def bytes_per_point(simulation: Simulation) -> int:
     """Bytes of all fields of a point, the mean over the points of all kinds."""
     blocks = simulation.setup.blocks
-    total = sum(sum(size for *_, size in point_fields(b)) * len(b.id) for b in blocks)
-    return round(total / max(1, sum(len(b.id) for b in blocks)))
+    total = sum(sum(size for *_, size in point_fields(b)) * len(b.points.id) for b in blocks)
+    return round(total / max(1, sum(len(b.points.id) for b in blocks)))
 
 
 def materials(hub: Hub, block: Any) -> list[Material]:
@@ -76,24 +80,25 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
     """The arrays of the nodes, and of those that heat flows through, with their names."""
-    fields = list(s.nodes._asdict().items())
+    found = list(_arrays_of_nodes(s.nodes))
     if isinstance(s.heat, Conducting):
-        fields += [(f"{name} (heat)", array) for name, array in s.heat.nodes._asdict().items()]
-    return [(name, array) for name, array in fields if array is not None]
+        found += [(f"{name} (heat)", array) for name, array in _arrays_of_nodes(s.heat.nodes)]
+    return found
+
+
+def _arrays_of_nodes(nodes: Any) -> Iterator[tuple[str, np.ndarray]]:
+    for name in ("sums", "update", "velocity"):
+        yield name, getattr(nodes, name)
+    for one in nodes.fields:
+        yield name_of(type(one)), one.array
 
 
 def point_fields(block: Any) -> list[tuple[str, str, int]]:
     """Name, shape and bytes of each field that a point of this block carries."""
-    fields = [("x", block.x[0]), ("x moved", block.x[1])]
-    fields += [(name, array) for name, array in block.points._asdict().items() if array is not None]
-    fields += [("id", block.id), ("grid", block.grid)]
-    if block.home is not None:
-        fields.append(("home", block.home))
-    out = []
-    for name, array in fields:
-        shape = str(array.shape[1]) if array.ndim > 1 else "1"
-        out.append((name, shape, array.itemsize * (array.shape[1] if array.ndim > 1 else 1)))
-    return out
+    found = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
+    found += [(name, array) for name, array in arrays_of(block.points) if name != "x"]
+    sizes = [(name, len(array) if array.ndim > 1 else 1, array) for name, array in found]
+    return [(name, str(size), size * array.itemsize) for name, size, array in sizes]
 
 
 def stages(hub: Hub, simulation: Simulation) -> list[str]:
@@ -105,9 +110,8 @@ def stages(hub: Hub, simulation: Simulation) -> list[str]:
             once = " (first step only)" if fix.first_step_only else ""
             acting.setdefault(name, []).append(fix.id + once)
     lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
-    first = type(hub.update.scheme).stages[0 if visits is Fused else 1]
+    rows = rows_of(type(hub.update.scheme), visits)
+    first = [text for row in rows if (text := says(row, simulation.setup)) is not None]
     if not lines:
         lines = ["no fix acts between them"]
-    if hub.update.thermal:
-        lines.insert(0, "before v*: heat to the nodes, its flow, temperature of the points")
     return [*first, *lines]

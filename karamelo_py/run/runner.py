@@ -7,10 +7,13 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from math import inf, isfinite
 from typing import Any
 
+from karamelo_py.compiler import cache
 from karamelo_py.kernels.step import DONE
+from karamelo_py.output.console import duration
 from karamelo_py.run import diagnosis
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
@@ -23,8 +26,19 @@ CHUNK = 100  # steps between two looks at the run, and between two snapshots, at
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
 
 
+ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
+
+
 class Interrupted(Exception):
     """The user pressed Ctrl-C; everything is written."""
+
+
+def _kind_of_scene(hub: Hub) -> str:
+    """What the loops of a scene depend on, roughly: for how long they take to compile."""
+    parts = {type(material).__name__ for material in hub.materials.values()}
+    parts |= {type(fix).__name__ for fix in hub.fixes.values()}
+    parts |= {str(hub.settings.precision), f"threads={hub.settings.threads}"}
+    return f"{hub.domain.dimension}D {hub.update.words} {' '.join(sorted(parts))}"
 
 
 class Runner:
@@ -79,6 +93,7 @@ class Runner:
         diagnosis.warn_about_groups(hub)
         diagnosis.warn_about_step(hub, simulation)
         diagnosis.warn_about_precision(hub, simulation)
+        simulation.compile()
         first_step = simulation.step
         first_time = simulation.time
         self._banner(simulation)
@@ -185,46 +200,45 @@ class Runner:
 
     @contextmanager
     def _telling_of_compilation(self) -> Iterator[None]:
-        """Say so when kernels are compiled; count the time, also that of loading them."""
+        """Say so when kernels are compiled, how long it may take, and count the time."""
         from numba.core import event
 
-        runner = self
+        runner, scene = self, _kind_of_scene(self.hub)
+        expected = cache.time_for(scene)
 
         class Listener(event.Listener):
             depth = 0
             begun = 0.0
+            said = False
 
             def on_start(self, _: Any) -> None:
                 self.depth += 1
                 if self.depth == 1:
                     self.begun = time.perf_counter()
+                    if not self.said:
+                        self.said = True
+                        about = f": about {duration(expected)}" if expected else ""
+                        runner.hub.console.say(
+                            f"Compiling the loops of this kind of scene, once{about}"
+                            " (the next run starts at once) ..."
+                        )
 
             def on_end(self, _: Any) -> None:
                 self.depth -= 1
                 if self.depth == 0:
                     runner.spent["compilation"] += time.perf_counter() - self.begun
 
-        class Teller(event.Listener):
-            said = False
-
-            def on_start(self, _: Any) -> None:
-                if not self.said:
-                    self.said = True
-                    runner.hub.console.say(
-                        "Compiling for this kind of scene (only the first time) ..."
-                    )
-
-            def on_end(self, _: Any) -> None: ...
-
-        # The lock is also held while a kernel is loaded from the cache.
-        listeners = {"numba:compiler_lock": Listener(), "numba:compile": Teller()}
-        for kind, listener in listeners.items():
-            event.register(kind, listener)
+        listener = Listener()
+        event.register("numba:compile", listener)
         try:
-            yield
+            with cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER)):
+                yield
         finally:
-            for kind, listener in listeners.items():
-                event.unregister(kind, listener)
+            event.unregister("numba:compile", listener)
+            spent = self.spent["compilation"]
+            # Where most was in the cache already, the time says nothing about the whole.
+            if spent > 0.5 * (expected or 0.0):
+                cache.keep_time(scene, spent)
 
     def _banner(self, simulation: Simulation) -> None:
         hub = self.hub

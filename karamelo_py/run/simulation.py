@@ -7,48 +7,44 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler import fields
+from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import (
-    COURANT,
-    DRIFT,
-    DRIFT_LIMIT,
     DT,
-    DT_FACTOR,
-    END_TIME,
-    FIRST_LIMIT,
-    FIXED_DT,
     INITIAL_INTEGRATE,
-    LIMIT,
-    NOW,
-    OVER_LIMIT,
+    MASS,
+    ON_VELOCITY,
     SUPPLY_HEAT,
     TIME,
     TIMESTEP,
-    WATCH_LIMIT,
     Hooks,
     NoHooks,
+    arrays_of,
 )
 from karamelo_py.kernels.export import impose_stress
 from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, show_heat
-from karamelo_py.kernels.hooks import ON_VELOCITY, POINT_STAGES, STAGES, CompiledHook
-from karamelo_py.kernels.laws import can, elastic_law, law_kind
-from karamelo_py.kernels.stages import Everything, SumsToVelocity
+from karamelo_py.kernels.hooks import POINT_STAGES, STAGES, CompiledHook
+from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.kernels.nodes import ClearSums, SumsToVelocity
+from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.step import (
     DONE,
     SORT,
+    SUMS,
     Fused,
     Staged,
     advance,
     at_nodes,
     at_points,
     choose_dt,
-    map_to_nodes,
     measure,
     run_steps,
     step_size,
+    sweep,
 )
-from karamelo_py.kernels.sweep import Serial, Threaded, sweep_nodes
-from karamelo_py.points.kinematics import identity
-from karamelo_py.points.laws import with_stress
+from karamelo_py.kernels.sweep import Serial, Threaded, Visit, sweep_nodes
+from karamelo_py.points.boundary import Bounces
+from karamelo_py.points.laws import can, law_kind, with_stress
 from karamelo_py.run.hooks import lower_hooks
 from karamelo_py.run.lowering import (
     State,
@@ -58,7 +54,6 @@ from karamelo_py.run.lowering import (
     thread_count,
 )
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import puts_force_on_points
 from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import ScriptError
 
@@ -76,7 +71,8 @@ def scene_key(hub: Hub) -> tuple:
         update.thermal,
         update.anti_locking,
         update.boundary,
-        puts_force_on_points(hub),
+        fields.declared(hub.fixes.values(), "point_fields"),
+        fields.declared(hub.fixes.values(), "node_fields"),
         hub.settings.precision,
         hub.settings.threads,
     )
@@ -121,7 +117,7 @@ def _(hooks, stage, then, s):
         if view.moved and stage == INITIAL_INTEGRATE:
             hooks.simulation.sort()
         elif view.moved:
-            s.control.real[DRIFT] = np.inf
+            s.control.clock[0].drift = np.inf
 
 
 @at_heat_nodes.on(PythonHooks)
@@ -177,19 +173,41 @@ class Simulation:
     @property
     def now(self) -> int:
         """Which of the two position arrays is the present one."""
-        return int(self.setup.control.whole[NOW])
+        return int(self.setup.control.clock[0].now)
 
     def by_id(self, field: Callable) -> np.ndarray:
-        """A field of all points in the order of their ids; `field` takes it from a block.
+        """A field of all points in the order of their ids; `field` takes it from `Points`.
 
         It is zero for points that were deleted.
         """
         blocks = self.setup.blocks
-        first = field(blocks[0])
-        out = np.zeros((self.count, *first.shape[1:]), first.dtype)
+        first = field(blocks[0].points)
+        out = np.zeros((*first.shape[:-1], self.count), first.dtype)
         for block in blocks:
-            out[block.id] = field(block)
+            out[..., block.points.id] = field(block.points)
         return out
+
+    def declared(self, kind: type) -> np.ndarray | None:
+        """A declared field (N, components) by id, None where the scene does not have it.
+
+        Where only some laws have it, the others show what it starts from.
+        """
+        blocks = self.setup.blocks
+        if all(field(block.points.fields, kind) is None for block in blocks):
+            return None
+        out = fields.at_points(kind, self.setup.kin, self.count, float).array
+        for block in blocks:
+            array = field(block.points.fields, kind)
+            if array is not None:
+                out[:, block.points.id] = array
+        return out.T
+
+    @property
+    def point_fields(self) -> tuple[type, ...]:
+        """The declared fields of the points, of all blocks."""
+        return tuple(
+            dict.fromkeys(type(one) for block in self.setup.blocks for one in block.points.fields)
+        )
 
     def members(self, group: Any) -> np.ndarray:
         """Ids (0-based) of a particle group, without deleted points."""
@@ -200,50 +218,36 @@ class Simulation:
     def x(self) -> np.ndarray:
         """(N, d) present positions by id."""
         d = self.setup.kin.dimension
-        return self.by_id(lambda block: block.x[self.now][:, :d])
+        return self.by_id(lambda points: points.x[self.now][:d]).T
 
     @property
     def v(self) -> np.ndarray:
         """(N, d) velocities by id."""
-        return self.by_id(lambda block: block.points.v)
+        return self.by_id(lambda points: points.v).T
 
     @property
     def mass(self) -> np.ndarray:
         """(N,) masses by id."""
-        return self.by_id(lambda block: block.points.mass)
+        return self.by_id(lambda points: points.mass)
 
     def state(self) -> State:
         """All that a new lowering takes over."""
         laws = {}
         for block in self.setup.blocks:
-            points = block.points
-            rows = np.zeros((self.count, points.state.shape[1]), points.state.dtype)
-            rows[block.id] = points.state
+            state = block.points.state
+            rows = np.zeros((len(state), self.count), state.dtype)
+            rows[:, block.points.id] = state
             laws[law_kind(block.laws)] = rows
-        keeps = self.setup.blocks[0].points.moment is not None
-        moment = self.by_id(lambda block: block.points.moment) if keeps else None
-        places = self.by_id(lambda block: block.x[self.now])
-        counts = self.setup.blocks[0].points.bounces is not None
-        bounces = self.by_id(lambda block: block.points.bounces) if counts else None
-        f = self._deformation()
-        contact = self.setup.contact
-        conducts = self.setup.blocks[0].points.heat is not None
-        heat = self.by_id(lambda block: block.points.heat) if conducts else None
+        kept = [kind for kind in self.point_fields if fields.is_kept(kind)]
         return State(
-            self.count, places, self.v, laws, moment, f, self.present, bounces, heat, contact
+            self.count,
+            self.present,
+            self.by_id(lambda points: points.x[self.now]),
+            self.by_id(lambda points: points.v),
+            laws,
+            {kind: self.declared(kind).T for kind in kept},
+            self.setup.contact,
         )
-
-    def _deformation(self) -> np.ndarray | None:
-        """F of all points, where a block has an array for it; others are left undeformed."""
-        blocks = self.setup.blocks
-        if all(block.points.deformation is None for block in blocks):
-            return None
-        kin = self.setup.kin
-        out = np.tile(np.array(identity(kin, 1.0)), (self.count, 1))
-        for block in blocks:
-            if block.points.deformation is not None:
-                out[block.id] = block.points.deformation
-        return out
 
     def set_stress(self, ids: np.ndarray, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress (by name, "11" ...) of the points `ids`."""
@@ -258,18 +262,18 @@ class Simulation:
         flags = np.array([name in given for name in names])
         for block in s.blocks:
             if can(elastic_law(block.laws), with_stress):
-                rows = stress[block.id]
-                part = chosen[block.id]
-                like = s.nodes.sums[0, 0]
+                rows = stress[block.points.id]
+                part = chosen[block.points.id]
+                like = s.nodes.sums[0, MASS]
                 impose_stress(s.kin, like, block.points, block.laws, part, flags, rows)
         self.version += 1
 
     def remove(self, ids: np.ndarray) -> None:
         """Take points out of the run; the ids of the others stay."""
         self.present[ids] = False
-        blocks = tuple(chosen(block, self.present[block.id]) for block in self.setup.blocks)
+        blocks = tuple(chosen(block, self.present[block.points.id]) for block in self.setup.blocks)
         self.setup = self.setup._replace(blocks=blocks)
-        self.setup.control.real[DRIFT] = np.inf
+        self.setup.control.clock[0].drift = np.inf
         self.version += 1
         # The rate of the last step stays: the same whether or not a run begins here.
         self._measured = self.version
@@ -277,14 +281,15 @@ class Simulation:
     @property
     def bounces(self) -> int:
         """How often points were reflected at the edge of the domain."""
-        counts = [b.points.bounces for b in self.setup.blocks if b.points.bounces is not None]
-        return int(sum(float(count.sum()) for count in counts))
+        counts = self.declared(Bounces)
+        return 0 if counts is None else int(counts.sum())
 
     def clear_forces(self) -> None:
         """Points bear no force of fixes, until these say so anew."""
         for block in self.setup.blocks:
-            if block.points.force is not None:
-                block.points.force[:] = 0
+            force = field(block.points.fields, Force)
+            if force is not None:
+                force[:] = 0
 
     # --- stepping -----------------------------------------------------------------------------
 
@@ -295,12 +300,12 @@ class Simulation:
         if self.threads > 1:
             numba.set_num_threads(self.threads)
         update = self.hub.update
-        control = self.setup.control
-        control.real[FIXED_DT] = update.fixed_dt or 0.0
-        control.real[COURANT] = stable_courant(self.hub)
-        control.real[DT_FACTOR] = update.dt_factor
-        control.real[END_TIME] = end_time
-        control.whole[OVER_LIMIT] = 0
+        clock = self.setup.control.clock[0]
+        clock.fixed_dt = update.fixed_dt or 0.0
+        clock.courant = stable_courant(self.hub)
+        clock.dt_factor = update.dt_factor
+        clock.end_time = end_time
+        clock.over_limit = 0
         # Twice: initial values may be formulas of dt, and dt follows the fastest point.
         self._choose_dt()
         self._prepare_hooks()
@@ -312,10 +317,10 @@ class Simulation:
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",
             )
         # A body at rest that has no waves has no first limit to compare with.
-        if control.real[FIRST_LIMIT] == 0 and np.isfinite(self.limit) and not update.fixed_dt:
-            control.real[FIRST_LIMIT] = self.limit
-        control.whole[WATCH_LIMIT] = int(not self.above_limit())
-        control.whole[OVER_LIMIT] = 0
+        if clock.first_limit == 0 and np.isfinite(self.limit) and not update.fixed_dt:
+            clock.first_limit = self.limit
+        clock.watch_limit = int(not self.above_limit())
+        clock.over_limit = 0
 
     def _choose_dt(self) -> None:
         if self._measured != self.version:
@@ -330,14 +335,14 @@ class Simulation:
 
     def sort_if_due(self) -> None:
         """Sort the points when one may have left its tile's surroundings, or none is sorted yet."""
-        control = self.setup.control.real
-        if control[DRIFT] > control[DRIFT_LIMIT]:
+        clock = self.setup.control.clock[0]
+        if clock.drift > clock.drift_limit:
             self.sort()
 
     @property
     def limit(self) -> float:
         """The stable step of the present state."""
-        return float(self.setup.control.real[LIMIT])
+        return float(self.setup.control.clock[0].limit)
 
     def above_limit(self) -> bool:
         """Whether the chosen step is above the stable limit already."""
@@ -370,11 +375,21 @@ class Simulation:
             self.sort_if_due()
             status = self._advance(target - self.step)
             self._mapped = True
-            ended = self.step >= target or control.values[TIME] >= control.real[END_TIME]
+            ended = self.step >= target or control.values[TIME] >= control.clock[0].end_time
             if status != SORT:
                 return status
             if ended:
                 return DONE
+
+    def compile(self) -> None:
+        """Have the loop over the steps compiled now: nobody waits for it in the midst of a log."""
+        import numba
+
+        if numba.config.DISABLE_JIT or self._python.by_stage:
+            return
+        visits = Staged() if self.staged else Fused()
+        arguments = (self.hub.update.scheme, visits, self.mode, self.setup, self.hooks, 1)
+        advance.compile(tuple(numba.typeof(argument) for argument in arguments))
 
     def _advance(self, count: int) -> int:
         scheme = self.hub.update.scheme
@@ -407,7 +422,7 @@ class Simulation:
             view = PointsView(self, fix.group, then=False)
             fix.hooks()["initial_integrate"](view)
             if view.moved:
-                self.setup.control.real[DRIFT] = np.inf
+                self.setup.control.clock[0].drift = np.inf
             self.version += 1
         self._begun |= set(at_once)
         self._first_fixes = [fix for fix in new if fix not in at_once]
@@ -422,7 +437,9 @@ class Simulation:
             s = self.setup
             self.sort_if_due()
             dt = step_size(s)
-            map_to_nodes(s, self.mode, Everything())
+            sweep_nodes(self.mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
+            visit = Visit((), SUMS.quantities, SUMS.weights)
+            sweep(s, self.mode, visit, dt, False, True, False)
             sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
             show_heat(s.heat, s, self.mode)
             self._mapped = True
@@ -432,15 +449,12 @@ class Simulation:
     def snapshot(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Every array that a step changes, with a copy."""
         s = self.setup
-        arrays = [s.control.values, s.control.real, s.control.whole, s.spans[: 1 + s.spans[0, 0]]]
+        arrays = [s.control.values, s.control.clock, s.spans[: 1 + s.spans[0, 0]]]
         for block in s.blocks:
-            points = [field for field in block.points if field is not None]
             tiling = block.tiling
             used = tiling.colour[-1]
-            arrays += [block.x, *points, block.id, block.grid, tiling.colour]
-            arrays += [tiling.range[:used], tiling.grid[:used]]
-            if block.home is not None:
-                arrays.append(block.home)
+            arrays += [array for _, array in arrays_of(block.points)]
+            arrays += [tiling.colour, tiling.range[:used], tiling.grid[:used]]
         arrays += self.hub.update.method.remembered(s.contact, s.spans[1 : 1 + s.spans[0, 0]])
         return [(array, array.copy()) for array in arrays]
 
@@ -451,8 +465,8 @@ class Simulation:
         spans = s.spans[1 : 1 + s.spans[0, 0]].copy()
         for begin, end in spans:
             s.nodes.sums[begin:end] = 0
-            if s.nodes.normal is not None:
-                s.nodes.normal[begin:end] = 0
+            for one in s.nodes.fields:
+                one.array[begin:end] = 0
             if isinstance(s.heat, Conducting):
                 s.heat.nodes.sums[begin:end] = 0
         for array, copy in snapshot:

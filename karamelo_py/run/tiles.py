@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import DRIFT, DRIFT_LIMIT, NOW, Block, Setup, Tiling
+from karamelo_py.kernels.arrays import Block, Setup, Tiling, arrays_of
+from karamelo_py.kernels.nodes import ClearSums
 from karamelo_py.kernels.sorting import order_points, widest
-from karamelo_py.kernels.stages import ClearSums
 from karamelo_py.kernels.step import step_size
 from karamelo_py.kernels.sweep import sweep_nodes
 from karamelo_py.scene.lattice import Lattice
@@ -99,30 +99,32 @@ class Tiles:
             end = self._find_nodes(lattice, shape, first, s.spans[1 + begin :]) + begin
             begin = end
         s.spans[0, 0] = end
-        s.control.real[DRIFT] = 0.0
+        s.control.clock[0].drift = 0.0
         self.sorts += 1
 
     def _make_room(self, s: Setup) -> None:
         """Larger tiles where domains of points have come to reach far beyond them."""
         if not s.frame.moves:
-            s.control.real[DRIFT_LIMIT] = np.inf  # nothing drifts: sorted once
+            s.control.clock[0].drift_limit = np.inf  # nothing drifts: sorted once
             return
         cells = self.cells
-        if s.blocks[0].x.shape[2] > self.dimension:
-            now = s.control.whole[NOW]
-            far = max(widest(s.kin, s.basis, s.grids, b.x[now], b.grid) for b in s.blocks)
+        if s.blocks[0].points.x.shape[1] > self.dimension:
+            now = s.control.clock[0].now
+            points = (block.points for block in s.blocks)
+            far = max(widest(s.kin, s.basis, s.grids, p.x[now], p.grid) for p in points)
             # Corners lie in cells of their own, on both sides.
             cells = max(cells, 2 * far + 2) if 0 < far < np.inf else cells
         size = max(self.size, tile_size(self.dimension, cells))
         if size != self.size:
             self._lay(size)
-        s.control.real[DRIFT_LIMIT] = drift_limit(size, cells)
+        s.control.clock[0].drift_limit = drift_limit(size, cells)
 
     def _sort_block(self, s: Setup, block: Block) -> None:
-        x = block.x[s.control.whole[NOW]] if block.home is None else block.home
-        tile, order = np.empty((2, len(x)), np.int64)
+        points = block.points
+        x = points.x[s.control.clock[0].now] if points.home is None else points.home
+        tile, order = np.empty((2, x.shape[1]), np.int64)
         order_points(
-            s.kin, s.grids, self.size, self.shapes, self.first, x, block.grid, self._start, tile,
+            s.kin, s.grids, self.size, self.shapes, self.first, x, points.grid, self._start, tile,
             order,
         )  # fmt: skip
         ends = self._start[:-1]
@@ -143,9 +145,8 @@ class Tiles:
         tiling.range[:count] = np.stack([begins[chosen], ends[chosen]], axis=1)
         tiling.grid[:count] = grid[by_colour]
         tiling.colour[:] = np.searchsorted(np.sort(colour), np.arange(len(tiling.colour)))
-        for field in (*block.x, block.home, *block.points, block.id, block.grid):
-            if field is not None:
-                field[:] = field[order]
+        for _, array in arrays_of(points):
+            array[:] = array[..., order]
 
     def _find_nodes(
         self, lattice: Lattice, shape: np.ndarray, first: int, spans: np.ndarray

@@ -48,17 +48,17 @@ def leaving(simulation: Any) -> np.ndarray:
     found = []
     s, then = simulation.setup, 1 - simulation.now
     for block in s.blocks:
-        beyond = np.zeros(len(block.id), np.bool_)
-        finite = np.ones(len(block.id), np.bool_)
+        beyond = np.zeros(block.points.id.size, np.bool_)
+        finite = np.ones(block.points.id.size, np.bool_)
         edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
         for k in range(s.kin.dimension):
-            y = block.x[then][:, k]
-            lower, size = (edge[block.grid] for edge in edges[k])
-            slack = s.grids.slack[block.grid]
-            a = (y - lower) * s.grids.inv_h[block.grid]
+            y = block.points.x[then][k]
+            lower, size = (edge[block.points.grid] for edge in edges[k])
+            slack = s.grids.slack[block.points.grid]
+            a = (y - lower) * s.grids.inv_h[block.points.grid]
             beyond |= (a < -slack) | (a > size + slack)
             finite &= np.isfinite(y)
-        found.append(block.id[beyond & finite])
+        found.append(block.points.id[beyond & finite])
     return np.sort(np.concatenate(found))
 
 

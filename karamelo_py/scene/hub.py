@@ -62,6 +62,20 @@ class Catalogue(dict):
         del self[ID]
 
 
+class Parts(dict):
+    """Kind of parts of a law -> their catalogue; one that a plug-in asks for is made for it."""
+
+    def __init__(self, hub: Hub):
+        self.hub = hub
+        super().__init__((k, Catalogue(k, hub)) for k in PARTS)
+
+    def __missing__(self, kind: str) -> Catalogue:
+        return self.setdefault(kind, Catalogue(kind, self.hub))
+
+
+PARTS = ("eos", "strength", "damage", "temperature")
+
+
 def _group_of(kind: str, ID: str) -> str:
     """How to make a group of a region or a solid."""
     who = f"{ID}, all" if kind == "region" else f"regionID, solid, {ID}"
@@ -87,8 +101,10 @@ class Hub:
         The domain, or None before ``dimension``.
     regions, load_paths, elements, solids, groups, fixes, computes, dumps
         Catalogues of what the script has named.
-    materials, eos, strengths, damages, temperatures
-        The same: materials, and the parts that some are made of.
+    materials
+        The same: materials.
+    parts
+        The catalogues of the parts that some materials are made of, by their kind.
     values
         Numbers that fixes and computes publish, and time, timestep, dt.
     place
@@ -111,10 +127,7 @@ class Hub:
         self.domain: Any = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
-        self.eos = Catalogue("eos", self)
-        self.strengths = Catalogue("strength", self)
-        self.damages = Catalogue("damage", self)
-        self.temperatures = Catalogue("temperature", self)
+        self.parts = Parts(self)
         self.materials = Catalogue("material", self)
         self.load_paths = Catalogue("load path", self)
         self.elements = Catalogue("element", self)
@@ -133,7 +146,8 @@ class Hub:
     @property
     def catalogues(self) -> list[Catalogue]:
         """All that has names."""
-        return [item for item in vars(self).values() if isinstance(item, Catalogue)]
+        mine = [item for item in vars(self).values() if isinstance(item, Catalogue)]
+        return [*self.parts.values(), *mine]
 
     @property
     def simulation(self) -> Any:
@@ -193,6 +207,9 @@ class Hub:
         """A copy on which the rest of the script can be tried without consequences."""
         other = copy.copy(self)
         other.rehearsing = True
+        other.parts = Parts(other)
+        for kind, mine in self.parts.items():
+            other.parts[kind].update(mine)
         for name, mine in vars(self).items():
             if isinstance(mine, Catalogue):
                 catalogue = Catalogue(mine.kind, other)

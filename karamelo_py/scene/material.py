@@ -1,62 +1,67 @@
-"""Materials: a constitutive law with its parameters, named in the script."""
+"""Materials and parts of materials that a script has named: entries of catalogues."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from karamelo_py.points.laws.thermoelastic import Expansion, Thermoelastic
-from karamelo_py.scene.part import Part
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.language import registry
+from karamelo_py.language.arguments import Argument, look_up
+from karamelo_py.language.scene import Scene
+
+
+class Part:
+    """A part of a law, or a whole one, under a name.
+
+    Parameters
+    ----------
+    kind
+        What it is: the family of its style, such as ``eos``.
+    style
+        The style that made it.
+    made
+        What that returned: the law, or laws by their kinds where it brings others with it.
+
+    Attributes
+    ----------
+    law
+        The NamedTuple of numbers; its class selects the point functions
+        (:mod:`karamelo_py.points.laws`).
+    laws
+        The same and what comes with it, by kind.
+    """
+
+    id: str = ""
+    place: Any = None
+
+    def __init__(self, kind: str, style: str, made: NamedTuple | dict[str, NamedTuple]):
+        self.kind = kind
+        self.style = style
+        self.laws = made if isinstance(made, dict) else {kind: made}
+
+    @property
+    def law(self) -> NamedTuple:
+        """The law itself."""
+        return self.laws[self.kind]
 
 
 class Material(Part):
-    """Base of the material styles; `law` is the whole law, of `parts` where it has any."""
+    """A material."""
 
     script_kind = "the ID of a material"
-    catalogue = "materials"
-    parts: Sequence[Part] = ()
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Material:
+        """The material that `argument` names."""
+        return look_up(hub.materials, argument)
 
     @property
     def words(self) -> str:
         """ID, style, and the styles of its parts: ``steel (eos-strength: linear, plastic)``."""
-        parts = ", ".join(part.style for part in self.parts)
+        named = zip(self.law._fields, self.law, strict=True)
+        styles = [
+            registry.name_of(kind, type(part))
+            for kind, part in named
+            if isinstance(part, tuple) and part and registry.names(kind)
+        ]
+        parts = ", ".join(styles)
         return f"{self.id} ({self.style}{': ' if parts else ''}{parts})"
-
-
-class LameParameters(NamedTuple):
-    """Isotropic elasticity, in consistent units of stress."""
-
-    lam: float  # Lame's first parameter
-    G: float  # shear modulus
-
-
-def check_poisson_ratio(nu: float) -> None:
-    """Refuse a Poisson's ratio for which the elastic energy is not positive or not finite."""
-    if not -1 < nu < 0.5:
-        raise ScriptError(
-            f"Poisson's ratio {nu:g} is impossible",
-            argument="nu",
-            expected="a number above -1 and below 0.5",
-        )
-
-
-def expanding(
-    law: NamedTuple, moduli: LameParameters, cp: float | None, kappa: float | None, alpha: float
-) -> NamedTuple:
-    """An elastic law with a temperature where heat capacity and conductivity are given."""
-    if cp is None or kappa is None:
-        if cp is not None:
-            raise ScriptError(
-                "with the heat capacity cp the conductivity kappa is needed",
-                argument="cp",
-                expected="cp and kappa, or neither",
-            )
-        return law
-    bulk = moduli.lam + 2 / 3 * moduli.G
-    return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, 0.0))
-
-
-def lame_parameters(E: float, nu: float) -> LameParameters:
-    """Lame's parameters from Young's modulus and Poisson's ratio."""
-    return LameParameters(lam=E * nu / ((1 + nu) * (1 - 2 * nu)), G=E / (2 * (1 + nu)))

@@ -60,8 +60,9 @@ class Fix:
     holds_nodes
         Whether it prescribes velocities of the nodes of its group in ``post_update_grid_state``,
         in the directions in which it has a formula: contact does not move them.
-    puts_force_on_points
-        Whether it sets forces on points in ``initial_integrate``, so that they have a field for it.
+    point_fields
+        The fields of points that it declares (:mod:`karamelo_py.compiler.fields`); `Force` if it
+        sets forces on points in ``initial_integrate``.
     needs_all_points
         Whether no point may be deleted (boundary delete) while it acts.
     friction
@@ -79,7 +80,8 @@ class Fix:
     first_step_only = False
     for_method = False
     holds_nodes = False
-    puts_force_on_points = False
+    point_fields: tuple[type, ...] = ()
+    node_fields: tuple[type, ...] = ()
     needs_all_points = False
     friction: float | None = None
     solids: tuple = ()
@@ -122,13 +124,9 @@ class Fix:
         def call(view: Any) -> None:
             with told(f"fix {self.style}", name, type(self), self.place):
                 hook(view)
+                view.write_back()
 
         return call
-
-
-def puts_force_on_points(hub: Scene) -> bool:
-    """Whether points of the scene have a field for forces of fixes."""
-    return any(fix.puts_force_on_points for fix in hub.fixes.values())
 
 
 class Compute:

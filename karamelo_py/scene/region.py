@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from karamelo_py.language.arguments import look_up
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
@@ -96,28 +96,6 @@ class Region:
     def from_script(cls, hub: Scene, argument: Argument) -> Region:
         """The region that `argument` names."""
         return look_up(hub.regions, argument)
-
-
-def look_up(catalogue: Any, argument: Argument):
-    """The part of the scene that `argument` names.
-
-    Raises
-    ------
-    ScriptError
-        When it is not a name, or an unknown one.
-    """
-    word = argument.word()
-    if word is None:
-        article = "an" if catalogue.kind[0] in "aeiou" else "a"
-        raise ScriptError(
-            f"'{argument.text}' is not the ID of {article} {catalogue.kind}", place=argument.place
-        )
-    try:
-        return catalogue[word]
-    except ScriptError as error:
-        if error.place is None:
-            error.place = argument.place
-        raise
 
 
 def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], bool]:

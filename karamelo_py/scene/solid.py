@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 
-from karamelo_py.kernels.laws import can, law_kind
 from karamelo_py.language.forms import finite
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.points.laws import specific_volume
+from karamelo_py.points.laws import can, law_kind, specific_volume
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.scene.domain import Domain, require_domain
 from karamelo_py.scene.material import Material

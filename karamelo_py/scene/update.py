@@ -55,17 +55,13 @@ class Update:
     @property
     def words(self) -> str:
         """Method, transfer, basis and scheme, as a script calls them."""
-        numbers = ", ".join(f"{name} {value:g}" for name, value in self.transfer._asdict().items())
-        transfer = registry.name_of("transfer", type(self.transfer))
-        return " ".join(
-            [
-                registry.name_of("method", type(self.method)),
-                transfer + (f" ({numbers})" if numbers else ""),
-                self.method.basis_name,
-                registry.name_of("scheme", type(self.scheme)),
-                *(["thermo-mechanical"] if self.thermal else []),
-            ]
-        )
+        words = [
+            registry.name_of("method", type(self.method)),
+            _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer),
+            _with_numbers(self.method.basis_name, self.method.basis),
+            _with_numbers(registry.name_of("scheme", type(self.scheme)), self.scheme),
+        ]
+        return " ".join([*words, *(["thermo-mechanical"] if self.thermal else [])])
 
     @property
     def step(self) -> int:
@@ -86,3 +82,12 @@ class Update:
         """The transfer with its numbers in the precision of the run."""
         numbers = (real(x) if isinstance(x, float) else x for x in self.transfer)
         return type(self.transfer)(*numbers)
+
+
+def _with_numbers(name: str, tag: NamedTuple) -> str:
+    """``FLIP (alpha 0.99)``."""
+    numbers = ", ".join(
+        f"{key} {value:g}" if isinstance(value, (int, float)) else f"{key} {value}"
+        for key, value in tag._asdict().items()
+    )
+    return name + (f" ({numbers})" if numbers else "")

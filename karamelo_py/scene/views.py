@@ -1,4 +1,8 @@
-"""Views of nodes and points for hooks that are written in Python."""
+"""Views of nodes and points for hooks that are written in Python.
+
+A view hands out arrays with a row for each node or point of the group. What a hook changes in them,
+by assignment or in place, is written back when it returns; what cannot be changed is read-only.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +11,58 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.fields import field, name_of
 from karamelo_py.kernels.arrays import (
     DT,
+    MASS,
     POST_PARTICLES_TO_GRID,
     POST_UPDATE_GRID_HEAT,
     POST_UPDATE_GRID_STATE,
     POST_VELOCITIES_TO_GRID,
-    SUPPLY,
-    TEMPERATURE,
     TIME,
+    of_change,
+    of_force,
+    of_momentum,
 )
+from karamelo_py.kernels.heat import Supply, Temperature
+from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.step import corners_that_move
 from karamelo_py.script.errors import nearest
+
+
+class Shown:
+    """A field of a view: how it is read and, unless it is read-only, written."""
+
+    def __init__(self, read: Callable):
+        self.read = read
+        self.write: Callable | None = None
+        self.__doc__ = read.__doc__
+
+    def writer(self, write: Callable) -> Callable:
+        """Decorate the function that writes the field."""
+        self.write = write
+        return write
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, view: _View | None, owner: type) -> Any:
+        if view is None:
+            return self
+        if self.name not in view._handed_out:
+            array = np.array(self.read(view))
+            array.flags.writeable = self.write is not None
+            view._handed_out[self.name] = array, array.copy()
+        return view._handed_out[self.name][0]
+
+    def __set__(self, view: _View, value: Any) -> None:
+        if self.write is None:
+            raise AttributeError(f"{self.name} is read-only")
+        now = self.__get__(view, type(view))
+        value = np.asarray(value)
+        if value.ndim and value.shape != now.shape:
+            raise ValueError(f"{self.name} has the shape {now.shape}, not {value.shape}")
+        now[...] = value
 
 
 class _View:
@@ -26,13 +70,20 @@ class _View:
 
     _fields: tuple[str, ...] = ()
 
+    def __init__(self) -> None:
+        self._handed_out: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+
+    def write_back(self) -> None:
+        """Write what a hook has changed; called when it returns."""
+        for name, (now, before) in self._handed_out.items():
+            write = getattr(type(self), name).write
+            if write is not None and not np.array_equal(now, before, equal_nan=True):
+                write(self, now)
+
     def __setattr__(self, name: str, value: Any) -> None:
-        if name not in self._fields and not name.startswith("_"):
-            if not isinstance(getattr(type(self), name, None), property):
-                raise self._unknown(name)
-            now, value = getattr(self, name).shape, np.asarray(value)
-            if value.ndim and value.shape != now:
-                raise ValueError(f"{name} has the shape {now}, not {value.shape}")
+        known = name in self._fields or name.startswith("_")
+        if not known and not isinstance(getattr(type(self), name, None), Shown):
+            raise self._unknown(name)
         object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Any:
@@ -48,9 +99,7 @@ class _View:
 
 
 class NodesView(_View):
-    """The nodes of a group that carry mass, at one stage of a step.
-
-    Reading a field gives an array with a row for each node; assigning it writes it back::
+    """The nodes of a group that carry mass, at one stage of a step::
 
         nodes.force += nodes.mass[:, None] * self.gravity
 
@@ -63,11 +112,13 @@ class NodesView(_View):
     _fields = ("dt", "time", "index")
 
     def __init__(self, s: Any, group: Any, stage: int, before_update: bool):
+        super().__init__()
         self._nodes = s.nodes
         self._grids = s.grids
         self._stage = stage
-        self._before_update = before_update
+        self._on_velocity = stage == POST_VELOCITIES_TO_GRID or before_update
         self._d = s.nodes.velocity.shape[1]
+        self._kin = s.kin
         self.dt = float(s.control.values[DT])
         self.time = float(s.control.values[TIME])
         if group.all:
@@ -75,11 +126,15 @@ class NodesView(_View):
             members = np.concatenate([np.arange(a, b) for a, b in spans] or [np.empty(0, int)])
         else:
             members = group.nodes
-        self.index = members[s.nodes.sums[members, 0] > 0]
+        self.index = members[s.nodes.sums[members, MASS] > 0]
 
-    @property
+    def _part(self, array: np.ndarray, first: int) -> tuple:
+        """Where in an array of the nodes a vector of those of the view lies."""
+        return self.index, slice(first, first + self._d)
+
+    @Shown
     def position(self) -> np.ndarray:
-        """(n, 3) positions of the nodes."""
+        """(n, 3) positions of the nodes; read only."""
         grids = self._grids
         g = np.searchsorted(grids.first, self.index, side="right") - 1
         local = self.index - grids.first[g]
@@ -88,66 +143,74 @@ class NodesView(_View):
         corners = np.stack([grids.x0[g], grids.y0[g], grids.z0[g]], axis=1)
         return corners + places * grids.spacing[g][:, None]
 
-    @property
+    @Shown
     def mass(self) -> np.ndarray:
         """(n,) nodal mass; read only."""
-        return self._nodes.sums[self.index, 0]
+        return self._nodes.sums[self.index, MASS]
 
-    @property
+    @Shown
     def force(self) -> np.ndarray:
         """(n, d) internal plus external force; set it in ``post_particles_to_grid``."""
-        return self._nodes.sums[self.index, 1 + self._d :]
+        return self._nodes.sums[self._at_force()]
 
-    @force.setter
-    def force(self, value: np.ndarray) -> None:
-        self._nodes.sums[self.index, 1 + self._d :] = value
+    @force.writer
+    def _(self, value: np.ndarray) -> None:
+        self._nodes.sums[self._at_force()] = value
 
-    @property
+    def _at_force(self) -> tuple:
+        return self._part(self._nodes.sums, of_force(self._kin))
+
+    @Shown
     def velocity(self) -> np.ndarray:
         """(n, d) velocity: v before the momentum update, or the one that deforms the points."""
-        if self._stage == POST_VELOCITIES_TO_GRID or self._before_update:
-            return self._nodes.velocity[self.index]
+        nodes = self._nodes
+        if self._on_velocity:
+            return nodes.velocity[self.index]
         if self._stage == POST_PARTICLES_TO_GRID:
-            return self._nodes.sums[self.index, 1 : 1 + self._d] / self.mass[:, None]
-        update = self._nodes.update[self.index]
-        return update[:, : self._d] - update[:, self._d :]
+            momentum = nodes.sums[self._part(nodes.sums, of_momentum(self._kin))]
+            return momentum / nodes.sums[self.index, MASS][:, None]
+        change = nodes.update[self._part(nodes.update, of_change(self._kin))]
+        return nodes.update[self._part(nodes.update, 0)] - change
 
-    @velocity.setter
-    def velocity(self, value: np.ndarray) -> None:
-        if self._stage == POST_VELOCITIES_TO_GRID or self._before_update:
-            self._nodes.velocity[self.index] = value
+    @velocity.writer
+    def _(self, value: np.ndarray) -> None:
+        nodes = self._nodes
+        if self._on_velocity:
+            nodes.velocity[self.index] = value
         elif self._stage in (POST_UPDATE_GRID_STATE, POST_UPDATE_GRID_HEAT):
-            star = self._nodes.update[self.index, : self._d]
-            self._nodes.update[self.index, self._d :] = star - value
+            star = nodes.update[self._part(nodes.update, 0)]
+            nodes.update[self._part(nodes.update, of_change(self._kin))] = star - value
         else:
-            self._nodes.sums[self.index, 1 : 1 + self._d] = self.mass[:, None] * value
+            mass = nodes.sums[self.index, MASS][:, None]
+            nodes.sums[self._part(nodes.sums, of_momentum(self._kin))] = mass * value
 
-    @property
+    @Shown
     def velocity_update(self) -> np.ndarray:
         """(n, d) v*, the velocity after the momentum update (``post_update_grid_state``)."""
-        if self._before_update:
-            return self.velocity
-        return self._nodes.update[self.index, : self._d]
+        if self._on_velocity:
+            return self._nodes.velocity[self.index]
+        return self._nodes.update[self._part(self._nodes.update, 0)]
 
-    @velocity_update.setter
-    def velocity_update(self, value: np.ndarray) -> None:
-        if self._before_update:
-            self.velocity = value
+    @velocity_update.writer
+    def _(self, value: np.ndarray) -> None:
+        nodes = self._nodes
+        if self._on_velocity:
+            nodes.velocity[self.index] = value
             return
-        old = self.velocity
-        self._nodes.update[self.index, : self._d] = value
-        self._nodes.update[self.index, self._d :] = self._nodes.update[self.index, : self._d] - old
+        star = self._part(nodes.update, 0)
+        change = self._part(nodes.update, of_change(self._kin))
+        old = nodes.update[star] - nodes.update[change]
+        nodes.update[star] = value
+        nodes.update[change] = nodes.update[star] - old
 
 
 class PointsView(_View):
-    """The points of a group, at one stage of a step, in the order of their ids.
-
-    Reading a field gives an array with a row for each point; assigning it writes it back.
-    """
+    """The points of a group, at one stage of a step, in the order of their ids."""
 
     _fields = ("dt", "time", "ids", "moved")
 
     def __init__(self, simulation: Any, group: Any, then: bool):
+        super().__init__()
         self._simulation = simulation
         self._then = then
         control = simulation.setup.control
@@ -155,30 +218,58 @@ class PointsView(_View):
         self.time = float(control.values[TIME])
         self.ids = simulation.members(group)
         self.moved = False
+        self._declared: dict[type, np.ndarray] = {}
 
-    def _gather(self, field: Callable) -> np.ndarray:
-        return self._simulation.by_id(field)[self.ids]
+    def _gather(self, of: Callable) -> np.ndarray:
+        return self._simulation.by_id(of)[..., self.ids].T
 
-    def _scatter(self, field: Callable, value: np.ndarray) -> None:
-        full = self._simulation.by_id(field)
-        full[self.ids] = value
+    def _scatter(self, of: Callable, value: np.ndarray) -> None:
+        full = self._simulation.by_id(of)
+        full[..., self.ids] = value.T
         for block in self._simulation.setup.blocks:
-            field(block)[...] = full[block.id]
+            of(block.points)[...] = full[..., block.points.id]
 
-    def _places(self, block: Any) -> np.ndarray:
+    def __getitem__(self, kind: type) -> np.ndarray:
+        """(n, components) of a field that a fix declares in its ``point_fields``."""
+        if kind not in self._declared:
+            self._declared[kind] = self._gather(self._of(kind))
+        return self._declared[kind]
+
+    def __setitem__(self, kind: type, value: np.ndarray) -> None:
+        self[kind][...] = value
+
+    def write_back(self) -> None:
+        """Write what a hook has changed; called when it returns."""
+        super().write_back()
+        for kind, array in self._declared.items():
+            self._scatter(self._of(kind), array)
+
+    @staticmethod
+    def _of(kind: type) -> Callable:
+        def of(points: Any) -> np.ndarray:
+            array = field(points.fields, kind)
+            if array is None:
+                raise ValueError(
+                    f"points have no {name_of(kind)}: name it in the point_fields of the fix"
+                )
+            return array
+
+        return of
+
+    def _places(self, points: Any) -> np.ndarray:
         now = self._simulation.now
-        return block.x[1 - now if self._then else now]
+        return points.x[1 - now if self._then else now]
 
-    def _place(self, block: Any) -> np.ndarray:
-        return self._places(block)[:, : self._simulation.setup.kin.dimension]
+    def _place(self, points: Any) -> np.ndarray:
+        return self._places(points)[: self._simulation.setup.kin.dimension]
 
-    @property
+    @Shown
     def position(self) -> np.ndarray:
         """(n, d) positions; the corners of convected domains go with the points."""
         return self._gather(self._place)
 
-    @position.setter
-    def position(self, value: np.ndarray) -> None:
+    @position.writer
+    def _(self, value: np.ndarray) -> None:
         s = self._simulation.setup
         before = self._simulation.by_id(self._place)
         self._scatter(self._place, value)
@@ -186,67 +277,65 @@ class PointsView(_View):
         d, corners = s.kin.dimension, corners_that_move(s)
         for block in s.blocks:
             if corners:
-                behind = self._places(block)[:, d : d + d * corners]
-                behind += np.tile(step[block.id], corners)
+                behind = self._places(block.points)[d : d + d * corners]
+                behind += np.tile(step[:, block.points.id], (corners, 1))
         self.moved = True
 
-    @property
+    @Shown
     def velocity(self) -> np.ndarray:
         """(n, d) velocities."""
-        return self._gather(lambda block: block.points.v)
+        return self._gather(lambda points: points.v)
 
-    @velocity.setter
-    def velocity(self, value: np.ndarray) -> None:
-        self._scatter(lambda block: block.points.v, value)
+    @velocity.writer
+    def _(self, value: np.ndarray) -> None:
+        self._scatter(lambda points: points.v, value)
 
-    @property
+    @Shown
     def mass(self) -> np.ndarray:
         """(n,) masses; read only."""
-        return self._gather(lambda block: block.points.mass)
+        return self._gather(lambda points: points.mass)
 
-    @property
+    @Shown
     def force(self) -> np.ndarray:
         """(n, d) forces that fixes put on the points; add to it in ``initial_integrate``.
 
-        Only for fixes with ``puts_force_on_points = True``. It is zero before the first of them.
+        Only for fixes with ``point_fields = (Force,)``. It is zero before the first of them.
         """
-        return self._gather(self._force)
+        return self._gather(self._of(Force))
 
-    @force.setter
-    def force(self, value: np.ndarray) -> None:
-        self._scatter(self._force, value)
+    @force.writer
+    def _(self, value: np.ndarray) -> None:
+        self._scatter(self._of(Force), value)
 
-    @staticmethod
-    def _force(block: Any) -> np.ndarray:
-        if block.points.force is None:
-            raise ValueError("points have no force: the fix needs puts_force_on_points = True")
-        return block.points.force
-
-    @property
+    @Shown
     def temperature(self) -> np.ndarray:
         """(n,) temperatures, where heat flows; read only."""
-        return self._gather(lambda block: self._heat(block)[:, TEMPERATURE])
+        return self._gather(self._heat(Temperature))[:, 0]
 
-    @property
+    @Shown
     def heat_supply(self) -> np.ndarray:
         """(n,) heat per time that fixes bring; add to it in ``supply_heat``."""
-        return self._gather(lambda block: self._heat(block)[:, SUPPLY])
+        return self._gather(self._heat(Supply))[:, 0]
 
-    @heat_supply.setter
-    def heat_supply(self, value: np.ndarray) -> None:
-        self._scatter(lambda block: self._heat(block)[:, SUPPLY], value)
+    @heat_supply.writer
+    def _(self, value: np.ndarray) -> None:
+        self._scatter(self._heat(Supply), value[:, None])
 
     @staticmethod
-    def _heat(block: Any) -> np.ndarray:
-        if block.points.heat is None:
-            raise ValueError("no heat flows: the method has to be thermo-mechanical")
-        return block.points.heat
+    def _heat(kind: type) -> Callable:
+        def of(points: Any) -> np.ndarray:
+            array = field(points.fields, kind)
+            if array is None:
+                raise ValueError("no heat flows: the method has to be thermo-mechanical")
+            return array
+
+        return of
 
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
         self._simulation.set_stress(self.ids, given)
 
-    @property
+    @Shown
     def reference_position(self) -> np.ndarray:
         """(n, d) positions before the first step; read only."""
         return self._simulation.x0[self.ids]

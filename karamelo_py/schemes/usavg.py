@@ -4,44 +4,26 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
 from karamelo_py.kernels.arrays import (
     FINAL_INTEGRATE,
     INITIAL_INTEGRATE,
+    ON_VELOCITY,
     POST_UPDATE_GRID_STATE,
     POST_VELOCITIES_TO_GRID,
 )
-from karamelo_py.kernels.hooks import ON_VELOCITY
-from karamelo_py.kernels.stages import (
-    ClearSums,
-    ClearVelocity,
-    Force,
-    Gradient,
-    MassMomentum,
-    Momentum,
-    MomentumToVelocity,
-    Nothing,
-    SecondGradient,
-    SumsToVelocity,
-    Velocity,
-)
+from karamelo_py.kernels.g2p import SecondStrain, Strain
+from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.step import (
-    Fused,
-    Staged,
-    at_nodes,
-    at_points,
-    begin,
-    map_to_nodes,
-    move_points,
-    step,
-    step_size,
-    strain,
-    sweep,
-    sweep_here,
-    touch_velocity,
-    update_nodes,
+    ACCELERATE,
+    CONTACT_AFTER,
+    CONTACT_BEFORE,
+    FORCE,
+    MASS_AND_MOMENTUM,
+    MOMENTUM_AGAIN,
+    MOVE,
+    SERIES,
 )
-from karamelo_py.kernels.sweep import sweep_nodes
+from karamelo_py.kernels.table import AtNodes, AtPoints, Gather, Nodes
 
 
 class USAVG(NamedTuple):
@@ -56,87 +38,20 @@ class USAVG(NamedTuple):
     """
 
     courant = (1.0, 1.0)
-    stages = (
-        (
-            "nodal velocity",
-            "half of the strain and force in one visit of the points",
-            "update v*",
-            "g2p, move, momentum to grid in one visit",
-            "re-mapped velocity",
-            "half of the strain and p2g in one visit",
-        ),
-        (
-            "p2g mass and momentum",
-            "nodal velocity",
-            "half of the strain and force",
-            "update v*",
-            "g2p, move",
-            "momentum to grid",
-            "re-mapped velocity",
-            "half of the strain",
-        ),
+    rows = (
+        AtPoints(INITIAL_INTEGRATE, 0),
+        MASS_AND_MOMENTUM,
+        Nodes(SumsToVelocity()),
+        AtNodes(POST_UPDATE_GRID_STATE, ON_VELOCITY),
+        CONTACT_BEFORE,
+        Gather(Strain(), 0.5),
+        FORCE,
+        *ACCELERATE,
+        SERIES,
+        *MOVE,
+        *MOMENTUM_AGAIN,
+        AtNodes(POST_VELOCITIES_TO_GRID, ON_VELOCITY),
+        CONTACT_AFTER,
+        Gather(SecondStrain(), 0.5),
+        AtPoints(FINAL_INTEGRATE, 1),
     )
-
-
-@begin.on(USAVG, Fused)
-def _(scheme, visits, mode, s):
-    return map_to_nodes(s, mode, MassMomentum())
-
-
-@shared
-def _half_first(s, mode, hooks, half):
-    """From the momentum on the nodes to v*, by way of half of the strain."""
-    sweep_nodes(mode, SumsToVelocity(), s.kin, s.nodes, s.spans, half)
-    at_nodes(hooks, POST_UPDATE_GRID_STATE, ON_VELOCITY, s)
-    touch_velocity(s.contact, s, 0)
-    if not strain(s.averaging, s, mode, Gradient(), Force(), half):
-        return False
-    update_nodes(s, mode, hooks)
-    sweep_nodes(mode, ClearVelocity(), s.kin, s.nodes, s.spans, half)
-    return True
-
-
-@shared
-def _remap(s, mode, hooks, half):
-    sweep_nodes(mode, MomentumToVelocity(), s.kin, s.nodes, s.spans, half)
-    at_nodes(hooks, POST_VELOCITIES_TO_GRID, ON_VELOCITY, s)
-    touch_velocity(s.contact, s, 1)
-
-
-@step.on(USAVG, Fused)
-def _(scheme, visits, mode, s, hooks, more):
-    dt = step_size(s)
-    half = real(0.5, dt) * dt
-    if not _half_first(s, mode, hooks, half):
-        return False
-    if not sweep(s, mode, Velocity(), Momentum(), dt):
-        return False
-    _remap(s, mode, hooks, half)
-    if not more:
-        return strain(s.averaging, s, mode, SecondGradient(), Nothing(), half)
-    sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    return strain(s.averaging, s, mode, SecondGradient(), MassMomentum(), half)
-
-
-@begin.on(USAVG, Staged)
-def _(scheme, visits, mode, s):
-    return True
-
-
-@step.on(USAVG, Staged)
-def _(scheme, visits, mode, s, hooks, more):
-    dt = step_size(s)
-    half = real(0.5, dt) * dt
-    at_points(hooks, INITIAL_INTEGRATE, 0, s)
-    if not map_to_nodes(s, mode, MassMomentum()):
-        return False
-    if not _half_first(s, mode, hooks, half):
-        return False
-    if not move_points(s, mode, hooks):
-        return False
-    sweep_here(s, mode, Nothing(), Momentum(), dt)
-    _remap(s, mode, hooks, half)
-    if not strain(s.averaging, s, mode, SecondGradient(), Nothing(), half):
-        return False
-    at_points(hooks, FINAL_INTEGRATE, 1, s)
-    return True

@@ -4,33 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.kernels.arrays import (
-    FINAL_INTEGRATE,
-    INITIAL_INTEGRATE,
-)
-from karamelo_py.kernels.stages import (
-    ClearSums,
-    Everything,
-    Gradient,
-    Nothing,
-    UpdateToVelocity,
-    VelocityAndGradient,
-)
-from karamelo_py.kernels.step import (
-    Fused,
-    Staged,
-    accelerate_nodes,
-    at_points,
-    begin,
-    light_node,
-    map_to_nodes,
-    move_points,
-    step,
-    step_size,
-    strain,
-    sum_series,
-)
-from karamelo_py.kernels.sweep import sweep_nodes
+from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE
+from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.step import ACCELERATE, MOVE, SERIES, SUMS, light_node
+from karamelo_py.kernels.table import AtPoints, Gather, Nodes
 
 
 class USL(NamedTuple):
@@ -52,46 +29,13 @@ class USL(NamedTuple):
     """
 
     courant = (0.65, 0.4)
-    stages = (
-        ("p2g, g2p, move and stress in one visit of the points", "update v*"),
-        ("p2g", "update v*", "g2p, move", "stress"),
+    rows = (
+        AtPoints(INITIAL_INTEGRATE, 0),
+        SUMS,
+        *ACCELERATE,
+        Nodes(light_node),
+        SERIES,
+        *MOVE,
+        Gather(Strain()),
+        AtPoints(FINAL_INTEGRATE, 1),
     )
-
-
-@begin.on(USL, Fused)
-def _(scheme, visits, mode, s):
-    return map_to_nodes(s, mode, Everything())
-
-
-@step.on(USL, Fused)
-def _(scheme, visits, mode, s, hooks, more):
-    dt = step_size(s)
-    accelerate_nodes(s, mode, hooks)
-    sweep_nodes(mode, UpdateToVelocity(light_node(s)), s.kin, s.nodes, s.spans, dt)
-    sum_series(s.transfer, s, mode)
-    if not more:
-        return strain(s.averaging, s, mode, VelocityAndGradient(), Nothing(), dt)
-    sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
-    return strain(s.averaging, s, mode, VelocityAndGradient(), Everything(), dt)
-
-
-@begin.on(USL, Staged)
-def _(scheme, visits, mode, s):
-    return True
-
-
-@step.on(USL, Staged)
-def _(scheme, visits, mode, s, hooks, more):
-    dt = step_size(s)
-    at_points(hooks, INITIAL_INTEGRATE, 0, s)
-    if not map_to_nodes(s, mode, Everything()):
-        return False
-    accelerate_nodes(s, mode, hooks)
-    sweep_nodes(mode, UpdateToVelocity(light_node(s)), s.kin, s.nodes, s.spans, dt)
-    sum_series(s.transfer, s, mode)
-    if not move_points(s, mode, hooks):
-        return False
-    if not strain(s.averaging, s, mode, Gradient(), Nothing(), dt):
-        return False
-    at_points(hooks, FINAL_INTEGRATE, 1, s)
-    return True

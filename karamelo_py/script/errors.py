@@ -125,6 +125,12 @@ def _printable(text: str) -> str:
     return "".join(c if c == "\t" or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
+def meant(name: str, names: Iterable[str]) -> str | None:
+    """``did you mean '...'?`` with the one of `names` most like `name`; None without any."""
+    close = nearest(name, names)
+    return f"did you mean '{close}'?" if close else None
+
+
 def nearest(name: str, names: Iterable[str]) -> str | None:
     """The one of `names` most like `name`, or None when none is alike."""
     names = list(names)

@@ -1,15 +1,13 @@
 """Syntax errors in a user's words.
 
-Lark tells where it stopped and which tokens it would have liked; what the user did is found by
-looking at the text around that place.
+Lark's parser, fed token by token, tells where it stopped, what it had read and what was open then;
+what the user did follows from these.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError
@@ -40,25 +38,11 @@ class Mistake(Exception):
         return ScriptError(self.message, place=place, expected=self.expected, hint=self.hint)
 
 
-@contextmanager
-def explained(explain: Callable[[int], Mistake]) -> Iterator[None]:
-    """Turn what Lark raises into what `explain` makes of the offset where it stopped."""
-    from lark.exceptions import UnexpectedCharacters, UnexpectedInput, VisitError
-
-    try:
-        yield
-    except UnexpectedCharacters as error:
-        raise explain(error.pos_in_stream) from None
-    except UnexpectedInput as error:
-        token = getattr(error, "token", None)
-        at_end = token is None or token.type == "$END" or token.start_pos is None
-        raise explain(-1 if at_end else token.start_pos) from None
-    except VisitError as error:
-        raise error.orig_exc from None
-
-
 # ---- the script: quotes and parentheses ---------------------------------------------------------
 
+_CLOSES_NOTHING = (
+    "this ) closes nothing", "as many ( as )", "remove it, or add the ( that belongs to it"
+)  # fmt: skip
 _PUNCTUATION = re.compile(r'"[^"\n]*"|#[^\n]*|["()“”„‟«»‘’`\x00-\x08\x0e-\x1f\x7f]')
 
 
@@ -91,7 +75,7 @@ def check_characters(text: str) -> None:
         )
 
 
-def in_script(text: str, _: int) -> Mistake:
+def in_script(text: str) -> Mistake:
     """What is wrong with the quotes or parentheses of a script."""
     opened: list[int] = []
     for match in _PUNCTUATION.finditer(text):
@@ -102,13 +86,8 @@ def in_script(text: str, _: int) -> Mistake:
             opened.append(start)
         elif word == ")":
             if not opened:
-                return Mistake(
-                    "this ) closes nothing",
-                    start,
-                    start + 1,
-                    expected="as many ( as )",
-                    hint="remove it, or add the ( that belongs to it",
-                )
+                message, *advice = _CLOSES_NOTHING
+                return Mistake(message, start, start + 1, *advice)
             opened.pop()
     if opened:
         return _open_parenthesis(text, opened[0])
@@ -141,17 +120,6 @@ def _open_parenthesis(text: str, start: int) -> Mistake:
 
 # ---- an expression ------------------------------------------------------------------------------
 
-_TOKEN = re.compile(
-    r"""(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)
-      | (?P<operator>\*\*|&&|\|\||<=|>=|==|!=|[-+*/%^<>!]|(?:and|or|not)\b)
-      | (?P<name>[^\W\d]\w*)
-      | (?P<text>"[^"\n]*")
-      | (?P<mark>[(),=])
-      | (?P<space>\s+)
-      | (?P<other>.)""",
-    re.VERBOSE | re.DOTALL,
-)
-
 _REMEDIES = {
     ";": "one statement per line, without ;",
     "&": "write && or and",
@@ -181,226 +149,207 @@ _REMEDIES = {
 _VALUE = "a number, a name or a parenthesis"
 
 
-class _Token(NamedTuple):
-    kind: str
-    text: str
+_OPERATORS = ("OR", "AND", "NOT", "COMPARISON", "SIGN", "TIMES", "POWER")
+_STARTS = ("NUMBER", "NAME", "STRING", "LPAR")
+_ENDS = ("NUMBER", "NAME", "STRING", "RPAR")
+
+
+class _Stop(NamedTuple):
+    """Where the parser stopped: tokens before and at that place, and what it held.
+
+    `here` is a character that begins no token, a token, or None at the end.
+    """
+
+    code: str
+    before: list
+    here: Any
     start: int
-    end: int
+    stack: list
 
     @property
-    def is_value_start(self) -> bool:
-        return self.kind in ("number", "name", "text") or self.text == "("
+    def end(self) -> int:
+        return self.start + len(self.here)
 
     @property
-    def is_value_end(self) -> bool:
-        return self.kind in ("number", "name", "text") or self.text == ")"
+    def last(self) -> Any:
+        """The token before, or None."""
+        return self.before[-1] if self.before else None
+
+    @property
+    def kind(self) -> str:
+        """The type of the token here."""
+        return getattr(self.here, "type", "")
+
+    @property
+    def opened(self) -> list[int]:
+        """Where parentheses are open."""
+        return [t.start_pos for t in self.stack if getattr(t, "type", "") == "LPAR"]
+
+    @property
+    def after_call(self) -> bool:
+        """Whether all before is one call."""
+        types = [getattr(part, "type", "") for part in self.stack]
+        call = types[:2] == ["NAME", "LPAR"] and types[-1] == "RPAR"
+        return call and types.count("LPAR") == 1
+
+    def mistake(self, message: str, expected: str = _VALUE, hint: str | None = None) -> Mistake:
+        """A mistake that marks what stands here."""
+        return Mistake(message, self.start, self.end, expected, hint)
 
 
-def in_expression(code: str, position: int) -> Mistake:
-    """What is wrong with `code`, at whose `position` (-1: end) the parser stopped."""
-    tokens = [
-        _Token(m.lastgroup or "", m[0], *m.span())
-        for m in _TOKEN.finditer(code)
-        if m.lastgroup != "space"
-    ]
-    odd = next((token for token in tokens if token.kind == "other"), None)
-    if odd and odd.text == '"':
-        return _open_quote(code, odd.start)
-    if odd and (position < 0 or odd.start <= position or odd.text in "&|"):
-        return Mistake(
-            f"'{odd.text}' means nothing in an expression",
-            odd.start,
-            odd.end,
-            expected="numbers, names, operators and parentheses",
-            hint=_REMEDIES.get(odd.text),
+def _stop(parser: Any, code: str) -> _Stop:
+    """Feed `code` to Lark's `parser` up to where it can go no further."""
+    from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+
+    interactive = parser.parse_interactive(code)
+    state, before = interactive.parser_state, []
+    here, start = None, len(code)
+    try:
+        for token in interactive.lexer_thread.lex(state):
+            interactive.feed_token(token)
+            before.append(token)
+    except UnexpectedCharacters as error:
+        start = error.pos_in_stream
+        here = code[start]
+    except UnexpectedToken as error:
+        here, start = error.token, error.token.start_pos
+    return _Stop(code, before, here, start, list(state.value_stack))
+
+
+def in_expression(parser: Any, code: str) -> Mistake:
+    """What is wrong with `code`, which Lark's `parser` refuses."""
+    at = _stop(parser, code)
+    if at.here is None:
+        return _at_end(at)
+    if at.here == "=":
+        return _equals(at)
+    if at.here == '"':
+        return _open_quote(code, at.start)
+    if not at.kind:
+        return at.mistake(
+            f"'{at.here}' means nothing in an expression",
+            "numbers, names, operators and parentheses",
+            _REMEDIES.get(at.here),
         )
-    if position < 0:
-        position = len(code)
-    index = next((k for k, token in enumerate(tokens) if token.start >= position), len(tokens))
-    before = tokens[index - 1] if index else None
-    here = tokens[index] if index < len(tokens) else None
-    opened = _opened(tokens[:index])
-    if here is None:
-        return _at_end(code, before, opened)
-    if here.text == "=":
-        return _equals(code, tokens, index)
-    if here.text == ",":
-        return _comma(code, tokens, index, opened)
-    if here.text == ")":
-        return _closing(here, before, opened)
-    if before is not None and before.is_value_end and here.is_value_start:
-        return _side_by_side(code, tokens, index)
-    if here.kind == "operator":
-        if before is not None and before.kind == "operator":
-            message = f"operator '{here.text}' follows operator '{before.text}'"
-        elif before is not None and before.is_value_end:
-            message = f"'{here.text}' cannot stand between two values"
-        else:
-            message = f"operator '{here.text}' has nothing on its left"
-        hint = "put it in parentheses" if here.text in ("!", "not") else None
-        return Mistake(message, here.start, here.end, expected=_VALUE, hint=hint)
-    return Mistake(f"'{here.text}' cannot stand here", here.start, here.end, expected=_VALUE)
+    if at.here == ",":
+        return _comma(at)
+    if at.here == ")":
+        return _closing(at)
+    before = at.last
+    if before and before.type in _ENDS and at.kind in _STARTS:
+        return _side_by_side(at)
+    if at.kind not in _OPERATORS:
+        return at.mistake(f"'{at.here}' cannot stand here")
+    hint = "put it in parentheses" if at.kind == "NOT" else None
+    if before and before.type in _OPERATORS:
+        return at.mistake(f"operator '{at.here}' follows operator '{before}'", hint=hint)
+    if before and before.type in _ENDS:
+        return at.mistake(f"'{at.here}' cannot stand between two values", hint=hint)
+    return at.mistake(f"operator '{at.here}' has nothing on its left", hint=hint)
 
 
-def _opened(tokens: list[_Token]) -> list[tuple[_Token, bool]]:
-    """Parentheses that are open after `tokens`, and whether each belongs to a call."""
-    opened: list[tuple[_Token, bool]] = []
-    for k, token in enumerate(tokens):
-        if token.text == "(":
-            opened.append((token, k > 0 and tokens[k - 1].kind == "name"))
-        elif token.text == ")" and opened:
-            opened.pop()
-    return opened
-
-
-def _at_end(code: str, before: _Token | None, opened: list) -> Mistake:
+def _at_end(at: _Stop) -> Mistake:
+    before = at.last
     if before is None:
-        return Mistake("there is nothing here", 0, len(code), expected="an expression")
-    if before.kind == "operator":
-        return Mistake(
-            f"the expression ends after '{before.text}'",
-            before.start,
-            before.end,
-            expected=f"{_VALUE} after '{before.text}'",
-        )
-    if opened:
-        return _open_parenthesis(code, opened[0][0].start)
-    return Mistake("the expression ends too early", before.start, before.end, expected=_VALUE)
+        return Mistake("there is nothing here", 0, len(at.code), expected="an expression")
+    place = before.start_pos, before.end_pos
+    if before.type in _OPERATORS:
+        message = f"the expression ends after '{before}'"
+        return Mistake(message, *place, expected=f"{_VALUE} after '{before}'")
+    if at.opened:
+        return _open_parenthesis(at.code, at.opened[0])
+    return Mistake("the expression ends too early", *place, expected=_VALUE)
 
 
-def _equals(code: str, tokens: list[_Token], index: int) -> Mistake:
-    here = tokens[index]
-    before = tokens[index - 1] if index else None
+def _equals(at: _Stop) -> Mistake:
+    tokens, before = at.before, at.last
     expected = "name = expression, once in a line; == compares"
     if before is None:
-        return Mistake("'=' has no name on its left", here.start, here.end, expected=expected)
-    first = tokens[0]
-    if index == 2 and before.kind == "operator" and first.kind == "name":
-        rest = code[here.end :].strip()
-        return Mistake(
-            f"'{before.text}=' is not known here",
-            before.start,
-            here.end,
-            expected=expected,
-            hint=f"{first.text} = {first.text} {before.text} {rest}",
-        )
-    if first.kind == "name" and len(tokens) > 1 and tokens[1].text == "(" and before.text == ")":
+        return at.mistake("'=' has no name on its left", expected)
+    first, rest = tokens[0], at.code[at.end :].strip()
+    if len(tokens) == 2 and before.type in _OPERATORS and first.type == "NAME":
+        hint = f"{first} = {first} {before} {rest}"
+        message = f"'{before}=' is not known here"
+        return Mistake(message, before.start_pos, at.end, expected, hint)
+    if first.type == "NAME" and len(tokens) > 1 and tokens[1] == "(" and before == ")":
         return Mistake(
             "only a name can stand left of '='",
-            first.start,
-            before.end,
-            expected=expected,
-            hint=f"a formula needs no arguments: {first.text} = {code[here.end :].strip()}",
+            first.start_pos,
+            before.end_pos,
+            expected,
+            f"a formula needs no arguments: {first} = {rest}",
         )
-    if all(token.text != "=" for token in tokens[:index]) and first.start < here.start:
-        hint = "compare with ==" if _opened(tokens[:index]) else None
-        if all(token.kind in ("name", "number", "operator") for token in tokens[:index]):
-            hint = "a name begins with a letter and has letters, digits and _ only"
-        return Mistake("'=' cannot stand here", here.start, here.end, expected=expected, hint=hint)
-    return Mistake("a second '='", here.start, here.end, expected=expected)
+    hint = "compare with ==" if at.opened else None
+    if all(token.type in ("NAME", "NUMBER", *_OPERATORS) for token in tokens):
+        hint = "a name begins with a letter and has letters, digits and _ only"
+    return at.mistake("'=' cannot stand here", expected, hint)
 
 
-def _comma(code: str, tokens: list[_Token], index: int, opened: list) -> Mistake:
-    here = tokens[index]
-    before = tokens[index - 1] if index else None
-    after = tokens[index + 1] if index + 1 < len(tokens) else None
-    if before is None or before.text in "(," or before.kind == "operator":
-        return Mistake(
-            "something is missing before this comma", here.start, here.end, expected=_VALUE
-        )
-    hint = None
-    digits = before.kind == "number" and after is not None and after.kind == "number"
-    if digits and after is not None:
-        hint = f"write decimals with a point: {before.text}.{after.text}"
-    return Mistake(
+def _comma(at: _Stop) -> Mistake:
+    before = at.last
+    if before is None or before in ("(", ",") or before.type in _OPERATORS:
+        return at.mistake("something is missing before this comma")
+    digits = re.match(r"\s*([\d.]+)", at.code[at.end :]) if before.type == "NUMBER" else None
+    return at.mistake(
         "a comma separates the arguments of a call; there is no call here",
-        here.start,
-        here.end,
-        expected="an operator or the end of the expression",
-        hint=hint,
+        "an operator or the end of the expression",
+        f"write decimals with a point: {before}.{digits[1]}" if digits else None,
     )
 
 
-def _closing(here: _Token, before: _Token | None, opened: list) -> Mistake:
-    if not opened:
-        return Mistake(
-            "this ) closes nothing",
-            here.start,
-            here.end,
-            expected="as many ( as )",
-            hint="remove it, or add the ( that belongs to it",
-        )
-    if before is not None and before.text == "(":
-        return Mistake(
-            "there is nothing in these parentheses", before.start, here.end, expected=_VALUE
-        )
-    after = f" after '{before.text}'" if before else ""
-    return Mistake(f"something is missing{after}", here.start, here.end, expected=_VALUE)
+def _closing(at: _Stop) -> Mistake:
+    if not at.opened:
+        return at.mistake(*_CLOSES_NOTHING)
+    if at.last == "(":
+        message = "there is nothing in these parentheses"
+        return Mistake(message, at.last.start_pos, at.end, expected=_VALUE)
+    return at.mistake(f"something is missing after '{at.last}'")
 
 
-def _side_by_side(code: str, tokens: list[_Token], index: int) -> Mistake:
-    before, here = tokens[index - 1], tokens[index]
-    touching = before.end == here.start
-    start, end = before.start, here.end
-    if before.kind == "number" and touching and here.kind == "number":
-        number = re.match(r"[\d.]+(?:[eE][+-]?\d+)?", code[start:])
-        end = start + number.end() if number else end
-        return Mistake(
-            f"'{code[start:end]}' is not a number",
-            start,
-            end,
-            expected="a number has one point at most",
-        )
-    if before.kind == "number" and touching and here.kind == "name":
-        if re.fullmatch(r"[eEdD]\d*", here.text):
-            good = re.fullmatch(r"[dD](\d+)", here.text)
-            after = code[end : end + 1] if here.text in ("e", "E", "d", "D") else ""
-            end += len(after) if after in ("+", "-") else 0
+def _side_by_side(at: _Stop) -> Mistake:
+    code, before, here = at.code, at.last, at.here
+    start, end = before.start_pos, at.end
+    touching = before.type == "NUMBER" and before.end_pos == at.start
+    if touching and at.kind == "NUMBER":
+        end = start + re.match(r"[\d.]+(?:[eE][+-]?\d+)?", code[start:]).end()
+        expected = "a number has one point at most"
+        return Mistake(f"'{code[start:end]}' is not a number", start, end, expected)
+    if touching and at.kind == "NAME":
+        if re.fullmatch(r"[eEdD]\d*", here):
+            good = re.fullmatch(r"[dD](\d+)", here)
+            end += len(here) == 1 and code[end : end + 1] in ("+", "-")
             return Mistake(
                 f"'{code[start:end]}' is not a number",
                 start,
                 end,
                 expected="an exponent as in 1e-5",
-                hint=f"{before.text}e{good[1]}" if good else None,
+                hint=f"{before}e{good[1]}" if good else None,
             )
         return Mistake(
-            f"an operator is missing between '{before.text}' and '{here.text}'",
+            f"an operator is missing between '{before}' and '{here}'",
             start,
             end,
             expected="an operator, such as *",
-            hint=f"{before.text}*{here.text}; a name cannot start with a digit",
+            hint=f"{before}*{here}; a name cannot start with a digit",
         )
-    if index == 1 and before.kind == "name":
-        rest = code[here.start :].strip().rstrip(",")
-        words = [word.strip(",") for word in rest.split()]
-        return Mistake(
-            f"'{here.text}' follows '{before.text}' without an operator",
-            here.start,
-            here.end,
-            expected="name = expression, or command(arguments)",
-            hint=_block_or_call(before.text, words),
+    if len(at.before) == 1 and before.type == "NAME":
+        words = [word.strip(",") for word in code[at.start :].strip().rstrip(",").split()]
+        return at.mistake(
+            f"'{here}' follows '{before}' without an operator",
+            "name = expression, or command(arguments)",
+            _block_or_call(before, words),
         )
-    two_statements = _is_call(tokens[:index]) and here.kind == "name"
-    hint = "multiply with *; two statements stand on two lines" if two_statements else None
-    if two_statements and tokens[0].text in _BLOCKS:
-        hint = _NO_BLOCKS
-    elif before.kind == "number" and here.kind == "name" and index == len(tokens) - 1:
+    hint = None
+    if at.after_call and at.kind == "NAME":
+        hint = "multiply with *; two statements stand on two lines"
+        hint = _NO_BLOCKS if at.before[0] in _BLOCKS else hint
+    elif before.type == "NUMBER" and at.kind == "NAME" and not code[end:].strip():
         hint = "numbers stand without units"
-    what = f"'{_short(before)}' and '{_short(here)}'"
-    return Mistake(
-        f"an operator is missing between {what}",
-        here.start,
-        here.end,
-        expected="an operator, such as *, or a comma between arguments",
-        hint=hint,
+    return at.mistake(
+        f"an operator is missing between '{_short(before)}' and '{_short(here)}'",
+        "an operator, such as *, or a comma between arguments",
+        hint,
     )
-
-
-def _is_call(tokens: list[_Token]) -> bool:
-    """Whether `tokens` are one call from end to end."""
-    if len(tokens) < 3 or tokens[0].kind != "name" or tokens[1].text != "(":
-        return False
-    return bool(_opened(tokens[:-1])) and not _opened(tokens)
 
 
 _BLOCKS = ("for", "while", "if", "else", "elif", "def", "do", "import", "loop", "next", "jump")
@@ -418,5 +367,5 @@ def _block_or_call(name: str, words: list[str]) -> str:
     return f"arguments go in parentheses: {name}(...)"
 
 
-def _short(token: _Token) -> str:
-    return token.text if len(token.text) < 30 else token.text[:27] + "..."
+def _short(text: str) -> str:
+    return text if len(text) < 30 else text[:27] + "..."

@@ -1,4 +1,4 @@
-"""From text to statements. The grammar is in karamelo.lark."""
+"""From text to statements. The grammars are in script.lark and expression.lark."""
 
 from __future__ import annotations
 
@@ -48,8 +48,9 @@ def parse(text: str, file: str = "<text>") -> list[Statement]:
     source = Source(text, file)
     try:
         mistakes.check_characters(text)
-        with mistakes.explained(lambda error: mistakes.in_script(text, error)):
-            spans = _lark().parse(text, start="script")
+        spans = _lark("script").parse(text)
+    except _refused():
+        raise mistakes.in_script(text).error(source) from None
     except Mistake as mistake:
         raise mistake.error(source) from None
     return [_statement(source, *span) for span in spans]
@@ -88,8 +89,10 @@ def _tree(code: str) -> Node:
         return Number(start, start + len(word), 1, _number(word, start))
     if not word:
         raise Mistake("there is nothing here", 0, len(code), expected="an expression")
-    with mistakes.explained(lambda error: mistakes.in_expression(code, error)):
-        return _lark().parse(code, start="expression")
+    try:
+        return _lark("expression").parse(code)
+    except _refused():
+        raise mistakes.in_expression(_lark("expression"), code) from None
 
 
 def _number(word: str, start: int) -> float:
@@ -146,15 +149,22 @@ def _arguments(source: Source, name: str, parts: list) -> list[Raw]:
 # ---- Lark ---------------------------------------------------------------------------------------
 
 
+def _refused() -> type[Exception]:
+    from lark.exceptions import UnexpectedInput
+
+    return UnexpectedInput
+
+
 @cache
-def _lark() -> Any:
+def _lark(start: str) -> Any:
+    """The parser of statements, or that of expressions, which knows no other tokens."""
     from lark import Lark
 
-    grammar = Path(__file__).with_name("karamelo.lark").read_text(encoding="utf-8")
+    grammar = Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8")
     return Lark(
         grammar,
         parser="lalr",
-        start=["script", "expression"],
+        start=start,
         transformer=_Builder(),
         keep_all_tokens=True,
         maybe_placeholders=False,

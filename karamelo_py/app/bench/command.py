@@ -6,53 +6,61 @@ this command, since machines are shared and their clocks change.
 
 from __future__ import annotations
 
-from argparse import ArgumentTypeError
+import re
+from argparse import ArgumentTypeError, Namespace
 from math import inf
+from typing import Any
 
 from karamelo_py.app.bench import measure
 from karamelo_py.app.bench.workloads import WORKLOADS
-from karamelo_py.app.cli import CommandLine, threads_option
+from karamelo_py.app.cli import add_variables, threads_option
 from karamelo_py.run.report import point_fields
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 
 ELSEWHERE = "published, one core of another machine, a small AMD EPYC"
 
 
-def explanation() -> str:
-    """How the subcommand is called, and what it can measure."""
+def add_parser(subparsers: Any) -> None:
+    """Say what the subcommand takes, and what it can measure."""
     width = max(map(len, WORKLOADS))
-    workloads = "".join(f"  {name:<{width}}  {w.title}\n" for name, w in WORKLOADS.items())
-    return f"""\
-karamelo-py bench [WORKLOAD ...] [options]
-
-Measures the speed of this machine on known scenes, all or those that are named: particle-steps per
+    parser = subparsers.add_parser(
+        "bench",
+        description=f"""\
+Measure the speed of this machine on known scenes, all or those that are named: particle-steps per
 second of the fastest of five repetitions, bytes per particle, and the time of each stage of a step.
 
 workloads:
-{workloads}
-options:
-  -var NAME VALUE    set a variable of the scenes, such as N, their fineness
-  --threads N        threads to use (default: 1)
-  --seconds S        how long each scene is measured (default: 2)
-"""
+{chr(10).join(f"  {name:<{width}}  {w.title}" for name, w in WORKLOADS.items())}""",
+    )
+    parser.set_defaults(act=measure_all)
+    parser.add_argument("workloads", nargs="*", metavar="WORKLOAD")
+    add_variables(parser, "set a variable of the scenes, such as N, their fineness")
+    parser.add_argument(
+        "--threads", type=threads_option, default=1, metavar="N",
+        help="threads to use (default: 1)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seconds", type=_positive, default=2.0, metavar="S",
+        help="how long each scene is measured (default: 2)",
+    )  # fmt: skip
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
-def main(arguments: list[str]) -> int:
+def measure_all(options: Namespace) -> int:
     """The subcommand."""
-    parser = CommandLine(prog="karamelo-py bench", add_help=False, allow_abbrev=False)
-    parser.add_argument("workloads", nargs="*")
-    parser.add_argument("-var", nargs=2, action="append", default=[])
-    parser.add_argument("--threads", type=threads_option, default=1)
-    parser.add_argument("--seconds", type=_positive, default=2.0)
-    parser.add_argument("--debug", action="store_true")
-    options = parser.parse_args(arguments)
     for name in options.workloads:
         if name not in WORKLOADS:
-            close = nearest(name, WORKLOADS)
             raise ScriptError(
                 f"unknown workload '{name}'",
                 expected="one of " + ", ".join(WORKLOADS),
-                hint=f"did you mean '{close}'?" if close else None,
+                hint=meant(name, WORKLOADS),
+            )
+    chosen = options.workloads or list(WORKLOADS)
+    known = {name: set(re.findall(r"\w+", WORKLOADS[name].script)) for name in chosen}
+    for variable, _ in options.var:
+        if not any(variable in words for words in known.values()):
+            raise ScriptError(
+                f"-var {variable}: no scene has a variable '{variable}'", expected="N or coarser"
             )
     import numba
 
@@ -61,8 +69,9 @@ def main(arguments: list[str]) -> int:
     numba.set_num_threads(threads)
     triad = measure.bandwidth(threads)
     print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")
-    for name in options.workloads or WORKLOADS:
-        _print(name, dict(options.var), threads, options.seconds, triad)
+    for name in chosen:
+        presets = {n: value for n, value in options.var if n in known[name]}
+        _print(name, presets, threads, options.seconds, triad)
     return 0
 
 

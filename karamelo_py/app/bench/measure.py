@@ -14,10 +14,10 @@ from numba import prange
 from karamelo_py.app.bench.workloads import MOST_STEPS, Workload
 from karamelo_py.compiler.compile import kernel
 from karamelo_py.kernels.step import DONE, Fused, begin, finish, step
-from karamelo_py.kernels.sweep import sweep_nodes, sweep_tiles
+from karamelo_py.kernels.sweep import sweep_nodes, sweep_points
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.report import point_fields
+from karamelo_py.run.report import node_fields, point_fields
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -31,14 +31,14 @@ class Timed(NamedTuple):
 
 
 def _name(*tags: Any) -> str:
-    return " + ".join(type(tag).__name__ for tag in tags if type(tag).__name__ != "Nothing")
+    return " + ".join(type(tag).__name__ for tag in tags)
 
 
-@sweep_tiles.on(Timed)
-def _(mode, gather, scatter, s, block, places, dt):
+@sweep_points.on(Timed)
+def _(mode, visit, s, block, then, gathers, scatters, dt):
     begun = time.perf_counter()
-    sweep_tiles(mode.mode, gather, scatter, s, block, places, dt)
-    _note(mode, _name(gather, scatter), begun)
+    sweep_points(mode.mode, visit, s, block, then, gathers, scatters, dt)
+    _note(mode, _name(*visit.tasks, *visit.quantities), begun)
 
 
 @sweep_nodes.on(Timed)
@@ -117,32 +117,20 @@ def _take_step(simulation: Simulation, mode: Any) -> None:
 class _Recorder(NamedTuple):
     """Sweeps nothing, and notes what a sweep would read and write."""
 
-    traffic: list
+    points: list
+    nodes: list
 
 
-@sweep_tiles.on(_Recorder)
-def _(mode, gather, scatter, s, block, places, dt):
-    mode.traffic.append(("points", set(gather.reads) | set(scatter.reads), set(gather.writes)))
+@sweep_points.on(_Recorder)
+def _(mode, visit, s, block, then, gathers, scatters, dt):
+    reads = {name for tag in (*visit.tasks, *visit.quantities) for name in tag.reads}
+    writes = {name for tag in visit.tasks for name in tag.writes}
+    mode.points.extend((*reads, *writes))
 
 
 @sweep_nodes.on(_Recorder)
 def _(mode, task, kin, nodes, spans, dt):
-    mode.traffic.append(("nodes", type(task).__name__, None))
-
-
-# Node arrays that a task goes through, read and written once each.
-NODE_TRAFFIC = {
-    "ClearSums": (("sums", 1),),
-    "ClearVelocity": (("velocity", 1),),
-    "Update": (("sums", 1), ("update", 1)),
-    "MomentumToVelocity": (("velocity", 2),),
-    "SumsToVelocity": (("sums", 1), ("velocity", 1)),
-    "UpdateToVelocity": (("update", 1), ("velocity", 1)),
-    "ClearGrowth": (("growth", 1),),
-    "AverageGrowth": (("growth", 2),),
-    "StartSeries": (("sums", 1), ("series", 1), ("update", 2)),
-    "ExtendSeries": (("sums", 1), ("series", 2), ("update", 2)),
-}
+    mode.nodes.extend(task.goes_through)
 
 
 def traffic(simulation: Simulation) -> float:
@@ -152,21 +140,16 @@ def traffic(simulation: Simulation) -> float:
     of node fields, those that loops over nodes go through.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
-    recorder = _Recorder([])
+    recorder = _Recorder([], [])
     control = s.control
-    kept = control.values.copy(), control.real.copy(), control.whole.copy()
+    kept = control.values.copy(), control.clock.copy()
     step(scheme, Fused(), recorder, s, simulation.hooks, True)
-    control.values[:], control.real[:], control.whole[:] = kept
-    sizes = {name: size for name, _, size in point_fields(s.blocks[0])}
+    control.values[:], control.clock[:] = kept
+    of_point = {name: size for name, _, size in point_fields(s.blocks[0])}
+    of_node = {name: array.itemsize * array.shape[1] for name, array in node_fields(s)}
     active = float(np.sum(s.spans[1 : 1 + s.spans[0, 0], 1] - s.spans[1 : 1 + s.spans[0, 0], 0]))
-    total = 0.0
-    for kind, first, second in recorder.traffic:
-        if kind == "points":
-            total += simulation.count * sum(sizes.get(n, 0) for n in (*first, *second))
-        else:
-            for field, times in NODE_TRAFFIC[first]:
-                array = getattr(s.nodes, field)
-                total += times * active * array.itemsize * array.shape[1]
+    total = simulation.count * sum(of_point.get(name, 0) for name in recorder.points)
+    total += active * sum(of_node.get(name, 0) for name in recorder.nodes)
     return total / simulation.count
 
 

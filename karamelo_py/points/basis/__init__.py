@@ -25,9 +25,16 @@ steady_moment
 steep_edge
     whether |grad N|^2 / N exceeds 2 / h^2 a direction where a weight vanishes: usl then limits what
     light nodes do to the strain.
+
+A basis whose points have domains says what a place keeps of them, and so where the arrays begin:
+
+shape
+    names of its parts, in their order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
+    ``deformation`` (F in the plane or in space) and ``corners`` (of its `element`, an
+    :class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.compile import by_type, define, point_function, tag_class
 
 
 @point_function(tags=2)
@@ -72,14 +79,24 @@ def _(basis, grid, moment):
 # --- the shape of a point's domain ------------------------------------------------------------
 
 
-@point_function(tags=2)
+def shape_size(basis: type, d: int) -> int:
+    """How many numbers a place has behind the position, in `d` dimensions."""
+    shape = getattr(basis, "shape", ())
+    corners = basis.element.corners if "corners" in shape else 0
+    sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}
+    return sum(sizes[part] for part in shape)
+
+
 def blank(basis, kin, x):
     """A place at position `x` with a shape of zeros."""
+    return (*x, *((x[0] - x[0],) * shape_size(type(basis), len(x))))
 
 
-@blank.otherwise
-def _(basis, kin, x):
-    return x
+@by_type(blank)
+def _blank(basis, kin, x):
+    own = "".join(f"x[{k}], " for k in range(len(x)))
+    zeros = "zero, " * shape_size(tag_class(basis), len(x))
+    return define("basis, kin, x", "zero = x[0] - x[0]", f"return ({own}{zeros})")
 
 
 @point_function()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.basis import mapped_again
-from karamelo_py.points.basis.product import along, register, spacing
+from karamelo_py.points.basis.product import Along, along, register, spacing
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -40,7 +40,7 @@ def _(basis, kin, grid, place, direction):
     weights = (t * t, (s + s) * t, s * s)
     gradients = (-twice * t, twice * (t - s), twice * s)
     # D = s (1 - s) h^2 / 2 vanishes at corners; N D^-1 (X - x) is the gradient everywhere.
-    return i + i, s, weights, gradients, gradients
+    return Along(i + i, s, weights, gradients, gradients)
 
 
 @spacing.on(BernsteinQuadratic)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real, shared
-from karamelo_py.points.basis.product import along, register
+from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -61,7 +61,7 @@ def _(basis, kin, grid, place, direction):
         three * s * weights[2],
         three * (real(1, a) + s) * weights[3],
     )
-    return cell - 1, r, weights, gradients, affine
+    return Along(cell - 1, r, weights, gradients, affine)
 
 
 @shared
@@ -73,17 +73,17 @@ def _at_wall(grid, a, last):
     zero, one = real(0, a), real(1, a)
     if last == 1:  # both walls at once: what is left are the hat functions
         gradients = (-grid.inv_h, grid.inv_h, zero, zero)
-        return first, r, (one - r, r, zero, zero), gradients, gradients
+        return Along(first, r, (one - r, r, zero, zero), gradients, gradients)
     if cell == 0:
         n, g, c = _beside_wall(grid, a)
-        return first, r, n + (zero,), g + (zero,), c + (zero,)
+        return Along(first, r, n + (zero,), g + (zero,), c + (zero,))
     n, g, c = _beside_wall(grid, real(last, a) - a)
     n = (n[2], n[1], n[0])
     g = (-g[2], -g[1], -g[0])
     c = (-c[2], -c[1], -c[0])
     if last == 2:
-        return first, r, n + (zero,), g + (zero,), c + (zero,)
-    return first, r, (zero,) + n, (zero,) + g, (zero,) + c
+        return Along(first, r, n + (zero,), g + (zero,), c + (zero,))
+    return Along(first, r, (zero,) + n, (zero,) + g, (zero,) + c)
 
 
 @shared

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.basis import mapped_again
-from karamelo_py.points.basis.product import along, register
+from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -39,7 +39,7 @@ def _(basis, kin, grid, place, direction):
     # D = r (1 - r) h^2 vanishes at the nodes, but N D^-1 (X - x) is the gradient everywhere
     # (Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-particle-in-cell
     # method", section 5.3).
-    return i, r, (one - r, r), gradients, gradients
+    return Along(i, r, (one - r, r), gradients, gradients)
 
 
 @mapped_again.on(Linear)

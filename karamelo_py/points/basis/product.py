@@ -1,32 +1,44 @@
 """Bases that are a product of one function a direction: hats, splines, uniform GIMP.
 
-The one-dimensional part is the point function `along`; the stencil of a point is the number of its
-first node and, for each direction, what `along` returned.
+The one-dimensional part is the point function `along`; everything else is the same product for any
+number of directions, unrolled from one definition.
 """
 
 from __future__ import annotations
 
-from karamelo_py.compiler.compile import index, point_function, real, shared
+from collections.abc import Callable
+from functools import cache
+from math import prod
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.compile import choose, define, index, point_function, real, shared
+from karamelo_py.compiler.symbols import Symbol, call, written
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
-from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.kinematics import Axisymmetric
+from karamelo_py.points.kinematics.tags import TAGS
+
+
+class Along(NamedTuple):
+    """The nodes that a point sees in one direction."""
+
+    first: int  # number of the first of them in this direction
+    r: float  # distance of the point from it, in cells
+    weights: tuple[float, ...]  # N of each
+    gradients: tuple[float, ...]  # dN/dx of each
+    affine: tuple[float, ...]  # N D^-1 (X_I - x) of each, D the mean of (X_I - x)^2 under N
+
+
+class Stencil(NamedTuple):
+    """The nodes that a point sees."""
+
+    first: int  # number of the first of them
+    lines: tuple[Along, ...]  # along each direction
+    inv_r: float  # 1 / r of an axisymmetric point
 
 
 @point_function()
 def along(basis, kin, grid, place, direction):
-    """The nodes that a point sees in one direction.
-
-    Returns
-    -------
-    first : int
-        Number of the first node in this direction.
-    r : float
-        Distance of the point from that node, in cells.
-    weights, gradients : tuple
-        N and dN/dx of the nodes.
-    affine : tuple
-        N D^-1 (X_I - x) of the nodes, for the affine transfers; D is the mean of (X_I - x)^2 under
-        the weights.
-    """
+    """The nodes that a point sees in one direction: an :class:`Along`, perhaps with more."""
 
 
 @point_function()
@@ -40,143 +52,85 @@ def _(basis, like):
 
 
 @shared
-def _arm(basis, grid, line, k):
-    """X_I - x along one direction."""
-    return (real(k, line[1]) * spacing(basis, line[1]) - line[1]) * grid.h
-
-
-@shared
 def hoop(weight, gradient, inv_r):
     """N / r at an axisymmetric point; at r = 0 its limit, dN/dr (`inv_r` is 0 there)."""
-    return weight * inv_r if inv_r > 0 else gradient
+    return choose(inv_r > 0, weight * inv_r, gradient)
 
 
 @shared
 def inverse_radius(r):
     """1 / r, or 0 on the axis and so close to it that 1 / r would overflow."""
-    return real(1, r) / r if r > real(1e-30, r) else real(0, r)
+    least = real(1e-30, r)
+    return choose(r > least, real(1, r) / max(r, least), real(0, r))
+
+
+@shared
+def _arm(basis, grid, line, k):
+    """X_I - x along one direction."""
+    return (real(k, line.r) * spacing(basis, line.r) - line.r) * grid.h
+
+
+@shared
+def _radius(basis, grid, line):
+    """The radius that the weights reproduce: the point's, but for domains cut at a wall."""
+    r = line.r - line.r
+    for k in range(len(line.weights)):
+        node = real(line.first + k, r) * spacing(basis, r)
+        r += line.weights[k] * (grid.x0 + node * grid.h)
+    return r
+
+
+def node_number(first: Any, numbers: Any) -> Symbol:
+    """The number of the node that is so many along each direction from node `first`."""
+    grid = Symbol("grid")
+    steps = (*(grid.step_x, grid.step_y)[: len(numbers) - 1], 1)
+    return sum((n * step for n, step in zip(numbers, steps, strict=True)), first)
+
+
+def digits(k: str, base: int, d: int) -> list[Symbol]:
+    """The `d` digits of a number in this base, the highest first."""
+    divided = [Symbol(f"({{}} // {base**i})", Symbol(k)) if i else Symbol(k) for i in range(d)]
+    divided.reverse()
+    return [divided[0], *(Symbol(f"({{}} % {base})", item) for item in divided[1:])]
+
+
+@cache
+def _written(kin: type, width: int) -> dict[Callable, Callable]:
+    """The point functions of a product of `width` nodes a direction."""
+    d, axisymmetric = kin.dimension, kin is Axisymmetric
+    basis, grid, stencil = Symbol("basis"), Symbol("grid"), Symbol("stencil")
+    lines = [call(along, basis, Symbol("kin"), grid, Symbol("place"), i) for i in range(d)]
+    first = node_number(grid.first, [line.first for line in lines])
+    inv_r = call(inverse_radius, call(_radius, basis, grid, lines[0])) if axisymmetric else 0
+    located = call(Stencil, first, lines, inv_r)
+
+    lines = [stencil.lines[i] for i in range(d)]
+    at = digits("k", width, d)
+    weights = [line.weights[k] for line, k in zip(lines, at, strict=True)]
+    weight = prod(weights)
+
+    def with_one(of: str) -> list[Symbol]:
+        """For each direction the product of the weights, with `of` in the place of its own."""
+        others = [getattr(line, of)[k] for line, k in zip(lines, at, strict=True)]
+        return [prod([*weights[:i], others[i], *weights[i + 1 :]]) for i in range(d)]
+
+    gradient = with_one("gradients")
+    if axisymmetric:
+        gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
+    node = call(index, node_number(stencil.first, at))
+    arms = [call(_arm, basis, grid, *pair) for pair in zip(lines, at, strict=True)]
+    seen = "basis, kin, grid, stencil, k"
+    return {
+        locate: written("basis, kin, grid, place", located),
+        support: define("basis, kin", f"return {width**d}"),
+        entry: written(seen, (node, weight, gradient)),
+        reach: written(seen, arms),
+        affine_weight: written(seen, with_one("affine")),
+    }
 
 
 def register(basis: type, width: int) -> None:
     """Give `basis` (a class with `along`, `width` nodes a direction) every point function."""
-
-    @locate.on(basis, Line)
-    def _(basis, kin, grid, place):
-        a = along(basis, kin, grid, place, 0)
-        return grid.first + a[0], (a,)
-
-    @locate.on(basis, PlaneStrain)
-    def _(basis, kin, grid, place):
-        a = along(basis, kin, grid, place, 0)
-        b = along(basis, kin, grid, place, 1)
-        return grid.first + a[0] * grid.step_x + b[0], (a, b)
-
-    @locate.on(basis, Axisymmetric)
-    def _(basis, kin, grid, place):
-        a = along(basis, kin, grid, place, 0)
-        b = along(basis, kin, grid, place, 1)
-        # The radius that the weights reproduce: that of the point, but for domains cut at a wall.
-        r = place[0] - place[0]
-        for k in range(width):
-            node = real(a[0] + k, r) * spacing(basis, r)
-            r += a[2][k] * (grid.x0 + node * grid.h)
-        return grid.first + a[0] * grid.step_x + b[0], (a, b), inverse_radius(r)
-
-    @locate.on(basis, Space)
-    def _(basis, kin, grid, place):
-        a = along(basis, kin, grid, place, 0)
-        b = along(basis, kin, grid, place, 1)
-        c = along(basis, kin, grid, place, 2)
-        return grid.first + a[0] * grid.step_x + b[0] * grid.step_y + c[0], (a, b, c)
-
-    @support.on(basis, Line)
-    def _(basis, kin):
-        return width
-
-    @support.on(basis, PlaneStrain)
-    @support.on(basis, Axisymmetric)
-    def _(basis, kin):
-        return width * width
-
-    @support.on(basis, Space)
-    def _(basis, kin):
-        return width * width * width
-
-    @entry.on(basis, Line)
-    def _(basis, kin, grid, stencil, k):
-        a = stencil[1][0]
-        return index(stencil[0] + k), a[2][k], (a[3][k],)
-
-    @entry.on(basis, PlaneStrain)
-    def _(basis, kin, grid, stencil, k):
-        a, b = stencil[1]
-        i = k // width
-        j = k % width
-        wa, wb = a[2][i], b[2][j]
-        node = stencil[0] + i * grid.step_x + j
-        return index(node), wa * wb, (a[3][i] * wb, wa * b[3][j])
-
-    @entry.on(basis, Axisymmetric)
-    def _(basis, kin, grid, stencil, k):
-        a, b = stencil[1]
-        i = k // width
-        j = k % width
-        wa, wb = a[2][i], b[2][j]
-        node = stencil[0] + i * grid.step_x + j
-        weight, slope = wa * wb, a[3][i] * wb
-        return index(node), weight, (slope, wa * b[3][j], hoop(weight, slope, stencil[2]))
-
-    @entry.on(basis, Space)
-    def _(basis, kin, grid, stencil, k):
-        a, b, c = stencil[1]
-        i = k // (width * width)
-        j = (k // width) % width
-        m = k % width
-        wa, wb, wc = a[2][i], b[2][j], c[2][m]
-        node = stencil[0] + i * grid.step_x + j * grid.step_y + m
-        wab = wa * wb
-        return index(node), wab * wc, (a[3][i] * wb * wc, wa * b[3][j] * wc, wab * c[3][m])
-
-    @reach.on(basis, Line)
-    def _(basis, kin, grid, stencil, k):
-        return (_arm(basis, grid, stencil[1][0], k),)
-
-    @reach.on(basis, PlaneStrain)
-    @reach.on(basis, Axisymmetric)
-    def _(basis, kin, grid, stencil, k):
-        a, b = stencil[1]
-        return _arm(basis, grid, a, k // width), _arm(basis, grid, b, k % width)
-
-    @reach.on(basis, Space)
-    def _(basis, kin, grid, stencil, k):
-        a, b, c = stencil[1]
-        return (
-            _arm(basis, grid, a, k // (width * width)),
-            _arm(basis, grid, b, (k // width) % width),
-            _arm(basis, grid, c, k % width),
-        )
-
-    @affine_weight.on(basis, Line)
-    def _(basis, kin, grid, stencil, k):
-        return (stencil[1][0][4][k],)
-
-    @affine_weight.on(basis, PlaneStrain)
-    @affine_weight.on(basis, Axisymmetric)
-    def _(basis, kin, grid, stencil, k):
-        a, b = stencil[1]
-        i = k // width
-        j = k % width
-        return a[4][i] * b[2][j], a[2][i] * b[4][j]
-
-    @affine_weight.on(basis, Space)
-    def _(basis, kin, grid, stencil, k):
-        a, b, c = stencil[1]
-        i = k // (width * width)
-        j = (k // width) % width
-        m = k % width
-        wa, wb, wc = a[2][i], b[2][j], c[2][m]
-        return (
-            a[4][i] * wb * wc,
-            wa * b[4][j] * wc,
-            wa * wb * c[4][m],
-        )
+    for kin in TAGS:
+        for function, implementation in _written(kin, width).items():
+            function.on(basis, kin)(implementation)

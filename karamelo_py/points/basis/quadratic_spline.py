@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
-from karamelo_py.points.basis.product import along, register
+from karamelo_py.compiler.compile import choose, real, shared
+from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -33,8 +33,7 @@ def _(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
     nearest = int(a + real(0.5, a))
-    if nearest < 1 or nearest >= last:
-        return _at_wall(grid, a, last)
+    bulk = nearest >= 1 and nearest < last
     t = a - real(nearest, a)
     half = real(0.5, a)
     left, right = half - t, half + t
@@ -44,7 +43,24 @@ def _(basis, kin, grid, place, direction):
     r = real(1, a) + t
     four = real(4, a) * grid.inv_h
     affine = (-four * r * weights[0], -four * t * weights[1], four * (left + half) * weights[2])
-    return nearest - 1, r, weights, gradients, affine
+    wall = _at_wall(grid, a, last)
+    return Along(
+        choose(bulk, nearest - 1, wall.first),
+        choose(bulk, r, wall.r),
+        _each(bulk, weights, wall.weights),
+        _each(bulk, gradients, wall.gradients),
+        _each(bulk, affine, wall.affine),
+    )
+
+
+@shared
+def _each(condition, a, b):
+    """One triple or the other."""
+    return (
+        choose(condition, a[0], b[0]),
+        choose(condition, a[1], b[1]),
+        choose(condition, a[2], b[2]),
+    )
 
 
 @shared
@@ -54,13 +70,15 @@ def _at_wall(grid, a, last):
     first = max(min(cell, last - 2), 0)
     t = a - real(cell, a)
     zero, one = real(0, a), real(1, a)
-    r = a - real(first, a)
+    second = first < cell  # the cell is that between the last two of the three nodes
+    weights = (choose(second, zero, one - t), choose(second, one - t, t), choose(second, t, zero))
+    gradients = (
+        choose(second, zero, -grid.inv_h),
+        choose(second, -grid.inv_h, grid.inv_h),
+        choose(second, grid.inv_h, zero),
+    )
     # For hat functions, N D^-1 (X - x) is the gradient.
-    if first < cell:
-        gradients = (zero, -grid.inv_h, grid.inv_h)
-        return first, r, (zero, one - t, t), gradients, gradients
-    gradients = (-grid.inv_h, grid.inv_h, zero)
-    return first, r, (one - t, t, zero), gradients, gradients
+    return Along(first, a - real(first, a), weights, gradients, gradients)
 
 
 register(QuadraticSpline, 3)

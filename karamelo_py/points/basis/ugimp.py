@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-import numpy as np
+from collections.abc import Callable
+from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real, shared
-from karamelo_py.points.basis import blank
-from karamelo_py.points.basis.product import along, register
+from karamelo_py.compiler.symbols import Symbol, call, written
+from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
-from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, dimension
+from karamelo_py.points.kinematics import dimension
 
 
 class UGIMP(NamedTuple):
@@ -31,30 +30,7 @@ class UGIMP(NamedTuple):
     least_nodes = 3
     steady_moment = True
     steep_edge = True
-
-    @staticmethod
-    def shapes(kin: NamedTuple, solid: Any) -> np.ndarray:
-        """Half sizes of the domains of a solid's points, (n, d)."""
-        return solid.half_size
-
-
-def blank_box(basis: type) -> None:
-    """The place of `basis` is a position and half sizes."""
-
-    @blank.on(basis, Line)
-    def _(basis, kin, x):
-        return (x[0], x[0] - x[0])
-
-    @blank.on(basis, PlaneStrain)
-    @blank.on(basis, Axisymmetric)
-    def _(basis, kin, x):
-        zero = x[0] - x[0]
-        return (x[0], x[1], zero, zero)
-
-    @blank.on(basis, Space)
-    def _(basis, kin, x):
-        zero = x[0] - x[0]
-        return (x[0], x[1], x[2], zero, zero, zero)
+    shape = ("half_size",)
 
 
 @shared
@@ -79,6 +55,35 @@ def in_cell(lo, hi, j):
     return length, length * (real(0.5, lo) * (p + q))
 
 
+def averaged_hats(cells: int) -> Callable:
+    """Make ``f(grid, first, lo, hi)``: hats from node `first` on, averaged over [lo, hi].
+
+    The domain lies within so many `cells` from that node; lengths are in cells, counted from it.
+    """
+    lo, hi, inv_h = Symbol("lo"), Symbol("hi"), Symbol("grid").inv_h
+    parts = [call(in_cell, lo, hi, j) for j in range(cells)]
+    k = 1 / sum(part[0] for part in parts)
+    slope = k * inv_h
+    weights, gradients = [], []
+    before = (0, 0)
+    for part in (*parts, (0, 0)):
+        # What is in the cell before the node, of its hat; and of the cell behind it.
+        behind = part[0] - part[1]
+        weights.append(k * (before[1] + behind))
+        gradients.append(slope * (before[0] - part[0]))
+        before = part
+    r = 0.5 * (lo + hi)
+    arms = [j - r if j else -r for j in range(cells + 1)]
+    spread = sum(w * arm * arm for w, arm in zip(weights, arms, strict=True))
+    k = inv_h / spread
+    affine = [k * arm * w for w, arm in zip(weights, arms, strict=True)]
+    line = call(Along, Symbol("first"), r, weights, gradients, affine)
+    return shared(written("grid, first, lo, hi", line, "lo"))
+
+
+_averaged = averaged_hats(2)
+
+
 @along.on(UGIMP)
 def _(basis, kin, grid, place, direction):
     a, lo, hi = box(grid, kin, place, direction, 1e-3, 0.5)
@@ -86,21 +91,8 @@ def _(basis, kin, grid, place, direction):
     lo = max(lo, real(0, a))
     hi = min(hi, real(last, a))
     first = max(min(int(lo), last - 2), 0)
-    lo -= real(first, a)
-    hi -= real(first, a)
-    p, u = in_cell(lo, hi, 0)
-    q, v = in_cell(lo, hi, 1)
-    k = real(1, a) / (p + q)
-    weights = (k * (p - u), k * (u + (q - v)), k * v)
-    k *= grid.inv_h
-    gradients = (-k * p, k * (p - q), k * q)
-    r = real(0.5, a) * (lo + hi)
-    s, t = real(1, a) - r, real(2, a) - r
-    spread = weights[0] * r * r + weights[1] * s * s + weights[2] * t * t
-    k = grid.inv_h / spread
-    affine = (-k * r * weights[0], k * s * weights[1], k * t * weights[2])
-    return first, r, weights, gradients, affine
+    start = real(first, a)
+    return _averaged(grid, first, lo - start, hi - start)
 
 
-blank_box(UGIMP)
 register(UGIMP, 3)

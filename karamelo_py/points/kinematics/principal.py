@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import point_function, real, round_off, shared
+from karamelo_py.compiler.compile import choose, point_function, real, round_off, shared
+from karamelo_py.compiler.tuples import add, scale, subtract
+from karamelo_py.points.kinematics.components import Number, formula
 from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
 
 
@@ -36,9 +38,10 @@ def _(kin, s):
     mean = half * (s[0] + s[1])
     radius = sqrt(apart * apart + s[3] * s[3])
     values = (mean + radius, mean - radius, s[2])
-    if radius > 0:
-        return values, (apart / radius, s[3] / radius)
-    return values, (real(1, s[0]), real(0, s[0]))
+    one = real(1, s[0])
+    turned = radius > 0
+    over = choose(turned, radius, one)
+    return values, (choose(turned, apart / over, one), s[3] / over)
 
 
 @from_principal.on(PlaneStrain)
@@ -56,12 +59,9 @@ def _(kin, values, frame):
 def _rotation(a, b, c):
     """Cosine, sine and tangent of the rotation that makes c vanish in [[a, c], [c, b]]."""
     one = real(1, a)
-    if c == 0:
-        return one, real(0, a), real(0, a)
-    cotangent = (b - a) / (c + c)
+    cotangent = (b - a) / choose(c == 0, one, c + c)
     t = one / (abs(cotangent) + sqrt(cotangent * cotangent + one))
-    if cotangent < 0:
-        t = -t
+    t = choose(c == 0, real(0, a), choose(cotangent < 0, -t, t))
     cosine = one / sqrt(t * t + one)
     return cosine, t * cosine, t
 
@@ -101,25 +101,14 @@ def _(kin, s):
 
 @shared
 def _turned(k, g, u, v):
-    return (
-        (k * u[0] - g * v[0], k * u[1] - g * v[1], k * u[2] - g * v[2]),
-        (g * u[0] + k * v[0], g * u[1] + k * v[1], g * u[2] + k * v[2]),
-    )
+    return subtract(scale(k, u), scale(g, v)), add(scale(g, u), scale(k, v))
+
+
+@formula(Space)
+def _composed(kin, values: Number, frame: Number):
+    return kin.symmetric(lambda i, j: sum(values[m] * frame[m][i] * frame[m][j] for m in range(3)))
 
 
 @from_principal.on(Space)
 def _(kin, values, frame):
-    return (
-        _component(values, frame, 0, 0),
-        _component(values, frame, 1, 1),
-        _component(values, frame, 2, 2),
-        _component(values, frame, 0, 1),
-        _component(values, frame, 0, 2),
-        _component(values, frame, 1, 2),
-    )
-
-
-@shared
-def _component(values, frame, i, j):
-    total = values[0] * frame[0][i] * frame[0][j] + values[1] * frame[1][i] * frame[1][j]
-    return total + values[2] * frame[2][i] * frame[2][j]
+    return _composed(kin, values, frame)

@@ -4,45 +4,16 @@ from __future__ import annotations
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import fma, point_function, real, shared
-from karamelo_py.points.kinematics.deformation import inverse, zero_tensor
-from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.compiler.compile import fma, real, shared
+from karamelo_py.compiler.symbols import call
+from karamelo_py.points.kinematics.components import Components, Number, Symmetric, Tensor, formula
+from karamelo_py.points.kinematics.deformation import inverse_of, zero_tensor
 
 
-@point_function()
-def symmetric_part(kin, dl):
+@formula()
+def symmetric_part(kin, dl: Tensor):
     """Strain increment sym(dl), as a symmetric tensor."""
-
-
-@symmetric_part.on(Line)
-def _(kin, dl):
-    zero = real(0, dl[0])
-    return (dl[0], zero, zero)
-
-
-@symmetric_part.on(PlaneStrain)
-def _(kin, dl):
-    half = real(0.5, dl[0])
-    return (dl[0], dl[3], real(0, dl[0]), half * (dl[1] + dl[2]))
-
-
-@symmetric_part.on(Axisymmetric)
-def _(kin, dl):
-    half = real(0.5, dl[0])
-    return (dl[0], dl[3], dl[4], half * (dl[1] + dl[2]))
-
-
-@symmetric_part.on(Space)
-def _(kin, dl):
-    half = real(0.5, dl[0])
-    return (
-        dl[0],
-        dl[4],
-        dl[8],
-        half * (dl[1] + dl[3]),
-        half * (dl[2] + dl[6]),
-        half * (dl[5] + dl[7]),
-    )
+    return kin.symmetric(lambda i, j: dl[i, i] if i == j else 0.5 * (dl[i, j] + dl[j, i]))
 
 
 @shared
@@ -57,54 +28,17 @@ def trace(s):
     return s[0] + s[1] + s[2]
 
 
-@point_function()
-def contract(kin, s, e):
+@formula()
+def contract(kin, s: Symmetric, e: Symmetric):
     """s_ij e_ij of two symmetric tensors."""
+    shear = sum(s[i, j] * e[i, j] for i, j in kin.symmetric_pairs if i != j)
+    return sum(s[i, i] * e[i, i] for i in range(3)) + 2 * shear
 
 
-@contract.on(Line)
-def _(kin, s, e):
-    return s[0] * e[0] + s[1] * e[1] + s[2] * e[2]
-
-
-@contract.on(PlaneStrain)
-@contract.on(Axisymmetric)
-def _(kin, s, e):
-    return s[0] * e[0] + s[1] * e[1] + s[2] * e[2] + real(2, s[0]) * s[3] * e[3]
-
-
-@contract.on(Space)
-def _(kin, s, e):
-    shear = s[3] * e[3] + s[4] * e[4] + s[5] * e[5]
-    return s[0] * e[0] + s[1] * e[1] + s[2] * e[2] + real(2, s[0]) * shear
-
-
-@point_function()
-def add_pressure(kin, factor, s, p):
+@formula()
+def add_pressure(kin, factor: Number, s: Symmetric, p: Number):
     """factor s + p I of a symmetric tensor."""
-
-
-@add_pressure.on(Line)
-def _(kin, factor, s, p):
-    return (factor * s[0] + p, factor * s[1] + p, factor * s[2] + p)
-
-
-@add_pressure.on(PlaneStrain)
-@add_pressure.on(Axisymmetric)
-def _(kin, factor, s, p):
-    return (factor * s[0] + p, factor * s[1] + p, factor * s[2] + p, factor * s[3])
-
-
-@add_pressure.on(Space)
-def _(kin, factor, s, p):
-    return (
-        factor * s[0] + p,
-        factor * s[1] + p,
-        factor * s[2] + p,
-        factor * s[3],
-        factor * s[4],
-        factor * s[5],
-    )
+    return kin.symmetric(lambda i, j: factor * s[i, j] + (p if i == j else 0))
 
 
 @shared
@@ -119,198 +53,84 @@ def von_mises(kin, s):
     return sqrt(real(1.5, s[0]) * contract(kin, s, s))
 
 
-@point_function()
-def leading_symmetric(kin, values):
+@formula()
+def leading_symmetric(kin, values: Number):
     """The symmetric tensor that `values` begin with."""
+    return values[f":{len(kin.symmetric_pairs)}"]
 
 
-@leading_symmetric.on(Line)
-def _(kin, values):
-    return values[:3]
-
-
-@leading_symmetric.on(PlaneStrain)
-@leading_symmetric.on(Axisymmetric)
-def _(kin, values):
-    return values[:4]
-
-
-@leading_symmetric.on(Space)
-def _(kin, values):
-    return values[:6]
-
-
-@point_function()
-def after_symmetric(kin, values):
+@formula()
+def after_symmetric(kin, values: Number):
     """What follows the symmetric tensor that `values` begin with, perhaps nothing."""
+    return values[f"{len(kin.symmetric_pairs)}:"]
 
 
-@after_symmetric.on(Line)
-def _(kin, values):
-    return values[3:]
-
-
-@after_symmetric.on(PlaneStrain)
-@after_symmetric.on(Axisymmetric)
-def _(kin, values):
-    return values[4:]
-
-
-@after_symmetric.on(Space)
-def _(kin, values):
-    return values[6:]
-
-
-@point_function()
-def largest_row_sum(kin, s):
+@formula()
+def largest_row_sum(kin, s: Symmetric):
     """max_i sum_j |s_ij|: a bound of the largest eigenvalue (Gershgorin)."""
+    order = ([i, *(j for j in range(3) if j != i)] for i in range(3))
+    return call(max, *(sum(abs(s[row[0], j]) for j in row) for row in order))
 
 
-@largest_row_sum.on(Line)
-def _(kin, s):
-    return max(abs(s[0]), abs(s[1]), abs(s[2]))
+def _spin_in_plane(kin: Components, dl: Tensor, s: Symmetric) -> tuple:
+    t = 0.25 * (dl[1, 0] - dl[0, 1])
+    t = call(fma, t * (t * t), 1 / 3, t)
+    tt = t * t
+    scale = 1 / (1 + tt)
+    cosine = (1 - tt) * scale
+    sine = (t + t) * scale
+    # The deviator in the plane turns by twice the angle; written as a change, which is exactly
+    # nothing where nothing turns.
+    double_sine = 2 * sine * cosine
+    double_versine = -2 * sine * sine
+    apart = 0.5 * (s[0, 0] - s[1, 1])
+    change = call(fma, double_versine, apart, -(double_sine * s[0, 1]))
+    shear = call(fma, double_sine, apart, double_versine * s[0, 1])
+    return (s[0, 0] + change, s[1, 1] - change, s[2, 2], s[0, 1] + shear)
 
 
-@largest_row_sum.on(PlaneStrain)
-@largest_row_sum.on(Axisymmetric)
-def _(kin, s):
-    shear = abs(s[3])
-    return max(abs(s[0]) + shear, abs(s[1]) + shear, abs(s[2]))
+def _spin_in_space(kin: Components, dl: Tensor, s: Symmetric) -> tuple:
+    # R = I + k (T + T T), T the cross product with the scaled w / 2
+    w = []
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        w.append(0.25 * (dl[k, j] - dl[j, k]))
+    longer = 1 + sum(x * x for x in w) * (1 / 3)
+    w = [x * longer for x in w]
+    k = 2 / sum((x * x for x in w), 1)
+
+    def rotation(i, j):
+        if i == j:
+            return 1 - k * sum(w[m] * w[m] for m in range(3) if m != i)
+        cross = w[3 - i - j]
+        return k * (w[i] * w[j] - cross) if (j - i) % 3 == 1 else k * (w[i] * w[j] + cross)
+
+    r = {(i, j): rotation(i, j) for i, j in kin.pairs}
+    a = {(i, j): sum(r[i, m] * s[m, j] for m in range(3)) for i, j in kin.pairs}
+    return kin.symmetric(lambda i, j: sum(a[i, m] * r[j, m] for m in range(3)))
 
 
-@largest_row_sum.on(Space)
-def _(kin, s):
-    xy, xz, yz = abs(s[3]), abs(s[4]), abs(s[5])
-    return max(abs(s[0]) + xy + xz, abs(s[1]) + xy + yz, abs(s[2]) + xz + yz)
-
-
-@point_function()
-def spin(kin, dl, s):
+@formula()
+def spin(kin, dl: Tensor, s: Symmetric):
     """R s R^T, with R the rotation of the increment dl: the objective (Jaumann) turn of a stress.
 
     R is the rotation by the vector w = axial(skew(dl)), built by Cayley's formula from
     tan(|w|/2) ~ |w|/2 (1 + |w|^2/12): orthogonal to round-off, its angle right to |w|^5/120
     (Hughes & Winget 1980 use tan(|w|/2) ~ |w|/2, right to |w|^3/12).
     """
+    if kin.dimension == 1:
+        return kin.symmetric(lambda i, j: s[i, j])
+    return (_spin_in_plane if kin.dimension == 2 else _spin_in_space)(kin, dl, s)
 
 
-@spin.on(Line)
-def _(kin, dl, s):
-    return s
-
-
-@spin.on(PlaneStrain)
-@spin.on(Axisymmetric)
-def _(kin, dl, s):
-    one = real(1, dl[0])
-    t = real(0.25, dl[0]) * (dl[2] - dl[1])
-    tt = t * t
-    t = fma(t * tt, real(1 / 3, dl[0]), t)
-    tt = t * t
-    scale = one / (one + tt)
-    cosine = (one - tt) * scale
-    sine = (t + t) * scale
-    # The deviator in the plane turns by twice the angle; written as a change, which is exactly
-    # nothing where nothing turns.
-    double_sine = real(2, dl[0]) * sine * cosine
-    double_versine = real(-2, dl[0]) * sine * sine
-    apart = real(0.5, dl[0]) * (s[0] - s[1])
-    change = fma(double_versine, apart, -(double_sine * s[3]))
-    shear = fma(double_sine, apart, double_versine * s[3])
-    return (s[0] + change, s[1] - change, s[2], s[3] + shear)
-
-
-@spin.on(Space)
-def _(kin, dl, s):
-    quarter = real(0.25, dl[0])
-    one = real(1, dl[0])
-    two = real(2, dl[0])
-    x = quarter * (dl[7] - dl[5])
-    y = quarter * (dl[2] - dl[6])
-    z = quarter * (dl[3] - dl[1])
-    longer = one + (x * x + y * y + z * z) * real(1 / 3, dl[0])
-    x = x * longer
-    y = y * longer
-    z = z * longer
-    k = two / (one + x * x + y * y + z * z)
-    # R = I + k (T + T T), T the cross product with (x, y, z)
-    r0 = one - k * (y * y + z * z)
-    r1 = k * (x * y - z)
-    r2 = k * (x * z + y)
-    r3 = k * (x * y + z)
-    r4 = one - k * (x * x + z * z)
-    r5 = k * (y * z - x)
-    r6 = k * (x * z - y)
-    r7 = k * (y * z + x)
-    r8 = one - k * (x * x + y * y)
-    # a = R s, then a R^T
-    a0 = r0 * s[0] + r1 * s[3] + r2 * s[4]
-    a1 = r0 * s[3] + r1 * s[1] + r2 * s[5]
-    a2 = r0 * s[4] + r1 * s[5] + r2 * s[2]
-    a3 = r3 * s[0] + r4 * s[3] + r5 * s[4]
-    a4 = r3 * s[3] + r4 * s[1] + r5 * s[5]
-    a5 = r3 * s[4] + r4 * s[5] + r5 * s[2]
-    a6 = r6 * s[0] + r7 * s[3] + r8 * s[4]
-    a7 = r6 * s[3] + r7 * s[1] + r8 * s[5]
-    a8 = r6 * s[4] + r7 * s[5] + r8 * s[2]
-    return (
-        a0 * r0 + a1 * r1 + a2 * r2,
-        a3 * r3 + a4 * r4 + a5 * r5,
-        a6 * r6 + a7 * r7 + a8 * r8,
-        a0 * r3 + a1 * r4 + a2 * r5,
-        a0 * r6 + a1 * r7 + a2 * r8,
-        a3 * r6 + a4 * r7 + a5 * r8,
-    )
-
-
-@point_function()
-def nominal(kin, tau, f):
+@formula()
+def nominal(kin, tau: Symmetric, f: Tensor):
     """First Piola-Kirchhoff stress P = tau F^-T of a Kirchhoff stress, in the layout of F.
 
     P times the reference volume and the gradient by reference positions makes nodal forces
     (`add_tensor_dot`).
     """
-
-
-@nominal.on(Line)
-def _(kin, tau, f):
-    return (tau[0] / f[0],)
-
-
-@nominal.on(PlaneStrain)
-def _(kin, tau, f):
-    i = inverse(kin, f)
-    return (
-        tau[0] * i[0] + tau[3] * i[1],
-        tau[0] * i[2] + tau[3] * i[3],
-        tau[3] * i[0] + tau[1] * i[1],
-        tau[3] * i[2] + tau[1] * i[3],
-    )
-
-
-@nominal.on(Axisymmetric)
-def _(kin, tau, f):
-    i = inverse(kin, f)
-    return (
-        tau[0] * i[0] + tau[3] * i[1],
-        tau[0] * i[2] + tau[3] * i[3],
-        tau[3] * i[0] + tau[1] * i[1],
-        tau[3] * i[2] + tau[1] * i[3],
-        tau[2] * i[4],
-    )
-
-
-@nominal.on(Space)
-def _(kin, tau, f):
-    i = inverse(kin, f)
-    return (
-        tau[0] * i[0] + tau[3] * i[1] + tau[4] * i[2],
-        tau[0] * i[3] + tau[3] * i[4] + tau[4] * i[5],
-        tau[0] * i[6] + tau[3] * i[7] + tau[4] * i[8],
-        tau[3] * i[0] + tau[1] * i[1] + tau[5] * i[2],
-        tau[3] * i[3] + tau[1] * i[4] + tau[5] * i[5],
-        tau[3] * i[6] + tau[1] * i[7] + tau[5] * i[8],
-        tau[4] * i[0] + tau[5] * i[1] + tau[2] * i[2],
-        tau[4] * i[3] + tau[5] * i[4] + tau[2] * i[5],
-        tau[4] * i[6] + tau[5] * i[7] + tau[2] * i[8],
-    )
+    if kin.dimension == 1:
+        return (tau[0, 0] / f[0, 0],)
+    back = inverse_of(kin, f)
+    return kin.tensor(lambda i, j: sum(tau[i, k] * back.get((j, k), 0) for k in kin.axes))

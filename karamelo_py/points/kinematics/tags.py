@@ -1,10 +1,10 @@
-"""The tags of kinematics, and what they say of themselves."""
+"""The tags of kinematics, and the tables of the components that tensors have there."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.compile import define, point_function
 
 
 class Line(NamedTuple):
@@ -13,6 +13,7 @@ class Line(NamedTuple):
     word = "1D"
     dimension = 1
     tensor_size = 1
+    tensor_names = ("11",)
     symmetric_names = ("11", "22", "33")
 
 
@@ -22,6 +23,7 @@ class PlaneStrain(NamedTuple):
     word = "plane-strain"
     dimension = 2
     tensor_size = 4
+    tensor_names = ("11", "12", "21", "22")
     symmetric_names = ("11", "22", "33", "12")
 
 
@@ -35,6 +37,7 @@ class Axisymmetric(NamedTuple):
     word = "axisymmetric"
     dimension = 2
     tensor_size = 5
+    tensor_names = ("11", "12", "21", "22", "33")
     symmetric_names = ("11", "22", "33", "12")
 
 
@@ -44,31 +47,17 @@ class Space(NamedTuple):
     word = "3D"
     dimension = 3
     tensor_size = 9
+    tensor_names = ("11", "12", "13", "21", "22", "23", "31", "32", "33")
     symmetric_names = ("11", "22", "33", "12", "13", "23")
 
 
+TAGS = (Line, PlaneStrain, Axisymmetric, Space)
 KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
 @point_function()
 def dimension(kin):
     """Number of components of a vector, a constant at compile time."""
-
-
-@dimension.on(Line)
-def _(kin):
-    return 1
-
-
-@dimension.on(PlaneStrain)
-@dimension.on(Axisymmetric)
-def _(kin):
-    return 2
-
-
-@dimension.on(Space)
-def _(kin):
-    return 3
 
 
 @point_function()
@@ -79,17 +68,6 @@ def planar(kin):
     """
 
 
-@planar.on(Line)
-def _(kin):
-    return Line()
-
-
-@planar.on(PlaneStrain)
-@planar.on(Axisymmetric)
-def _(kin):
-    return PlaneStrain()
-
-
-@planar.on(Space)
-def _(kin):
-    return Space()
+for _tag in TAGS:
+    dimension.on(_tag)(define("kin", f"return {_tag.dimension}"))
+    planar.on(_tag)(define("kin", "return flat()", flat=KINEMATICS[_tag.dimension]))

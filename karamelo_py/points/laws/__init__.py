@@ -1,42 +1,87 @@
-"""Constitutive laws of one point. One file each.
+"""Constitutive laws of one point. One file each: what a script says, and the point functions.
 
 A law is a NamedTuple of parameters (its class is the tag). It owns a state, a flat tuple with as
 many numbers as it needs; kernels only load it, pass it on and store it. All tensors have the
 components of the kinematics `kin`; `j` = det F is the volume over the reference volume. A law may
 be composed of parts, NamedTuples among its parameters (`eos_strength`).
+
+The class is the style, too: its docstring is the manual, and its fields with their annotations are
+the arguments. Where a script gives other numbers than the law computes with, a classmethod `given`
+has the arguments and returns the law; `checked`, a method, refuses what no annotation can, and
+returns the law or a simpler one that means the same.
+
+What dumps and plots can show of a law is declared beside it (`column`).
 """
 
+from __future__ import annotations
+
+import sys
+from collections import namedtuple
+from collections.abc import Callable
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
 
 
-class Whole(NamedTuple):
-    """Tag of laws that have no parts."""
+class Absent(NamedTuple):
+    """Tag of a part that a law does not have."""
 
 
-@point_function()
-def separate(law):
-    """A tag that stands for the class of a law, and its parts, five at most; () for none.
+def law_kind(law: NamedTuple) -> tuple[type, ...]:
+    """The classes of a law and of its parts: laws of one kind share kernels and arrays.
 
-    Numba hands tuples of arrays to threads, but no tuples of such tuples: laws that are made of
-    parts cross one by one.
+    A table of laws (`karamelo_py.kernels.laws.law_table`) is of the kind of its laws.
     """
+    parts = [law_kind(part) for part in law if isinstance(part, tuple)]
+    return type(law), *(kind for part in parts for kind in part)
 
 
-@separate.otherwise
-def _(law):
-    return Whole(), (law, (), (), (), ())
+def can(law: NamedTuple, function: Callable) -> bool:
+    """Whether a point function is defined for a law, or for one of its parts."""
+    return any(function.defined(kind) for kind in law_kind(law))
+
+
+_columns: dict[type, dict[str, NamedTuple]] = {}
+
+
+def column(part: type, name: str, what: Callable | NamedTuple) -> None:
+    """Declare that laws with `part`, or that are of this class, can show a number.
+
+    Parameters
+    ----------
+    part
+        The class of the law, or of one of its parts.
+    name
+        What dumps, plots and tables call it.
+    what
+        A point function of the whole law (`number`), or a tag of `shown`.
+    """
+    _columns.setdefault(part, {})[name] = what if isinstance(what, tuple) else what.tag
+
+
+def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
+    """The numbers that a law can show, those of its parts first: name, and tag for `shown`."""
+    kinds = reversed(law_kind(law))
+    return {name: what for kind in kinds for name, what in _columns.get(kind, {}).items()}
 
 
 @point_function()
-def assemble(tag, first, second, third, fourth, fifth):
-    """The law again from what `separate` returned."""
+def shown(what, law, kin, state):
+    """The number that a tag stands for, of a point in `state`."""
 
 
-@assemble.on(Whole)
-def _(tag, first, second, third, fourth, fifth):
-    return first
+def number(function: Callable) -> Callable:
+    """Mark a point function of (law, kin, state) whose value can be shown.
+
+    It gets a tag that stands for it where kernels choose by type. The tag's class is put beside
+    the function, so that it can be imported, and kernels with it be cached.
+    """
+    name = f"{function.__name__}_tag"
+    made = namedtuple(name, (), module=function.__module__)
+    shown.on(made)(lambda what, law, kin, state: function(law, kin, state))
+    setattr(sys.modules[function.__module__], name, made)
+    function.tag = made()
+    return function
 
 
 @point_function()
@@ -74,36 +119,41 @@ def wave_speed_squared(law, kin, state):
     """Square of the speed of the fastest small disturbance, for the stable step."""
 
 
+@number
 @point_function()
 def energy_density(law, kin, state):
     """Stored energy per reference volume."""
 
 
 @point_function()
-def driven(law, own, given):
+def constrained_velocity(law, own, given):
     """Velocity of a point after a step: what the grid gives, or of rigid bodies their own."""
 
 
-@driven.otherwise
+@constrained_velocity.otherwise
 def _(law, own, given):
     return given
 
 
+@number
 @point_function()
 def dissipated_energy(law, kin, state):
     """Energy that is gone, per reference volume; left out by laws that dissipate nothing."""
 
 
+@number
 @point_function()
 def damage(law, kin, state):
     """0 intact to 1 broken; left out by laws without."""
 
 
+@number
 @point_function()
 def damage_initiation(law, kin, state):
     """Grows from 0, damage begins at 1; left out by laws without."""
 
 
+@number
 @point_function()
 def temperature(law, kin, state):
     """Temperature; 0 of laws without."""
@@ -149,6 +199,7 @@ def elastic_strain(law, kin, state):
     """Elastic strain, for output."""
 
 
+@number
 @point_function()
 def plastic_strain(law, kin, state):
     """Equivalent plastic strain, for output; left out by laws without."""
@@ -162,3 +213,8 @@ def with_stress(law, kin, state, stress):
 @point_function()
 def specific_volume(law):
     """Reference volume per mass."""
+
+
+@specific_volume.otherwise
+def _(law):
+    return law.specific_volume

@@ -1,31 +1,25 @@
-"""A law in parts: pressure from an equation of state, deviatoric stress from a strength.
+"""material eos-strength: a law in parts, found by their names.
 
-Viscosity, damage and temperature may be added. The parts are NamedTuples inside the law's, so that
-their types select their point functions; those that are absent are tags without parameters, and
-have no numbers in the state. The state of a point is det F, the deviatoric stress of the intact
-material, what each part remembers (`Memory`), and the dissipated energy where there is any.
+Pressure comes from an equation of state, deviatoric stress from a strength. Viscosity, damage and
+temperature may be added. The parts are NamedTuples inside the law's, so that their types select
+their point functions; `Absent` stands for those that are not there, which have no numbers in the
+state. The state of a point is det F, the deviatoric stress of the intact material, what each part
+remembers (`Memory`), and the dissipated energy where there is any. Parts of other kinds,
+a plug-in's, are chained (`karamelo_py.points.laws.further`).
 """
 
 from __future__ import annotations
 
 from math import log, sqrt
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-from karamelo_py.compiler.compile import by_type, point_function, real, shared
-from karamelo_py.compiler.tuples import (
-    either,
-    following,
-    increased,
-    leading,
-    plus,
-    scale,
-    subtract,
-    times,
-)
+from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.tuples import either, following, increased, leading, plus, scale
+from karamelo_py.language.arguments import Argument, look_up
+from karamelo_py.language.scene import Scene
 from karamelo_py.points.kinematics import (
     add_pressure,
     after_symmetric,
-    contract,
     deviator,
     leading_symmetric,
     spin,
@@ -36,9 +30,10 @@ from karamelo_py.points.kinematics import (
     zero_symmetric,
 )
 from karamelo_py.points.laws import (
+    Absent,
     advance,
-    assemble,
     cauchy_stress,
+    column,
     conductivity,
     damage,
     damage_initiation,
@@ -50,72 +45,158 @@ from karamelo_py.points.laws import (
     jacobian,
     kirchhoff_stress,
     plastic_strain,
-    separate,
+    shown,
     specific_volume,
     temperature,
     wave_speed_squared,
     with_stress,
     with_temperature,
 )
-from karamelo_py.points.laws.damages import (
-    NoDamage,
-    damage_after,
-    damage_begun,
-    initial_damage,
-    integrity,
-)
+from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
 from karamelo_py.points.laws.eos import (
     at_pressure,
     bulk_modulus,
     compressed,
     compression_energy,
     initial_energy,
-    kept_heat,
     pressure,
-    ratio_at_pressure,
+    stored_heat,
 )
-from karamelo_py.points.laws.strength import (
+from karamelo_py.points.laws.further import (
+    chained,
+    further_after,
+    further_pressure,
+    initial_further,
+)
+from karamelo_py.points.laws.strengths import (
+    Remembered,
+    damped_speed_squared,
     elastic_ratio,
     equivalent_plastic_strain,
     initial_loss,
     initial_memory,
-    pressure_response,
+    respond,
     shear_energy,
     shear_modulus,
-    shear_response,
     shear_strain,
-    viscosity_of,
-    with_elastic_ratio,
 )
-from karamelo_py.points.laws.strength.drucker_prager import DruckerPrager
-from karamelo_py.points.laws.strength.elastic import elastic_trial
-from karamelo_py.points.laws.strength.mohr_coulomb import MohrCoulomb
 from karamelo_py.points.laws.temperatures import (
-    Isothermal,
+    heat_from,
     heated,
     initial_heat,
     thermal_pressure,
 )
 from karamelo_py.points.laws.viscosity import (
-    NoViscosity,
+    damped,
     initial_viscous_pressure,
     viscous_pressure,
     viscous_speed,
 )
+from karamelo_py.script.errors import ScriptError, nearest
+
+
+class Eos:
+    """For signatures: an equation of state that the script has named."""
+
+    script_kind: ClassVar[str] = "the ID of an equation of state"
+    kind: ClassVar[str] = "eos"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        """The part that `argument` names."""
+        return look_up(hub.parts[cls.kind], argument)
+
+
+class Strength(Eos):
+    """For signatures: a strength."""
+
+    script_kind = "the ID of a strength"
+    kind = "strength"
+
+
+class Option:
+    """For signatures: a part that may be left out."""
+
+    script_kind: ClassVar[str] = "the ID of a damage or of a temperature"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        """The part that `argument` names."""
+        word = argument.word()
+        optional = {kind: named for kind, named in hub.parts.items() if kind not in NEEDED}
+        known = {ID: part for named in optional.values() for ID, part in named.items()}
+        if word in known:
+            return known[word]
+        close = nearest(word, known) if word else None
+        raise ScriptError(
+            f"unknown {' or '.join(optional)} '{argument.text}'",
+            place=argument.place,
+            expected=f"one of {', '.join(known)}" if known else "none is defined yet",
+            hint=f"did you mean '{close}'?" if close else None,
+        )
+
+
+NEEDED = ("eos", "strength")
 
 
 class EosStrength(NamedTuple):
-    """sigma = (1 - D) s - p I."""
+    """Pressure from an equation of state, deviatoric stress from a strength.
 
-    eos: Any  # parameters of an equation of state (karamelo_py.points.laws.eos)
-    strength: Any  # parameters of a strength (karamelo_py.points.laws.strength)
-    viscosity: Any = NoViscosity()  # (karamelo_py.points.laws.viscosity)
-    damage: Any = NoDamage()  # (karamelo_py.points.laws.damages)
-    temperature: Any = Isothermal()  # (karamelo_py.points.laws.temperatures)
+    Parameters
+    ----------
+    eos
+        ID of an equation of state, which has the density too.
+    strength
+        ID of a strength.
+    parts
+        ID of a damage, ID of a temperature, in either order; each may be left out.
+
+    Example
+    -------
+    eos(bulk, linear, 7850, 160e9)
+    strength(mild, plastic, 80e9, 400e6)
+    material(body, eos-strength, bulk, mild)
+
+    Notes
+    -----
+    sigma = s - p I. The deviatoric stress s turns with the point (Jaumann rate; Hughes & Winget
+    1980). The elastic strain is that of s and, with J the volume over the reference volume,
+    ln J / 3; of soils, J is its elastic part. The strain energy is what unloading would give back;
+    plastic work is not in it, compute dissipated_energy measures it. Where fix initial_stress sets
+    a pressure, the points get the volume that has this pressure.
+
+    See Also
+    --------
+    eos, strength, damage, temperature, compute max_plastic_strain, compute dissipated_energy
+    """
+
+    eos: Any
+    strength: Any
+    viscosity: Any = Absent()
+    damage: Any = Absent()
+    temperature: Any = Absent()
+    further: Any = Absent()  # of other kinds
+
+    syntax = "eos, strength[, damage][, temperature]"
+
+    @classmethod
+    def given(cls, eos: Eos, strength: Strength, *parts: Option):
+        """The law of the parts that a script has named, each in the place of its kind."""
+        kinds: dict[str, Any] = {}
+        for part in parts:
+            if part.kind in kinds:
+                raise ScriptError(
+                    f"'{kinds[part.kind].id}' and '{part.id}' are both a {part.kind}",
+                    argument=2 + parts.index(part),
+                    expected="one damage and one temperature at most",
+                )
+            kinds[part.kind] = part
+        laws = {k: law for part in (eos, strength, *parts) for k, law in part.laws.items()}
+        further = [laws.pop(kind) for kind in list(laws) if kind not in cls._fields]
+        return cls(**laws, further=chained(further))
 
 
-class EosStrengthParts(NamedTuple):
-    """Tag of the law while its parts travel one by one."""
+column(EosStrength, "dissipated", dissipated_energy)
 
 
 class Memory(NamedTuple):
@@ -127,17 +208,7 @@ class Memory(NamedTuple):
     heat: Any  # temperature
     loss: Any  # dissipated energy per reference volume
     strength: Any
-
-
-@separate.on(EosStrength)
-def _(law):
-    parts = (law.eos, law.strength, law.viscosity, law.damage, law.temperature)
-    return EosStrengthParts(), parts
-
-
-@assemble.on(EosStrengthParts)
-def _(tag, first, second, third, fourth, fifth):
-    return EosStrength(first, second, third, fourth, fifth)
+    further: Any
 
 
 @shared
@@ -148,10 +219,16 @@ def lossless(law, like):
 
 @initial_state.on(EosStrength)
 def _(law, kin, like):
-    at_rest = (real(1, like),) + zero_symmetric(kin, like) + initial_energy(law.eos, like)
-    at_rest = at_rest + initial_viscous_pressure(law.viscosity, like)
-    at_rest = at_rest + initial_damage(law.damage, like) + initial_heat(law.temperature, like)
-    return at_rest + lossless(law, like) + initial_memory(law.strength, like)
+    m = Memory(
+        initial_energy(law.eos, like),
+        initial_viscous_pressure(law.viscosity, like),
+        initial_damage(law.damage, like),
+        initial_heat(law.temperature, like),
+        lossless(law, like),
+        initial_memory(law.strength, like),
+        initial_further(law.further, like),
+    )
+    return state_of(real(1, like), zero_symmetric(kin, like), m)
 
 
 @shared
@@ -165,16 +242,22 @@ def memory_of(law, kin, state):
     rest = following(rest, viscous)
     broken = leading(rest, initial_damage(law.damage, like))
     rest = following(rest, broken)
-    heat = leading(rest, initial_heat(law.temperature, like))
+    heat = heat_from(initial_heat(law.temperature, like), rest)
     rest = following(rest, heat)
     loss = leading(rest, lossless(law, like))
-    return Memory(energy, viscous, broken, heat, loss, following(rest, loss))
+    rest = following(rest, loss)
+    strength = leading(rest, initial_memory(law.strength, like))
+    return Memory(energy, viscous, broken, heat, loss, strength, following(rest, strength))
 
 
 @shared
 def state_of(j, s, m):
     """The state of a point from its numbers."""
-    return (j,) + s + m.energy + m.viscous + m.damage + m.heat + m.loss + m.strength
+    heat = leading(m.heat, m.heat)  # the tuple without its name
+    return (j,) + s + m.energy + m.viscous + m.damage + heat + m.loss + m.strength + m.further
+
+
+# ---- pressure -----------------------------------------------------------------------------------
 
 
 @shared
@@ -182,82 +265,15 @@ def intact_pressure(law, j, m):
     """Pressure of the intact material, without viscous pressure."""
     elastic = elastic_ratio(law.strength, m.strength, j)
     p = pressure(law.eos, elastic, m.energy, m.heat)
-    return plus(p, thermal_pressure(law.temperature, m.heat))
-
-
-def open_pressure(p, whole):
-    """Pressure after damage: tension is lost with integrity (1 - D,), compression is not."""
-    if len(whole) == 0:
-        return p
-    return p * whole[0] if p < 0 else p
-
-
-@by_type(open_pressure)
-def _open_pressure(p, whole):
-    if len(whole) == 0:
-        return lambda p, whole: p
-    return lambda p, whole: p * whole[0] if p < 0 else p
+    p = plus(p, thermal_pressure(law.temperature, m.heat))
+    return further_pressure(law.further, m.further, p)
 
 
 @shared
 def full_pressure(law, j, m):
-    """The pressure in the stress."""
-    p = open_pressure(intact_pressure(law, j, m), integrity(law.damage, m.damage))
-    return plus(p, m.viscous)
-
-
-@point_function()
-def respond(strength, law, kin, s, strain, j, m, dt):
-    """Deviatoric stress, memory of the strength, and plastic work per volume after a step."""
-
-
-@respond.otherwise
-def _(strength, law, kin, s, strain, j, m, dt):
-    return shear_response(strength, kin, s, strain, m.strength, m.heat, dt)
-
-
-@respond.on(MohrCoulomb)
-@respond.on(DruckerPrager)
-def _(strength, law, kin, s, strain, j, m, dt):
-    trial = elastic_trial(kin, strength.G, s, strain)
-    elastic = elastic_ratio(strength, m.strength, j)
-    warm = plus(real(0, j), thermal_pressure(law.temperature, m.heat))
-    p = pressure(law.eos, elastic, m.energy, m.heat) + warm
-    K = bulk_modulus(law.eos, elastic, m.energy, m.heat)
-    new, reached = pressure_response(strength, kin, trial, p, K, m.strength[0])
-    plastic = scale(real(0.5, j) / strength.G, subtract(trial, new))
-    increment = sqrt(real(2 / 3, j) * contract(kin, plastic, plastic))
-    memory = (m.strength[0] + increment,) + m.strength[1:]
-    work = contract(kin, new, plastic)
-    if reached != p:
-        # The volume that bears the new pressure is elastic; the rest is plastic.
-        after = ratio_at_pressure(law.eos, reached - warm, m.heat)
-        memory = with_elastic_ratio(strength, memory, j, after)
-        work -= reached * log(elastic / after)
-    return new, memory, work
-
-
-def broken_further(law, kin, m, strain, s, j, dt):
-    """Memory of the damage after an increment of plastic strain; () where nothing breaks."""
-    if len(m.damage) == 0:
-        return ()
-    return _broken_further(law, kin, m, strain, s, j, dt)
-
-
-@shared
-def _broken_further(law, kin, m, strain, s, j, dt):
+    """The pressure in the stress: damage takes of tension, not of compression."""
     p = intact_pressure(law, j, m)
-    q = von_mises(kin, s)
-    bound = q + real(1e-3, p) * abs(p)
-    triaxiality = -p / bound if bound > 0 else real(0, p)
-    return damage_after(law.damage, m.damage, strain, triaxiality, m.heat, dt)
-
-
-@by_type(broken_further)
-def _choose_broken_further(law, kin, m, strain, s, j, dt):
-    if len(m[2]) == 0:
-        return lambda law, kin, m, strain, s, j, dt: ()
-    return lambda law, kin, m, strain, s, j, dt: _broken_further(law, kin, m, strain, s, j, dt)
+    return plus(borne(law.damage, m.damage, p) if p < 0 else p, m.viscous)
 
 
 @shared
@@ -268,48 +284,108 @@ def sound(law, j, m):
     return sqrt(K * specific_volume(law.eos) * j)
 
 
-def viscous_after(law, j, m, rate):
+@point_function()
+def viscous_after(viscosity, law, j, m, rate):
     """Viscous pressure (q,) at a rate of volume change, or ()."""
-    if len(m.viscous) == 0:
-        return ()
-    return _viscous_after(law, j, m, rate)
 
 
-@shared
-def _viscous_after(law, j, m, rate):
+@viscous_after.on(Absent)
+def _(viscosity, law, j, m, rate):
+    return ()
+
+
+@viscous_after.otherwise
+def _(viscosity, law, j, m, rate):
     density = real(1, j) / (specific_volume(law.eos) * j)
-    return viscous_pressure(law.viscosity, rate, density, sound(law, j, m))
+    return viscous_pressure(viscosity, rate, density, sound(law, j, m))
 
 
-@by_type(viscous_after)
-def _choose_viscous_after(law, j, m, rate):
-    if len(m[1]) == 0:
-        return lambda law, j, m, rate: ()
-    return lambda law, j, m, rate: _viscous_after(law, j, m, rate)
+@point_function()
+def slowed_by_viscosity(viscosity, law, j, m, squared, density):
+    """The square of the speed of waves that the time step has to resolve."""
 
 
-def released(law, kin, j, s, m, broken):
+@slowed_by_viscosity.on(Absent)
+def _(viscosity, law, j, m, squared, density):
+    return squared
+
+
+@slowed_by_viscosity.otherwise
+def _(viscosity, law, j, m, squared, density):
+    return damped(squared, viscous_speed(viscosity, m.viscous, density, sound(law, j, m)))
+
+
+# ---- damage -------------------------------------------------------------------------------------
+
+
+@point_function()
+def borne(damage, memory, x):
+    """The share of a number that the damaged material bears: (1 - D) x."""
+
+
+@borne.on(Absent)
+def _(damage, memory, x):
+    return x
+
+
+@borne.otherwise
+def _(damage, memory, x):
+    return x * integrity(damage, memory)
+
+
+@point_function()
+def nominal(damage, memory, s):
+    """The deviatoric stress that damage leaves, (1 - D) s."""
+
+
+@nominal.on(Absent)
+def _(damage, memory, s):
+    return s
+
+
+@nominal.otherwise
+def _(damage, memory, s):
+    return scale(integrity(damage, memory), s)
+
+
+@point_function()
+def broken_further(damage, law, kin, m, strain, s, j, dt):
+    """Memory of the damage after an increment of plastic strain; () where nothing breaks."""
+
+
+@broken_further.on(Absent)
+def _(damage, law, kin, m, strain, s, j, dt):
+    return ()
+
+
+@broken_further.otherwise
+def _(damage, law, kin, m, strain, s, j, dt):
+    p = intact_pressure(law, j, m)
+    q = von_mises(kin, s)
+    bound = q + real(1e-3, p) * abs(p)
+    triaxiality = -p / bound if bound > 0 else real(0, p)
+    return damage_after(damage, m.damage, strain, triaxiality, m.heat, dt)
+
+
+@point_function()
+def released(damage, law, kin, j, s, m, broken):
     """Stored energy that an increment of damage sets free."""
-    if len(m.damage) == 0:
-        return j - j
-    return _released(law, kin, j, s, m, broken)
 
 
-@shared
-def _released(law, kin, j, s, m, broken):
-    before = integrity(law.damage, m.damage)
-    after = integrity(law.damage, broken)
+@released.on(Absent)
+def _(damage, law, kin, j, s, m, broken):
+    return j - j
+
+
+@released.otherwise
+def _(damage, law, kin, j, s, m, broken):
     energy = j * shear_energy(law.strength, kin, s)
     if intact_pressure(law, j, m) < 0:
         energy += compression_energy(law.eos, j, m.energy)
-    return (before[0] - after[0]) * energy
+    return (integrity(damage, m.damage) - integrity(damage, broken)) * energy
 
 
-@by_type(released)
-def _choose_released(law, kin, j, s, m, broken):
-    if len(m[2]) == 0:
-        return lambda law, kin, j, s, m, broken: j - j
-    return lambda law, kin, j, s, m, broken: _released(law, kin, j, s, m, broken)
+# ---- the law ------------------------------------------------------------------------------------
 
 
 @advance.on(EosStrength)
@@ -320,42 +396,25 @@ def _(law, kin, state, dl, dt):
     strain = symmetric_part(kin, dl)
     old = spin(kin, dl, leading_symmetric(kin, state[1:]))
     s, memory, work = respond(law.strength, law, kin, old, strain, j, m, dt)
-    work = times(j * work, integrity(law.damage, m.damage))
-    viscous = viscous_after(law, j, m, trace(strain) / dt)
+    work = borne(law.damage, m.damage, j * work)
+    viscous = viscous_after(law.viscosity, law, j, m, trace(strain) / dt)
     viscous_work = plus(j - j, viscous) * (before - j)
     energy = compressed(law.eos, m.energy, before, j, work + viscous_work)
     flow = equivalent_plastic_strain(law.strength, memory)
     flow -= equivalent_plastic_strain(law.strength, m.strength)
-    now = Memory(energy, viscous, m.damage, m.heat, m.loss, memory)
-    broken = broken_further(law, kin, now, flow, s, j, dt)
+    now = Memory(energy, viscous, m.damage, m.heat, m.loss, memory, m.further)
+    broken = broken_further(law.damage, law, kin, now, flow, s, j, dt)
     heat = heated(law.temperature, m.heat, work * specific_volume(law.eos))
-    gone = work + viscous_work + released(law, kin, j, s, now, broken)
-    return state_of(j, s, Memory(energy, viscous, broken, heat, increased(m.loss, gone), memory))
-
-
-@shared
-def _nominal_deviator(law, kin, state, m):
-    """The deviatoric stress that damage leaves."""
-    s = leading_symmetric(kin, state[1:])
-    return damaged(s, integrity(law.damage, m.damage))
-
-
-def damaged(s, whole):
-    """(1 - D) s."""
-    return scale(whole[0], s) if len(whole) else s
-
-
-@by_type(damaged)
-def _damaged(s, whole):
-    if len(whole) == 0:
-        return lambda s, whole: s
-    return lambda s, whole: scale(whole[0], s)
+    gone = work + viscous_work + released(law.damage, law, kin, j, s, now, broken)
+    loss = increased(m.loss, gone)
+    further = further_after(law.further, m.further, law, kin, j, s, now, dt)
+    return state_of(j, s, Memory(energy, viscous, broken, heat, loss, memory, further))
 
 
 @cauchy_stress.on(EosStrength)
 def _(law, kin, state):
     m = memory_of(law, kin, state)
-    s = _nominal_deviator(law, kin, state, m)
+    s = nominal(law.damage, m.damage, leading_symmetric(kin, state[1:]))
     return add_pressure(kin, real(1, state[0]), s, -full_pressure(law, state[0], m))
 
 
@@ -363,7 +422,7 @@ def _(law, kin, state):
 def _(law, kin, state):
     j = state[0]
     m = memory_of(law, kin, state)
-    s = _nominal_deviator(law, kin, state, m)
+    s = nominal(law.damage, m.damage, leading_symmetric(kin, state[1:]))
     return add_pressure(kin, j, s, -j * full_pressure(law, j, m))
 
 
@@ -372,49 +431,9 @@ def _(law, kin, state):
     return state[0]
 
 
-def slowed(squared, a):
-    """Square of c' = sqrt(c^2 + a^2) + a, from c^2 and (a,); c^2 for ()."""
-    if len(a) == 0:
-        return squared
-    return _slowed(squared, a[0])
-
-
-@shared
-def _slowed(squared, a):
-    speed = sqrt(squared + a * a) + a
-    return speed * speed
-
-
-@by_type(slowed)
-def _choose_slowed(squared, a):
-    if len(a) == 0:
-        return lambda squared, a: squared
-    return lambda squared, a: _slowed(squared, a[0])
-
-
-def shear_speed(strength, density):
-    """(nu / h,) of a viscous strength, nu = 4/3 mu/rho, or ()."""
-    fluid = viscosity_of(strength)
-    return (4 / 3 * fluid[0] / (density * fluid[1]),) if len(fluid) else ()
-
-
-@by_type(shear_speed)
-def _shear_speed(strength, density):
-    if not viscosity_of.defined(getattr(strength, "instance_class", None)):
-        return lambda strength, density: ()
-
-    def speed(strength, density):
-        fluid = viscosity_of(strength)
-        return (real(4 / 3, density) * fluid[0] / (density * fluid[1]),)
-
-    return speed
-
-
 @wave_speed_squared.on(EosStrength)
 def _(law, kin, state):
-    # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower. Viscosity nu damps
-    # the shortest wave of a cell by xi = nu / (c h), which takes c dt / h down to
-    # sqrt(1 + xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10): as if c were c', see `slowed`.
+    # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower.
     j = state[0]
     m = memory_of(law, kin, state)
     elastic = elastic_ratio(law.strength, m.strength, j)
@@ -422,26 +441,8 @@ def _(law, kin, state):
     volume = specific_volume(law.eos) * j
     squared = (modulus + real(4 / 3, j) * shear_modulus(law.strength)) * volume
     density = real(1, j) / volume
-    squared = slowed(squared, shear_speed(law.strength, density))
-    return slowed(squared, bulk_damping(law, j, m, density))
-
-
-def bulk_damping(law, j, m, density):
-    """(nu / h,) of the viscosity, or ()."""
-    if len(m.viscous) == 0:
-        return ()
-    return viscous_speed(law.viscosity, m.viscous, density, sound(law, j, m))
-
-
-@by_type(bulk_damping)
-def _bulk_damping(law, j, m, density):
-    if len(m[1]) == 0:
-        return lambda law, j, m, density: ()
-
-    def damping(law, j, m, density):
-        return viscous_speed(law.viscosity, m.viscous, density, sound(law, j, m))
-
-    return damping
+    squared = damped_speed_squared(law.strength, squared, density)
+    return slowed_by_viscosity(law.viscosity, law, j, m, squared, density)
 
 
 @energy_density.on(EosStrength)
@@ -449,15 +450,14 @@ def _(law, kin, state):
     """What unloading gives back at this temperature: plastic work is not stored."""
     j = state[0]
     m = memory_of(law, kin, state)
-    whole = integrity(law.damage, m.damage)
     elastic = elastic_ratio(law.strength, m.strength, j)
     volume = compression_energy(law.eos, elastic, m.energy)
-    volume -= kept_heat(law.eos, plus(j - j, m.loss))
+    volume -= stored_heat(law.eos, plus(j - j, m.loss))
     volume += plus(j - j, thermal_pressure(law.temperature, m.heat)) * (real(1, j) - j)
     if intact_pressure(law, j, m) < 0:
-        volume = times(volume, whole)
+        volume = borne(law.damage, m.damage, volume)
     shear = shear_energy(law.strength, kin, leading_symmetric(kin, state[1:]))
-    return volume + j * times(shear, whole)
+    return volume + j * borne(law.damage, m.damage, shear)
 
 
 @dissipated_energy.on(EosStrength)
@@ -479,15 +479,21 @@ def _(law, kin, state):
     return equivalent_plastic_strain(law.strength, memory_of(law, kin, state).strength)
 
 
+@shown.on(Remembered)
+def _(what, law, kin, state):
+    return memory_of(law, kin, state).strength[what.place]
+
+
 @with_stress.on(EosStrength)
 def _(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
     m = memory_of(law, kin, state)
     elastic = elastic_ratio(law.strength, m.strength, state[0])
     beside = plus(plus(elastic - elastic, thermal_pressure(law.temperature, m.heat)), m.viscous)
+    beside = further_pressure(law.further, m.further, beside)
     p = -trace(stress) * real(1 / 3, elastic) - beside
     after, energy = at_pressure(law.eos, elastic, m.energy, p, m.heat)
-    now = Memory(energy, m.viscous, m.damage, m.heat, m.loss, m.strength)
+    now = Memory(energy, m.viscous, m.damage, m.heat, m.loss, m.strength, m.further)
     return state_of(state[0] * (after / elastic), deviator(kin, stress), now)
 
 
@@ -498,14 +504,13 @@ def _(law):
 
 @damage.on(EosStrength)
 def _(law, kin, state):
-    m = memory_of(law, kin, state)
     one = real(1, state[0])
-    return one - times(one, integrity(law.damage, m.damage))
+    return one - borne(law.damage, memory_of(law, kin, state).damage, one)
 
 
 @damage_initiation.on(EosStrength)
 def _(law, kin, state):
-    return damage_begun(law.damage, memory_of(law, kin, state).damage)
+    return initiation(law.damage, memory_of(law, kin, state).damage)
 
 
 @temperature.on(EosStrength)
@@ -513,22 +518,11 @@ def _(law, kin, state):
     return plus(state[0] - state[0], memory_of(law, kin, state).heat)
 
 
-def set_heat(heat, T):
-    """(T,) in the place of a temperature, () in that of none."""
-    return (T,) if len(heat) else ()
-
-
-@by_type(set_heat)
-def _set_heat(heat, T):
-    if len(heat) == 0:
-        return lambda heat, T: ()
-    return lambda heat, T: (T,)
-
-
 @with_temperature.on(EosStrength)
 def _(law, kin, state, T):
     m = memory_of(law, kin, state)
-    now = Memory(m.energy, m.viscous, m.damage, set_heat(m.heat, T), m.loss, m.strength)
+    heat = heat_from(m.heat, (T,))
+    now = Memory(m.energy, m.viscous, m.damage, heat, m.loss, m.strength, m.further)
     return state_of(state[0], leading_symmetric(kin, state[1:]), now)
 
 

@@ -1,11 +1,15 @@
-"""Linear elasticity in rate form."""
+"""material linear: isotropic linear elasticity for large rotations.
+
+The state of a point is (det F, Cauchy stress).
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
 from karamelo_py.compiler.tuples import add, scale
+from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import (
     add_pressure,
     contract,
@@ -23,21 +27,74 @@ from karamelo_py.points.laws import (
     initial_state,
     jacobian,
     kirchhoff_stress,
-    specific_volume,
     wave_speed_squared,
     with_stress,
 )
+from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
+from karamelo_py.points.laws.thermoelastic import expanding
 
 
-class Jaumann(NamedTuple):
-    """Parameters of the law whose stress turns with the spin of the point.
+class LinearElastic(NamedTuple):
+    """Hooke's law in rate form: the stress rate follows the strain rate, and turns with the point.
 
-    The state of a point is (det F, Cauchy stress).
+    Parameters
+    ----------
+    rho
+        Density.
+    E
+        Young's modulus.
+    nu
+        Poisson's ratio, above -1 and below 0.5.
+    cp, kappa
+        Heat capacity per mass, and conductivity; both or neither. With them points have a
+        temperature, at first that of their solid.
+    alpha
+        Coefficient of linear expansion.
+    rate
+        ``jaumann``: the stress turns with the point, as it must. ``none``: it does not, as in
+        Karamelo; only to repeat results of programs that leave the turn out.
+
+    Example
+    -------
+    material(rubber, linear, 1000, 1e6, 0.3)
+    material(girder, linear, 7850, 211e9, 0.3, 460, 45, 12e-6)
+
+    Notes
+    -----
+    sigma' = R sigma R^T + 2 G d + lambda tr(d) I, with d the strain increment and R the rotation
+    increment of the step (Jaumann rate; Hughes & Winget 1980). For strains of more than some ten
+    per cent a hyperelastic law such as neo-hookean is the better model. One dimension means
+    uniaxial strain, as plane strain and space have it.
+
+    A temperature T other than that at the start, T0, adds the stress -3 K alpha (T - T0), K the
+    bulk modulus; the elastic strain is without the expansion alpha (T - T0).
+
+    See Also
+    --------
+    material, neo-hookean
     """
 
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
     G: float  # shear modulus
+
+    @classmethod
+    def given(
+        cls,
+        rho: Annotated[float, Positive],
+        E: Annotated[float, Positive],
+        nu: float,
+        cp: Annotated[float, Positive] | None = None,
+        kappa: Annotated[float, NonNegative] | None = None,
+        alpha: float = 0.0,
+        *,
+        rate: Literal["jaumann", "none"] = "jaumann",
+    ):
+        """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
+        check_poisson_ratio(nu)
+        moduli = lame_parameters(E, nu)
+        law = cls if rate == "jaumann" else FixedFrame
+        return expanding(law(1 / rho, *moduli), moduli, cp, kappa, alpha)
 
 
 class FixedFrame(NamedTuple):
@@ -53,7 +110,7 @@ def turned(law, kin, dl, stress):
     """The old stress in the frame after the increment dl."""
 
 
-@turned.on(Jaumann)
+@turned.on(LinearElastic)
 def _(law, kin, dl, stress):
     return spin(kin, dl, stress)
 
@@ -63,13 +120,13 @@ def _(law, kin, dl, stress):
     return stress
 
 
-@initial_state.on(Jaumann)
+@initial_state.on(LinearElastic)
 @initial_state.on(FixedFrame)
 def _(law, kin, like):
     return (real(1, like),) + zero_symmetric(kin, like)
 
 
-@advance.on(Jaumann)
+@advance.on(LinearElastic)
 @advance.on(FixedFrame)
 def _(law, kin, state, dl, dt):
     strain = symmetric_part(kin, dl)
@@ -79,32 +136,32 @@ def _(law, kin, state, dl, dt):
     return (state[0] * volume_ratio(kin, dl),) + add(old, increment)
 
 
-@kirchhoff_stress.on(Jaumann)
+@kirchhoff_stress.on(LinearElastic)
 @kirchhoff_stress.on(FixedFrame)
 def _(law, kin, state):
     return scale(state[0], state[1:])
 
 
-@cauchy_stress.on(Jaumann)
+@cauchy_stress.on(LinearElastic)
 @cauchy_stress.on(FixedFrame)
 def _(law, kin, state):
     return state[1:]
 
 
-@jacobian.on(Jaumann)
+@jacobian.on(LinearElastic)
 @jacobian.on(FixedFrame)
 def _(law, kin, state):
     return state[0]
 
 
-@wave_speed_squared.on(Jaumann)
+@wave_speed_squared.on(LinearElastic)
 @wave_speed_squared.on(FixedFrame)
 def _(law, kin, state):
     # (lam + 2 G) / rho: the moduli are constant, the volume per mass has grown by det F
     return (law.lam + real(2, law.G) * law.G) * law.specific_volume * state[0]
 
 
-@elastic_strain.on(Jaumann)
+@elastic_strain.on(LinearElastic)
 @elastic_strain.on(FixedFrame)
 def _(law, kin, state):
     # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
@@ -114,20 +171,14 @@ def _(law, kin, state):
     return scale(half / law.G, add_pressure(kin, real(1, law.G), stress, -mean))
 
 
-@energy_density.on(Jaumann)
+@energy_density.on(LinearElastic)
 @energy_density.on(FixedFrame)
 def _(law, kin, state):
     strain = elastic_strain(law, kin, state)
     return real(0.5, law.G) * state[0] * contract(kin, state[1:], strain)
 
 
-@with_stress.on(Jaumann)
+@with_stress.on(LinearElastic)
 @with_stress.on(FixedFrame)
 def _(law, kin, state, stress):
     return (state[0],) + stress
-
-
-@specific_volume.on(Jaumann)
-@specific_volume.on(FixedFrame)
-def _(law):
-    return law.specific_volume

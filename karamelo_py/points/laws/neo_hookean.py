@@ -1,12 +1,16 @@
-"""Compressible neo-Hookean solid: hyperelastic, so objective and without dissipation."""
+"""material neo-hookean: compressible hyperelasticity.
+
+The state of a point is the deformation gradient F.
+"""
 
 from __future__ import annotations
 
 from math import log
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.tuples import scale
+from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import (
     add_pressure,
     deform,
@@ -26,53 +30,101 @@ from karamelo_py.points.laws import (
     initial_state,
     jacobian,
     kirchhoff_stress,
-    specific_volume,
     wave_speed_squared,
 )
+from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
+from karamelo_py.points.laws.thermoelastic import expanding
 
 
-class Hyperelastic(NamedTuple):
-    """Parameters of the law; the state of a point is the deformation gradient F."""
+class NeoHookean(NamedTuple):
+    """Compressible neo-Hookean solid, right at any strain and rotation.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    E
+        Young's modulus at small strain.
+    nu
+        Poisson's ratio at small strain, above -1 and below 0.5.
+    cp, kappa
+        Heat capacity per mass, and conductivity; both or neither. With them points have a
+        temperature, at first that of their solid.
+    alpha
+        Coefficient of linear expansion.
+
+    Example
+    -------
+    material(rubber, neo-hookean, 1000, 1e6, 0.3)
+    material(seal, neo-hookean, 1000, 1e6, 0.3, 1900, 0.2, 2e-4)
+
+    Notes
+    -----
+    First Piola-Kirchhoff stress P = G (F - F^-T) + lambda ln(det F) F^-T; stored energy
+    W = G/2 (tr F^T F - 3) - G ln J + lambda/2 (ln J)^2 (Bonet & Wood 2008, section 6.4.3).
+
+    A temperature T other than that at the start, T0, adds the stress -3 K alpha (T - T0), K the
+    bulk modulus; the elastic strain is without the expansion alpha (T - T0).
+
+    See Also
+    --------
+    material, linear
+    """
 
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
     G: float  # shear modulus
 
+    @classmethod
+    def given(
+        cls,
+        rho: Annotated[float, Positive],
+        E: Annotated[float, Positive],
+        nu: float,
+        cp: Annotated[float, Positive] | None = None,
+        kappa: Annotated[float, NonNegative] | None = None,
+        alpha: float = 0.0,
+    ):
+        """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
+        check_poisson_ratio(nu)
+        moduli = lame_parameters(E, nu)
+        return expanding(cls(1 / rho, *moduli), moduli, cp, kappa, alpha)
 
-@initial_state.on(Hyperelastic)
+
+@initial_state.on(NeoHookean)
 def _(law, kin, like):
     return identity(kin, like)
 
 
-@advance.on(Hyperelastic)
+@advance.on(NeoHookean)
 def _(law, kin, state, dl, dt):
     return deform(kin, dl, state)
 
 
-@kirchhoff_stress.on(Hyperelastic)
+@kirchhoff_stress.on(NeoHookean)
 def _(law, kin, state):
     # P = G (F - F^-T) + lam ln J F^-T, so tau = P F^T = G (b - I) + lam ln J I
     pressure = law.lam * log(determinant(kin, state)) - law.G
     return add_pressure(kin, law.G, left_cauchy_green(kin, state), pressure)
 
 
-@cauchy_stress.on(Hyperelastic)
+@cauchy_stress.on(NeoHookean)
 def _(law, kin, state):
     inverse = real(1, law.G) / determinant(kin, state)
     return scale(inverse, kirchhoff_stress(law, kin, state))
 
 
-@deformation.on(Hyperelastic)
+@deformation.on(NeoHookean)
 def _(law, kin, state):
     return state
 
 
-@jacobian.on(Hyperelastic)
+@jacobian.on(NeoHookean)
 def _(law, kin, state):
     return determinant(kin, state)
 
 
-@wave_speed_squared.on(Hyperelastic)
+@wave_speed_squared.on(NeoHookean)
 def _(law, kin, state):
     # Along a principal direction of stretch a, the tangent of P gives
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
@@ -82,7 +134,7 @@ def _(law, kin, state):
     return (law.G * (one + stretch) + max(bulk, real(0, law.G))) * law.specific_volume
 
 
-@energy_density.on(Hyperelastic)
+@energy_density.on(NeoHookean)
 def _(law, kin, state):
     half = real(0.5, law.G)
     ln_j = log(determinant(kin, state))
@@ -90,13 +142,8 @@ def _(law, kin, state):
     return half * law.G * excess - law.G * ln_j + half * law.lam * ln_j * ln_j
 
 
-@elastic_strain.on(Hyperelastic)
+@elastic_strain.on(NeoHookean)
 def _(law, kin, state):
     """Green-Lagrange strain (F^T F - I) / 2."""
     half = real(0.5, law.G)
     return add_pressure(kin, half, right_cauchy_green(kin, state), -half)
-
-
-@specific_volume.on(Hyperelastic)
-def _(law):
-    return law.specific_volume

@@ -1,29 +1,61 @@
-"""Bodies that move as they are told: no stress, and a velocity that nothing changes."""
+"""material rigid: a body that moves as it is told. Its state is empty."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real
+from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import zero_symmetric
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
-    driven,
+    constrained_velocity,
     elastic_strain,
     energy_density,
     initial_state,
     jacobian,
     kirchhoff_stress,
-    specific_volume,
     wave_speed_squared,
 )
 
 
 class Rigid(NamedTuple):
-    """The state is empty: there is nothing to remember."""
+    """A body that moves as it is told, whatever it meets.
+
+    Parameters
+    ----------
+    rho
+        Density.
+
+    Example
+    -------
+    material(tool, rigid, 1e6)
+
+    Notes
+    -----
+    Each point keeps the velocity that fix initial_velocity_particles or fix velocity_particles
+    gives it. Forces, contact and velocities of nodes do not change it. There is no stress, and no
+    limit of the time step but that a point stays within a cell.
+
+    On the grid the body counts with its mass: what shares nodes with it gets the mean velocity by
+    mass. Only with a density a hundred times that of what it meets, and more, does that give way
+    as if before a rigid body.
+
+    Domains of points that deform with the grid (CPDI, cpgimp) would not stay rigid, and are
+    refused.
+
+    See Also
+    --------
+    material, fix velocity_particles, fix initial_velocity_particles
+    """
 
     specific_volume: float  # volume per mass
+
+    @classmethod
+    def given(cls, rho: Annotated[float, Positive]):
+        """The law from the density."""
+        return cls(1 / rho)
 
 
 @initial_state.on(Rigid)
@@ -36,7 +68,7 @@ def _(law, kin, state, dl, dt):
     return ()
 
 
-@driven.on(Rigid)
+@constrained_velocity.on(Rigid)
 def _(law, own, given):
     return own
 
@@ -57,8 +89,3 @@ def _(law, kin, state):
 @energy_density.on(Rigid)
 def _(law, kin, state):
     return real(0, law.specific_volume)
-
-
-@specific_volume.on(Rigid)
-def _(law):
-    return law.specific_volume

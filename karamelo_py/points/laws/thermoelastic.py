@@ -9,8 +9,8 @@ from karamelo_py.compiler.tuples import following, leading
 from karamelo_py.points.kinematics import add_pressure
 from karamelo_py.points.laws import (
     advance,
-    assemble,
     cauchy_stress,
+    column,
     conductivity,
     deformation,
     elastic_strain,
@@ -19,14 +19,15 @@ from karamelo_py.points.laws import (
     initial_state,
     jacobian,
     kirchhoff_stress,
-    separate,
     specific_volume,
     temperature,
     wave_speed_squared,
     with_stress,
     with_temperature,
 )
-from karamelo_py.points.laws.temperatures import initial_heat, thermal_pressure
+from karamelo_py.points.laws.elasticity import LameParameters
+from karamelo_py.points.laws.temperatures import Warm, initial_heat, thermal_pressure
+from karamelo_py.script.errors import ScriptError
 
 
 class Expansion(NamedTuple):
@@ -46,28 +47,33 @@ class Thermoelastic(NamedTuple):
     heat: Any
 
 
-class ThermoelasticParts(NamedTuple):
-    """Tag of the law while its parts travel one by one."""
+def expanding(
+    law: NamedTuple, moduli: LameParameters, cp: float | None, kappa: float | None, alpha: float
+) -> NamedTuple:
+    """An elastic law with a temperature where heat capacity and conductivity are given."""
+    if cp is None or kappa is None:
+        if cp is not None:
+            raise ScriptError(
+                "with the heat capacity cp the conductivity kappa is needed",
+                argument="cp",
+                expected="cp and kappa, or neither",
+            )
+        return law
+    bulk = moduli.lam + 2 / 3 * moduli.G
+    return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, 0.0))
+
+
+column(Expansion, "T", temperature)
 
 
 @initial_heat.on(Expansion)
 def _(heat, like):
-    return (heat.initial_temperature,)
+    return Warm(heat.initial_temperature)
 
 
 @thermal_pressure.on(Expansion)
 def _(heat, T):
     return (heat.pressure * (T[0] - heat.initial_temperature),)
-
-
-@separate.on(Thermoelastic)
-def _(law):
-    return ThermoelasticParts(), (law.elastic, law.heat, (), (), ())
-
-
-@assemble.on(ThermoelasticParts)
-def _(tag, first, second, third, fourth, fifth):
-    return Thermoelastic(first, second)
 
 
 @shared
@@ -90,7 +96,7 @@ def thermal_pressure_of(law, kin, state):
 
 @initial_state.on(Thermoelastic)
 def _(law, kin, like):
-    return initial_state(law.elastic, kin, like) + initial_heat(law.heat, like)
+    return initial_state(law.elastic, kin, like) + (initial_heat(law.heat, like).T,)
 
 
 @advance.on(Thermoelastic)

@@ -11,16 +11,27 @@ dv
 
 Every class has these attributes:
 
-keeps_moment
-    whether points keep a tensor beside their velocity;
+point_fields
+    the fields that points have for it (:mod:`karamelo_py.compiler.fields`), such as `Moment`;
 inverts_spread
     whether it divides by D = sum_I N_I (X_I - x)(X_I - x)^T, which some bases let vanish.
 
 What is not defined for a class is that of FLIP and PIC: nothing is kept, v alone is mapped.
 """
 
+from typing import Any, NamedTuple
+
 from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.fields import planar
 from karamelo_py.compiler.tuples import add_scaled
+
+
+class Moment(NamedTuple):
+    """The tensor that points keep beside their velocity: its moment B or its gradient L."""
+
+    array: Any
+
+    shape = planar
 
 
 @point_function()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import affine, updated_velocity
+from karamelo_py.points.transfers import Moment, affine, updated_velocity
 
 
 class APIC(NamedTuple):
@@ -21,7 +21,7 @@ class APIC(NamedTuple):
     method(ulmpm, APIC, quadratic-spline)
     """
 
-    keeps_moment = True
+    point_fields = (Moment,)
     inverts_spread = True
 
 

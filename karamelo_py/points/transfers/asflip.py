@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from karamelo_py.points.transfers import affine, displacing_velocity, updated_velocity
-from karamelo_py.points.transfers.flip import blend
+from karamelo_py.points.transfers import Moment, affine, displacing_velocity, updated_velocity
+from karamelo_py.points.transfers.flip import Share, blend
 
 
 class ASFLIP(NamedTuple):
@@ -17,16 +17,16 @@ class ASFLIP(NamedTuple):
     Parameters
     ----------
     alpha
-        Share of FLIP, 0 to 1.
+        Share of FLIP.
 
     Example
     -------
     method(ulmpm, ASFLIP, quadratic-spline, 0.97)
     """
 
-    alpha: float = 1.0
+    alpha: Annotated[float, Share]
 
-    keeps_moment = True
+    point_fields = (Moment,)
     inverts_spread = True
 
 

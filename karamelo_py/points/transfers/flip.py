@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.tuples import add, add_scaled, scale
+from karamelo_py.language.kinds import Constraint
 from karamelo_py.points.transfers import updated_velocity
+
+Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
 
 
 class FLIP(NamedTuple):
@@ -18,17 +22,19 @@ class FLIP(NamedTuple):
     Parameters
     ----------
     alpha
-        Share of FLIP, 0 to 1.
+        Share of FLIP.
+    variant
+        Maps the gradient of velocity, too: TFLIP.
 
     Example
     -------
     method(ulmpm, FLIP, linear, 0.99)
     """
 
-    alpha: float = 1.0
+    alpha: Annotated[float, Share]
 
-    keeps_moment = False
     inverts_spread = False
+    variants = MappingProxyType({"gradient-enhanced": "TFLIP"})
 
 
 @shared

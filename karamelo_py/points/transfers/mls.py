@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function
 from karamelo_py.points.basis import affine_weight
-from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.kinematics import Line, PlaneStrain, Space
+from karamelo_py.points.kinematics.components import Vector, formula
 from karamelo_py.points.transfers import (
+    Moment,
     gradient_weight,
     kept_gradient,
     straining,
@@ -29,7 +30,7 @@ class MLS(NamedTuple):
     method(ulmpm, MLS, quadratic-spline)
     """
 
-    keeps_moment = True
+    point_fields = (Moment,)
     inverts_spread = True
 
 
@@ -43,21 +44,10 @@ def _(transfer, basis, kin, grid, stencil, k, gradient):
     return with_hoop(kin, affine_weight(basis, kin, grid, stencil, k), gradient)
 
 
-@point_function()
-def with_hoop(kin, planar, gradient):
+@formula()
+def with_hoop(kin, planar: Vector, gradient: Vector):
     """The planar gradient, with the hoop part N / r of an axisymmetric one."""
-
-
-@with_hoop.on(Line)
-@with_hoop.on(PlaneStrain)
-@with_hoop.on(Space)
-def _(kin, planar, gradient):
-    return planar
-
-
-@with_hoop.on(Axisymmetric)
-def _(kin, planar, gradient):
-    return planar + gradient[2:]
+    return [planar[i] if i < kin.dimension else gradient[i] for i in kin.axes]
 
 
 # The velocity gradient is what the point keeps: gathered once where both come from v*.

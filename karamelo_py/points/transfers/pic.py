@@ -18,7 +18,6 @@ class PIC(NamedTuple):
     method(ulmpm, PIC, linear)
     """
 
-    keeps_moment = False
     inverts_spread = False
 
 

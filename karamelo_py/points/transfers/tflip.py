@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from karamelo_py.points.transfers import taylor, updated_velocity
-from karamelo_py.points.transfers.flip import blend
+from karamelo_py.points.transfers import Moment, taylor, updated_velocity
+from karamelo_py.points.transfers.flip import Share, blend
 
 
 class TFLIP(NamedTuple):
@@ -16,16 +16,16 @@ class TFLIP(NamedTuple):
     Parameters
     ----------
     alpha
-        Share of FLIP, 0 to 1.
+        Share of FLIP.
 
     Example
     -------
     method(ulmpm, TFLIP, cubic-spline, 0.99)
     """
 
-    alpha: float = 1.0
+    alpha: Annotated[float, Share]
 
-    keeps_moment = True
+    point_fields = (Moment,)
     inverts_spread = False
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import taylor, updated_velocity
+from karamelo_py.points.transfers import Moment, taylor, updated_velocity
 
 
 class TPIC(NamedTuple):
@@ -19,7 +19,7 @@ class TPIC(NamedTuple):
     method(ulmpm, TPIC, quadratic-spline)
     """
 
-    keeps_moment = True
+    point_fields = (Moment,)
     inverts_spread = False
 
 

@@ -2,9 +2,33 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple
 
+from karamelo_py.compiler.fields import vector
+from karamelo_py.language.kinds import In
 from karamelo_py.points.transfers import terms, updated_velocity
+
+
+class TermOfSeries(NamedTuple):
+    """Term of the series at a point."""
+
+    array: Any
+
+    shape = vector
+    kept = False
+
+
+class Series(NamedTuple):
+    """Term of the series at a node, and the sum for the next."""
+
+    array: Any
+
+    kept = False
+
+    @staticmethod
+    def shape(kin: Any) -> int:
+        """Two vectors."""
+        return 2 * kin.dimension
 
 
 class XPIC(NamedTuple):
@@ -18,16 +42,25 @@ class XPIC(NamedTuple):
     Parameters
     ----------
     order
-        m, 1 to 20.
+        m.
 
     Example
     -------
     method(ulmpm, XPIC, quadratic-spline, 5)
     """
 
-    order: int = 2
+    order: Annotated[int, In(1, 20)]
 
-    keeps_moment = False
+    @property
+    def point_fields(self) -> tuple[type, ...]:
+        """Fields of the points, beyond the first order."""
+        return (TermOfSeries,) if self.order > 1 else ()
+
+    @property
+    def node_fields(self) -> tuple[type, ...]:
+        """Fields of the nodes, beyond the first order."""
+        return (Series,) if self.order > 1 else ()
+
     inverts_spread = False
 
 

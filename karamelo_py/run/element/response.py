@@ -7,24 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from karamelo_py.kernels.laws import can
 from karamelo_py.output.figures import blank_figure, tidy
 from karamelo_py.output.files import savefig, whole
 from karamelo_py.points import laws as materials
-from karamelo_py.points.laws.damages import damage_begun
-from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run.element.load_path import COMPONENTS
 from karamelo_py.run.element.point import Point
 
 WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take, and a blank
-
-# Column: point function, and what is defined for a law (or a part of it) that has it.
-OF_SOME_LAWS = {
-    "ep": (materials.plastic_strain, materials.plastic_strain),
-    "dissipated": (materials.dissipated_energy, materials.dissipated_energy),
-    "damage": (materials.damage, damage_begun),
-    "T": (materials.temperature, initial_heat),
-}
 
 
 def pressure(point: Point) -> float:
@@ -53,9 +42,8 @@ def columns(point: Point) -> dict[str, Callable[[], float]]:
     found["J"] = lambda: materials.jacobian(law, kin, point.state)
     found["stored"] = lambda: materials.energy_density(law, kin, point.state)
     found["work"] = lambda: point.work
-    for column, (function, has) in OF_SOME_LAWS.items():
-        if can(law, has):
-            found[column] = lambda function=function: function(law, kin, point.state)
+    for name, what in materials.columns_of(law).items():
+        found[name] = lambda what=what: materials.shown(what, law, kin, point.state)
     return found
 
 

@@ -8,10 +8,7 @@ from typing import Annotated
 
 from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import puts_force_on_points
 from karamelo_py.script.errors import ScriptError, nearest
-
-POINT_FORCE = ("bx", "by", "bz")  # there when a fix puts forces on points
 
 
 class Dump:
@@ -57,8 +54,6 @@ class Dump:
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
         """Warn of columns that are 0 because no point or node (`what`) keeps them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]
-        if what == "points" and puts_force_on_points(self.hub):
-            empty = [name for name in empty if name not in POINT_FORCE]
         if empty:
             self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} have no such field")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from karamelo_py.kernels.laws import can, elastic_law
-from karamelo_py.points.laws import with_stress
+from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.points.laws import can, with_stress
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.pairs import Bodies, Cells, collect, distribute, push_apart
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -29,7 +30,7 @@ class PairContact(Fix):
     """Base of the fixes by which the points of two solids push each other."""
 
     published = ("x", "y", "z")
-    puts_force_on_points = True
+    point_fields = (Force,)
     needs_all_points = True  # they are searched by ranges of ids
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
@@ -80,11 +81,11 @@ class PairContact(Fix):
         s = self.hub.simulation.setup
         now = self.hub.simulation.now
         for block in s.blocks:
-            x = block.x[now]
-            collect(s.kin, x, block.points, block.laws, block.id, *self._ranges, self._bodies)
+            x = block.points.x[now]
+            collect(s.kin, x, block.points, block.laws, *self._ranges, self._bodies)
         if self._push(s.kin, points.dt):
             for block in s.blocks:
-                distribute(s.kin, block.points, block.id, *self._ranges, self._bodies)
+                distribute(s.kin, block.points, *self._ranges, self._bodies)
         self.publish_components(self._total)
 
     def _push(self, kin: Any, dt: float) -> int:

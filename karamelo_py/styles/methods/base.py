@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.step import FBar, PointByPoint
+from karamelo_py.kernels.g2p import FBar, PointByPoint
 from karamelo_py.language import registry
-from karamelo_py.points.basis import blank
 from karamelo_py.points.frames import Updated
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice, numbered
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.styles.methods.domains import initial_shape
 
 
 class NoContact(NamedTuple):
@@ -31,6 +31,8 @@ class Method:
         The basis' tag.
     basis_name
         The basis, with its variant, as the script calls it.
+    thermal
+        Whether heat flows.
     place
         Place of the command in the script, for messages.
     frame
@@ -41,19 +43,28 @@ class Method:
         Whether every solid has a velocity field of its own on the grid of the domain.
     """
 
+    basis: NamedTuple
     basis_name = ""
+    thermal = False
     place: Place | None = None
     frame: NamedTuple = Updated()
     own_grids: ClassVar[bool] = False
     fields_per_solid: ClassVar[bool] = False
 
-    def __init__(self, hub: Hub, basis: NamedTuple):
-        self.basis = basis
+    def __init__(self, hub: Hub, heat: Literal["mechanical", "thermo-mechanical"] = "mechanical"):
+        """What a script may add.
+
+        Parameters
+        ----------
+        heat
+            Whether heat flows between points, too.
+        """
+        self.thermal = heat == "thermo-mechanical"
 
     @property
     def regular_points(self) -> bool:
         """Whether points of a cell stand at equal distances, so that their domains tile it."""
-        return hasattr(type(self.basis), "shapes")
+        return bool(getattr(self.basis, "shape", ()))
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """How solids with velocity fields of their own touch: a tag with what that takes."""
@@ -95,10 +106,7 @@ class Method:
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
         """What the basis keeps of the domains of a solid's points, (n, s)."""
-        width = len(blank(self.basis, kin, (0.0,) * kin.dimension)) - kin.dimension
-        if not width:
-            return np.empty((len(solid.x0), 0))
-        return type(self.basis).shapes(kin, solid)
+        return initial_shape(type(self.basis), solid)
 
     def _lattice(
         self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float

@@ -20,6 +20,11 @@ from karamelo_py.styles.methods.base import Method
 VARIANTS = {"R4": R4, "Q4": Q4, "T3": T3, "R8": R8, "H8": H8, "Tet4": Tet4}
 
 
+def _kind(basis: type) -> str | None:
+    """The kind of element that domains are made of in a mesh."""
+    return basis.element.kind if basis.element else None
+
+
 class Convected(Method):
     """A method whose points have domains that deform with them (CPDI).
 
@@ -69,7 +74,7 @@ class Convected(Method):
         basis = type(self.basis)
         wanted = basis.__name__
         has = solid.shape
-        boxes = [n for n, v in VARIANTS.items() if v.element in (None, "quad", "hexahedron")]
+        boxes = [n for n, v in VARIANTS.items() if v.element is None or v.element.box]
         if has == "box":
             if wanted in boxes:
                 return
@@ -78,9 +83,9 @@ class Convected(Method):
             )
             has = "boxes"
         else:
-            if has == basis.element:
+            if _kind(basis) == has:
                 return
-            fit = [name for name, other in VARIANTS.items() if other.element == has]
+            fit = [name for name, other in VARIANTS.items() if _kind(other) == has]
             hint = f"{fit[0]} in the place of {wanted}" if fit else "a mesh of linear elements"
             has = f"elements of the kind {has}"
         raise ScriptError(

@@ -13,6 +13,11 @@ class TLCPDI(Convected, OwnGrids):
     Domains keep their initial shape, so that none tangles; weights never change. Solids do not see
     each other on the grid. The variants are those of ulcpdi.
 
+    Parameters
+    ----------
+    variant
+        The shape of the domains.
+
     Example
     -------
     method(tlcpdi, FLIP, linear, 1, Q4)

@@ -18,6 +18,11 @@ class ULCPDI(Convected):
     ``T3`` and ``Tet4``
         the triangles and tetrahedra of a mesh, whose corners move with the grid.
 
+    Parameters
+    ----------
+    variant
+        The shape of the domains.
+
     Example
     -------
     method(ulcpdi, FLIP, linear, 1, R4)

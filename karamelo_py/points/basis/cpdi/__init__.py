@@ -12,9 +12,44 @@ A family of domains is one file; it gives only :func:`domain`, its place, and ca
 :func:`karamelo_py.points.basis.cpdi.corners.register`.
 """
 
+from __future__ import annotations
+
+from typing import NamedTuple
+
 from karamelo_py.compiler.compile import point_function
+
+
+class Element(NamedTuple):
+    """The kind of element whose corners a family of domains keeps."""
+
+    kind: str  # what meshes call it
+    corners: int
+    edges: tuple[tuple[int, int], ...]  # between corners; their determinant must be positive
+    mirrored: tuple[int, ...]  # the order of corners for elements of which it is negative
+    box: tuple[tuple[int, ...], ...] = ()  # corners of the box of side 2 around 0, where it is one
+
+
+class Domain(NamedTuple):
+    """What all these bases are; they add `dimension`, `shape` and, for `corners`, `element`."""
+
+    cells = 3
+    nodes_per_cell = 1
+    least_nodes = 2
+    steady_moment = True
+    steep_edge = False
+    element = None
+
+
+# Corners in the order of a mesh: around the square; around the lower face of the cube and the upper
+SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)
 
 
 @point_function(tags=2)
 def domain(basis, kin, place):
     """Corners x_c, weights w_c and gradients g_c of the domain of a point, a tuple each."""
+
+
+@point_function()
+def upright(basis, kin, place):
+    """Whether the domain is nowhere folded over: the Jacobian is positive at every corner."""

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from math import inf
+from collections.abc import Callable
+from math import inf, prod
+from typing import NamedTuple
 
-from numba.extending import overload
-
-from karamelo_py.compiler.compile import define, index, point_function, real, shared
-from karamelo_py.compiler.tuples import add, add_row, add_scaled, scale, subtract
+from karamelo_py.compiler.compile import choose, define, index, real, shared
+from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant, written
+from karamelo_py.compiler.tuples import add_row, add_scaled, scale
 from karamelo_py.points.basis import (
     affine_weight,
-    blank,
     carried,
     carrier,
     carriers,
@@ -22,13 +22,31 @@ from karamelo_py.points.basis import (
     reach,
     support,
 )
-from karamelo_py.points.basis.cpdi import domain
-from karamelo_py.points.basis.product import hoop, inverse_radius
+from karamelo_py.points.basis.cpdi import domain, upright
+from karamelo_py.points.basis.product import digits, hoop, inverse_radius, node_number
 from karamelo_py.points.grid import cells_along, in_cells, pick
-from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
+from karamelo_py.points.kinematics import Axisymmetric
+from karamelo_py.points.kinematics.components import Components, Number, Vector, formula
+from karamelo_py.points.kinematics.tags import TAGS
 
-_INLINED = {"forceinline": True}
-KINEMATICS = {2: (PlaneStrain, Axisymmetric), 3: (Space,)}
+
+class Corner(NamedTuple):
+    """Where a corner lies on the grid."""
+
+    first: int  # first node of its cell
+    fractions: tuple[float, ...]  # how far into the cell, along each direction
+    x: tuple[float, ...]  # its position, on the grid
+
+
+class Stencil(NamedTuple):
+    """What the nodes that a point sees are made of. Nobody computes what nobody reads of it."""
+
+    corners: tuple[Corner, ...]
+    weights: tuple[float, ...]  # of the corners, and their gradients
+    gradients: tuple[tuple[float, ...], ...]
+    centre: tuple[float, ...]  # sum_I N_I X_I
+    spread: tuple[float, ...]  # D of the affine transfers: xx yy (zz) xy (xz yz)
+    inv_r: float  # 1 / r of an axisymmetric point
 
 
 # --- one corner -------------------------------------------------------------------------------
@@ -47,68 +65,31 @@ def along_cell(grid, direction, x):
     return i, a - real(i, a), pick(direction, grid.x0, grid.y0, grid.z0) + a * grid.h
 
 
-@point_function()
-def hats(kin, grid, x):
-    """The first node of the cell of a corner, the fractions of that cell, and the place itself."""
-
-
-@hats.on(PlaneStrain)
-@hats.on(Axisymmetric)
-def _(kin, grid, x):
-    i, r, a = along_cell(grid, 0, x[0])
-    j, s, b = along_cell(grid, 1, x[1])
-    return grid.first + i * grid.step_x + j, (r, s), (a, b)
-
-
-@hats.on(Space)
-def _(kin, grid, x):
-    i, r, a = along_cell(grid, 0, x[0])
-    j, s, b = along_cell(grid, 1, x[1])
-    k, t, c = along_cell(grid, 2, x[2])
-    return grid.first + i * grid.step_x + j * grid.step_y + k, (r, s, t), (a, b, c)
+@formula()
+def _corner(kin, grid: Number, x: Vector):
+    """Where a corner at `x` lies on the grid."""
+    cells = kin.vector(lambda i: call(along_cell, grid, i, x[i]))
+    first = node_number(grid.first, [cell[0] for cell in cells])
+    fractions, positions = ([cell[n] for cell in cells] for n in (1, 2))
+    return call(Corner, first, fractions, positions)
 
 
 @shared
 def _side(far, fraction):
-    return fraction if far > 0 else real(1, fraction) - fraction
+    return choose(far > 0, fraction, real(1, fraction) - fraction)
 
 
-@point_function()
-def hat(kin, fractions, j):
-    """The linear function of the j-th node of a cell."""
+@formula()
+def _hat(kin, corner: Number, j: Number):
+    """The linear function of the j-th node of a corner's cell."""
+    sides = zip(digits("j", 2, kin.dimension), kin.directions, strict=True)
+    return prod(call(_side, far, corner.fractions[i]) for far, i in sides)
 
 
-@hat.on(PlaneStrain)
-@hat.on(Axisymmetric)
-def _(kin, fractions, j):
-    return _side(j // 2, fractions[0]) * _side(j % 2, fractions[1])
-
-
-@hat.on(Space)
-def _(kin, fractions, j):
-    plane = _side(j // 4, fractions[0]) * _side(j // 2 % 2, fractions[1])
-    return plane * _side(j % 2, fractions[2])
-
-
-@point_function()
-def node(kin, grid, first, j):
-    """The number of the j-th node of a cell."""
-
-
-@node.on(PlaneStrain)
-@node.on(Axisymmetric)
-def _(kin, grid, first, j):
-    return index(first + (j // 2) * grid.step_x + j % 2)
-
-
-@node.on(Space)
-def _(kin, grid, first, j):
-    return index(first + (j // 4) * grid.step_x + (j // 2 % 2) * grid.step_y + j % 2)
-
-
-@point_function()
-def arm(kin, grid, fractions, j):
-    """From a corner to the j-th node of its cell."""
+@formula()
+def _node(kin, grid: Number, corner: Number, j: Number):
+    """The number of the j-th node of a corner's cell."""
+    return call(index, node_number(corner.first, digits("j", 2, kin.dimension)))
 
 
 @shared
@@ -116,312 +97,125 @@ def _arm(grid, far, fraction):
     return (real(far, fraction) - fraction) * grid.h
 
 
-@arm.on(PlaneStrain)
-@arm.on(Axisymmetric)
-def _(kin, grid, fractions, j):
-    return _arm(grid, j // 2, fractions[0]), _arm(grid, j % 2, fractions[1])
-
-
-@arm.on(Space)
-def _(kin, grid, fractions, j):
-    return (
-        _arm(grid, j // 4, fractions[0]),
-        _arm(grid, j // 2 % 2, fractions[1]),
-        _arm(grid, j % 2, fractions[2]),
-    )
-
-
-@shared
-def away(kin, grid, at, centre, j):
-    """From the weighted centre to the j-th node of the cell of a corner."""
-    return add(arm(kin, grid, at[1], j), subtract(at[2], centre))
+@formula()
+def _away(kin, grid: Number, corner: Number, centre: Vector, j: Number):
+    """From the weighted centre to the j-th node of a corner's cell."""
+    far = digits("j", 2, kin.dimension)
+    arms = kin.vector(lambda i: call(_arm, grid, far[i], corner.fractions[i]))
+    return kin.vector(lambda i: arms[i] + (corner.x[i] - centre[i]))
 
 
 # --- all corners ------------------------------------------------------------------------------
 
 
-def each(function):
-    """``f(kin, grid, items)``: the tuple of ``function(kin, grid, item)``, written out."""
-
-    def loop(kin, grid, items):
-        return tuple(function(kin, grid, item) for item in items)
-
-    @overload(loop, _INLINED, strict=False)
-    def _written_out(kin, grid, items):
-        terms = "".join(f"function(kin, grid, items[{k}]), " for k in range(len(items)))
-        return define("kin, grid, items", f"return ({terms})", function=function)
-
-    return loop
+def _spread_pairs(kin: Components) -> list[tuple[int, int]]:
+    """Rows and columns of D in the layout of :class:`Stencil`."""
+    return [pair for pair in kin.symmetric_pairs if max(pair) < kin.dimension]
 
 
-_hats_of_all = each(hats)
-
-
-def mean(weights, at):
-    """sum_c w_c x_c of the corners' places: sum_I N_I X_I."""
-    total = scale(weights[0], at[0][2])
-    for w, corner in zip(weights[1:], at[1:], strict=True):
-        total = add_scaled(total, w, corner[2])
-    return total
-
-
-@overload(mean, _INLINED)
-def _mean(weights, at):
-    lines = ["total = scale(weights[0], at[0][2])"]
-    for c in range(1, len(weights)):
-        lines.append(f"total = add_scaled(total, weights[{c}], at[{c}][2])")
-    lines.append("return total")
-    return define("weights, at", *lines, scale=scale, add_scaled=add_scaled)
-
-
-@point_function()
-def second_moment(kin, grid, total, weight, away, fractions):
+@formula()
+def _add_spread(kin, grid: Number, total: Vector, weight: Number, corner: Number, centre: Number):
     """total + the part of one corner in D, that is w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
+    away = kin.vector(lambda i: corner.x[i] - centre[i])
+    r = corner.fractions
+
+    def part(i, j):
+        within = grid.h * grid.h * r[i] * (1 - r[i]) if i == j else 0
+        return weight * (away[i] * away[j] + within)
+
+    return [total[n] + part(i, j) for n, (i, j) in enumerate(_spread_pairs(kin))]
 
 
-@shared
-def _spread(grid, r):
-    return grid.h * grid.h * r * (real(1, r) - r)
-
-
-@second_moment.on(PlaneStrain)
-@second_moment.on(Axisymmetric)
-def _(kin, grid, total, weight, away, fractions):
-    a, b = away
-    return (
-        total[0] + weight * (a * a + _spread(grid, fractions[0])),
-        total[1] + weight * (b * b + _spread(grid, fractions[1])),
-        total[2] + weight * (a * b),
-    )
-
-
-@second_moment.on(Space)
-def _(kin, grid, total, weight, away, fractions):
-    a, b, c = away
-    return (
-        total[0] + weight * (a * a + _spread(grid, fractions[0])),
-        total[1] + weight * (b * b + _spread(grid, fractions[1])),
-        total[2] + weight * (c * c + _spread(grid, fractions[2])),
-        total[3] + weight * (a * b),
-        total[4] + weight * (a * c),
-        total[5] + weight * (b * c),
-    )
-
-
-@point_function()
-def no_moment(kin, like):
-    """A second moment of zero."""
-
-
-@no_moment.on(PlaneStrain)
-@no_moment.on(Axisymmetric)
-def _(kin, like):
-    zero = real(0, like)
-    return (zero, zero, zero)
-
-
-@no_moment.on(Space)
-def _(kin, like):
-    zero = real(0, like)
-    return (zero, zero, zero, zero, zero, zero)
-
-
-@point_function()
-def solve(kin, d, a):
-    """D^-1 a of a symmetric D in the layout of `second_moment`."""
-
-
-@solve.on(PlaneStrain)
-@solve.on(Axisymmetric)
-def _(kin, d, a):
-    k = real(1, a[0]) / (d[0] * d[1] - d[2] * d[2])
-    return (k * (d[1] * a[0] - d[2] * a[1]), k * (d[0] * a[1] - d[2] * a[0]))
-
-
-@solve.on(Space)
-def _(kin, d, a):
-    xx, yy, zz, xy, xz, yz = d
-    p = yy * zz - yz * yz
-    q = xz * yz - xy * zz
-    r = xy * yz - xz * yy
-    k = real(1, a[0]) / (xx * p + xy * q + xz * r)
-    s = xx * zz - xz * xz
-    t = xy * xz - xx * yz
-    u = xx * yy - xy * xy
-    return (
-        k * (p * a[0] + q * a[1] + r * a[2]),
-        k * (q * a[0] + s * a[1] + t * a[2]),
-        k * (r * a[0] + t * a[1] + u * a[2]),
-    )
-
-
-def moment(kin, grid, weights, at, centre):
-    """D = sum_I N_I (X_I - x)(X_I - x)^T about the weighted centre."""
-    total = no_moment(kin, centre[0])
-    for w, corner in zip(weights, at, strict=True):
-        total = second_moment(kin, grid, total, w, subtract(corner[2], centre), corner[1])
-    return total
-
-
-@overload(moment, _INLINED, strict=False)
-def _moment(kin, grid, weights, at, centre):
-    lines = ["total = no_moment(kin, centre[0])"]
-    for c in range(len(weights)):
-        lines.append(
-            f"total = second_moment(kin, grid, total, weights[{c}], "
-            f"subtract(at[{c}][2], centre), at[{c}][1])"
-        )
-    return define(
-        "kin, grid, weights, at, centre", *lines, "return total",
-        no_moment=no_moment, second_moment=second_moment, subtract=subtract,
-    )  # fmt: skip
-
-
-def farthest(kin, place):
-    """How far a corner that `place` keeps is from the point in any direction; NaN if any is."""
+@formula()
+def _solve(kin, spread: Vector, a: Vector):
+    """D^-1 a."""
     d = kin.dimension
-    far = abs(place[d] - place[0])
-    for k in range(d, len(place)):
-        far = max(abs(place[k] - place[k % d]), far)
-    return far
+    m = {pair: spread[n] for n, pair in enumerate(_spread_pairs(kin))}
+    m |= {(j, i): value for (i, j), value in m.items()}
+    k = 1 / determinant(m, d)
+    return kin.vector(lambda i: k * sum(cofactor(m, d, i, j) * a[j] for j in range(d)))
 
 
-@overload(farthest, _INLINED, strict=False)
-def _farthest(kin, place):
-    d = kin.instance_class.dimension
-    lines = [f"far = abs(place[{d}] - place[0])"]
-    lines += [f"far = max(abs(place[{k}] - place[{k % d}]), far)" for k in range(d + 1, len(place))]
-    return define("kin, place", *lines, "return far")
+def _domain_functions(tag: type, corners: int) -> dict[Callable, Callable]:
+    """The point functions of domains of so many corners."""
+    basis, kin, grid, place, stencil = map(Symbol, ("basis", "kin", "grid", "place", "stencil"))
+    described = call(domain, basis, kin, place)
+    x, weights, gradients = (described[i] for i in range(3))
+    at = [call(_corner, kin, grid, x[c]) for c in range(corners)]
+    centre = call(scale, weights[0], at[0].x)
+    for c in range(1, corners):
+        centre = call(add_scaled, centre, weights[c], at[c].x)
+    spread = (0,) * len(_spread_pairs(Components(tag)))
+    for c in range(corners):
+        spread = call(_add_spread, kin, grid, spread, weights[c], at[c], centre)
+    inv_r = call(inverse_radius, centre[0])
+    located = call(Stencil, at, weights, gradients, centre, spread, inv_r)
 
-
-@point_function()
-def upright(basis, kin, place):
-    """Whether the domain is nowhere folded over: the Jacobian is positive at every corner."""
-
-
-def corners_of(kin, place):
-    """The corners that a place keeps behind its position."""
-    d = kin.dimension
-    return tuple(tuple(place[k : k + d]) for k in range(d, len(place), d))
-
-
-@overload(corners_of, _INLINED, strict=False)
-def _corners_of(kin, place):
-    d = kin.instance_class.dimension
-    items = "".join(
-        "(" + "".join(f"place[{k + i}], " for i in range(d)) + "), "
-        for k in range(d, len(place), d)
-    )
-    return define("kin, place", f"return ({items})")
-
-
-def stencil_of(basis, kin, grid, place):
-    """The stencil: see `register`."""
-    x, weights, gradients = domain(basis, kin, place)
-    at = _hats_of_all(kin, grid, x)
-    centre = mean(weights, at)
-    spread = moment(kin, grid, weights, at, centre)
-    return at, weights, gradients, centre, spread, inverse_radius(centre[0])
+    d = tag.dimension
+    c, j = (Symbol(f"({{}} {operation} {2**d})", Symbol("k")) for operation in ("//", "%"))
+    corner = stencil.corners[c]
+    hat = call(_hat, kin, corner, j)
+    weight = stencil.weights[c] * hat
+    gradient = [hat * stencil.gradients[c][i] for i in range(d)]
+    if tag is Axisymmetric:
+        gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
+    away = call(_away, kin, grid, corner, stencil.centre, j)
+    solved = call(_solve, kin, stencil.spread, away)
+    seen = "basis, kin, grid, stencil, k"
+    return {
+        locate: written("basis, kin, grid, place", located, "place[0]"),
+        support: define("basis, kin", f"return {corners * 2**d}"),
+        entry: written(seen, (call(_node, kin, grid, corner, j), weight, gradient)),
+        reach: written(seen, away),
+        affine_weight: written(seen, [weight * solved[i] for i in range(d)]),
+    }
 
 
 # --- registration -----------------------------------------------------------------------------
 
 
+def tags_of(d: int) -> list[type]:
+    """The kinematics of so many dimensions."""
+    return [tag for tag in TAGS if tag.dimension == d]
+
+
 def register(basis: type, d: int, corners: int) -> None:
     """Give `basis`, a class with :func:`domain`, what an engine asks of a basis.
-
-    The stencil is: for each corner the first node of its cell, the fractions of that cell and the
-    place; weights; gradients; the weighted centre; D of the affine transfers; 1 / r, of
-    axisymmetric points. What a transfer does not use is never computed: compilers see that nobody
-    reads it.
 
     Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I. Where that is not
     the point (corners beyond the grid; quadrilaterals and hexahedra that are no parallelograms),
     linear momentum stays exact, and angular momentum is that about these centres: what the points
     themselves show wanders by a thousandth of what it does with FLIP (a spinning square, Q4).
     """
-    nodes = 2**d
 
     @carrier.on(basis)
     def _(basis, kin, grid, stencil, corner, j):
-        at = stencil[0][corner]
-        return node(kin, grid, at[0], j), hat(kin, at[1], j)
+        at = stencil.corners[corner]
+        return _node(kin, grid, at, j), _hat(kin, at, j)
 
-    for kin_class in KINEMATICS[d]:
-        locate.on(basis, kin_class)(stencil_of)
-
-        @support.on(basis, kin_class)
-        def _(basis, kin):
-            return corners * nodes
-
-        @reach.on(basis, kin_class)
-        def _(basis, kin, grid, stencil, k):
-            c = k // nodes
-            at = stencil[0][c]
-            return away(kin, grid, at, stencil[3], k % nodes)
-
-        @affine_weight.on(basis, kin_class)
-        def _(basis, kin, grid, stencil, k):
-            c = k // nodes
-            at = stencil[0][c]
-            weight = stencil[1][c] * hat(kin, at[1], k % nodes)
-            to_node = away(kin, grid, at, stencil[3], k % nodes)
-            return scale(weight, solve(kin, stencil[4], to_node))
-
-        if kin_class is Axisymmetric:
-
-            @entry.on(basis, kin_class)
-            def _(basis, kin, grid, stencil, k):
-                c = k // nodes
-                j = k % nodes
-                at = stencil[0][c]
-                n = hat(kin, at[1], j)
-                weight = stencil[1][c] * n
-                slope = scale(n, stencil[2][c])
-                around = hoop(weight, slope[0], stencil[5])
-                return node(kin, grid, at[0], j), weight, (slope[0], slope[1], around)
-
-        else:
-
-            @entry.on(basis, kin_class)
-            def _(basis, kin, grid, stencil, k):
-                c = k // nodes
-                j = k % nodes
-                at = stencil[0][c]
-                n = hat(kin, at[1], j)
-                weight = stencil[1][c] * n
-                return node(kin, grid, at[0], j), weight, scale(n, stencil[2][c])
+    for kin in tags_of(d):
+        for function, implementation in _domain_functions(kin, corners).items():
+            function.on(basis, kin)(implementation)
 
 
-def register_carried(basis: type, d: int, corners: int) -> None:
+def register_carried(basis: type) -> None:
     """Let the corners of `basis`, which defines `upright`, be kept and go with the grid."""
-    nodes = 2**d
+    d, corners = basis.dimension, basis.element.corners
     register(basis, d, corners)
-
-    @carried.on(basis)
-    def _(basis, kin):
-        return corners
-
-    @placed.on(basis)
-    def _(basis, kin):
-        return corners
-
-    @carriers.on(basis)
-    def _(basis, kin):
-        return nodes
-
-    @carry.on(basis)
-    def _(basis, kin, place, old, corner, displacement):
-        return add_row(place, d + d * corner, displacement)
-
-    @extent.on(basis)
-    def _(basis, kin, grid, place):
-        if not upright(basis, kin, place):
-            return real(inf, grid.h)
-        return farthest(kin, place) * grid.inv_h
-
-    zeros = "zero, " * (d * corners)
-    own = "".join(f"x[{k}], " for k in range(d))
-    blanked = define("basis, kin, x", "zero = real(0, x[0])", f"return ({own}{zeros})", real=real)
-    for kin_class in KINEMATICS[d]:
-        blank.on(basis, kin_class)(blanked)
+    carried.on(basis)(define("basis, kin", f"return {corners}"))
+    placed.on(basis)(define("basis, kin", f"return {corners}"))
+    carriers.on(basis)(define("basis, kin", f"return {2**d}"))
+    carry.on(basis)(
+        define(
+            "basis, kin, place, old, corner, displacement",
+            f"return add_row(place, {d} + {d} * corner, displacement)",
+            add_row=add_row,
+        )
+    )
+    # How far a corner is from the point in any direction; NaN if any is.
+    basis_, kin, place, grid = map(Symbol, ("basis", "kin", "place", "grid"))
+    far = abs(place[d] - place[0])
+    for k in range(d + 1, d + d * corners):
+        far = call(max, abs(place[k] - place[k % d]), far)
+    reached = call(choose, call(upright, basis_, kin, place), far * grid.inv_h, inf)
+    extent.on(basis)(written("basis, kin, grid, place", reached, "place[0]"))

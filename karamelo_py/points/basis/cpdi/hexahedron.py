@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-import numpy as np
-
 from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.tuples import add, scale, subtract
-from karamelo_py.points.basis.cpdi import domain
-from karamelo_py.points.basis.cpdi.corners import register_carried, upright
-from karamelo_py.points.basis.cpdi.initial import element_corners, turned
+from karamelo_py.compiler.symbols import call
+from karamelo_py.compiler.tuples import add, scale
+from karamelo_py.points.basis.cpdi import CUBE, Domain, Element, domain, upright
+from karamelo_py.points.basis.cpdi.corners import register_carried
 from karamelo_py.points.kinematics import Space
+from karamelo_py.points.kinematics.components import Number, Vector, formula
 
-# The order of a mesh: around the lower face, then around the upper.
-SIGNS = np.array([(x, y, z) for z in (-1, 1) for x, y in [(-1, -1), (1, -1), (1, 1), (-1, 1)]])
 # Weights of the ends of an edge at the nearer and the farther of its two Gauss points.
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 
 
-class H8(NamedTuple):
+class H8(Domain):
     """Trilinear hexahedra of eight corners, which neighbouring points move alike.
 
     Weights and gradients are the exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate
@@ -30,21 +25,10 @@ class H8(NamedTuple):
     method(ulcpdi, FLIP, linear, 1, H8)
     """
 
+    __slots__ = ()
     dimension = 3
-    cells = 3
-    nodes_per_cell = 1
-    least_nodes = 2
-    steady_moment = True
-    steep_edge = False
-    element = "hexahedron"  # of a mesh
-
-    @staticmethod
-    def shapes(kin: Any, solid: Any) -> np.ndarray:
-        """Corners (n, 24) of hexahedra with a positive volume."""
-        places = element_corners(solid, SIGNS)
-        x = places.reshape(-1, 8, 3)
-        edges = np.stack([x[:, 1] - x[:, 0], x[:, 3] - x[:, 0], x[:, 4] - x[:, 0]], axis=1)
-        return turned(places, np.linalg.det(edges) < 0, [4, 5, 6, 7, 0, 1, 2, 3], 3)
+    shape = ("corners",)
+    element = Element("hexahedron", 8, ((0, 1), (0, 3), (0, 4)), (4, 5, 6, 7, 0, 1, 2, 3), CUBE)
 
 
 @shared
@@ -79,27 +63,27 @@ def _mix(p, a, q, b):
     return add(scale(p, a), scale(q, b))
 
 
-@shared
-def _edges(place):
+def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
+    """Signs of a corner: `s` in direction e, `a` and `b` in the others."""
+    others = (a, b)
+    return (*others[:e], s, *others[e:])
+
+
+@formula(Space)
+def _edges(kin, place: Vector):
     """Half of the edges along each direction; the other two directions go as in `_at_gauss`."""
-    a, b, c, d = place[3:6], place[6:9], place[9:12], place[12:15]
-    e, f, g, h = place[15:18], place[18:21], place[21:24], place[24:27]
-    half = real(0.5, place[0])
-    return (
-        (_half(half, b, a), _half(half, c, d), _half(half, f, e), _half(half, g, h)),
-        (_half(half, d, a), _half(half, c, b), _half(half, h, e), _half(half, g, f)),
-        (_half(half, e, a), _half(half, f, b), _half(half, h, d), _half(half, g, c)),
-    )
+    at = {signs: [place[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(CUBE)}
 
+    def half(e, a, b):
+        lower, upper = at[_across(e, a, b, -1)], at[_across(e, a, b, 1)]
+        return [0.5 * (upper[i] - lower[i]) for i in range(3)]
 
-@shared
-def _half(half, b, a):
-    return scale(half, subtract(b, a))
+    return [[half(e, a, b) for b in (-1, 1) for a in (-1, 1)] for e in range(3)]
 
 
 @domain.on(H8, Space)
 def _(basis, kin, place):
-    along = _edges(place)
+    along = _edges(kin, place)
     # Rows of the Jacobian at the Gauss points: u does not depend on xi, v not on eta, w not on
     # zeta; numbers say at which points of the other two directions.
     u00, u10, u01, u11 = _at_gauss(along[0][0], along[0][1], along[0][2], along[0][3])
@@ -131,59 +115,44 @@ def _(basis, kin, place):
         (_dot(u01, c001), _dot(u01, c101)),
         (_dot(u11, c011), _dot(u11, c111)),
     )
-    volume = add(add(d00, d10), add(d01, d11))
-    k = real(1, place[0]) / (volume[0] + volume[1])
-    near, far = k * real(NEAR, k), k * real(FAR, k)
-    half = k * real(0.5, k)
-    weights = (
-        near * d00[0] + far * d00[1],
-        far * d00[0] + near * d00[1],
-        far * d10[0] + near * d10[1],
-        near * d10[0] + far * d10[1],
-        near * d01[0] + far * d01[1],
-        far * d01[0] + near * d01[1],
-        far * d11[0] + near * d11[1],
-        near * d11[0] + far * d11[1],
-    )
-    gradients = (
-        _slope(-half, p[0], -half, q[0], -half, r[0]),
-        _slope(half, p[0], -half, q[1], -half, r[1]),
-        _slope(half, p[1], half, q[1], -half, r[3]),
-        _slope(-half, p[1], half, q[0], -half, r[2]),
-        _slope(-half, p[2], -half, q[2], half, r[0]),
-        _slope(half, p[2], -half, q[3], half, r[1]),
-        _slope(half, p[3], half, q[3], half, r[3]),
-        _slope(-half, p[3], half, q[2], half, r[2]),
-    )
-    corners = (
-        place[3:6], place[6:9], place[9:12], place[12:15],
-        place[15:18], place[18:21], place[21:24], place[24:27],
-    )  # fmt: skip
+    return _means(kin, place, (d00, d10, d01, d11), p, q, r)
+
+
+def _at(a: int, b: int) -> int:
+    """Which of the four in the order of `_at_gauss`."""
+    return (a > 0) + 2 * (b > 0)
+
+
+@formula(Space)
+def _means(kin, place: Vector, d: Number, p: Number, q: Number, r: Number):
+    """Corners, weights and gradients, from what det J and its cofactors give to the corners."""
+    sums = [(d[0][n] + d[1][n]) + (d[2][n] + d[3][n]) for n in range(2)]
+    k = 1 / (sums[0] + sums[1])
+    near, far, half = k * NEAR, k * FAR, k * 0.5
+    corners, weights, gradients = [], [], []
+    for c, (x, y, z) in enumerate(CUBE):
+        corners.append([place[3 * c + 3 + i] for i in range(3)])
+        first, second = (near, far) if x < 0 else (far, near)
+        at = d[_at(y, z)]
+        weights.append(first * at[0] + second * at[1])
+        share = [-half if sign < 0 else half for sign in (x, y, z)]
+        u, v, w = p[_at(y, z)], q[_at(x, z)], r[_at(x, y)]
+        slope = [share[0] * u[i] + share[1] * v[i] + share[2] * w[i] for i in range(3)]
+        gradients.append(slope)
     return corners, weights, gradients
 
 
-@shared
-def _slope(a, p, b, q, c, r):
-    return add(_mix(a, p, b, q), scale(c, r))
-
-
-@shared
-def _corner(u, v, w):
-    return _dot(u, _cross(v, w))
+@formula(Space)
+def _least_jacobian(kin, u: Number, v: Number, w: Number):
+    """The least of the corners' Jacobians, from the half edges that meet there."""
+    met = ((u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in CUBE)
+    return call(min, *(call(_dot, a, call(_cross, b, c)) for a, b, c in met))
 
 
 @upright.on(H8)
 def _(basis, kin, place):
-    u, v, w = _edges(place)
-    lower = min(
-        min(_corner(u[0], v[0], w[0]), _corner(u[0], v[1], w[1])),
-        min(_corner(u[1], v[1], w[3]), _corner(u[1], v[0], w[2])),
-    )
-    upper = min(
-        min(_corner(u[2], v[2], w[0]), _corner(u[2], v[3], w[1])),
-        min(_corner(u[3], v[3], w[3]), _corner(u[3], v[2], w[2])),
-    )
-    return min(lower, upper) > 0
+    u, v, w = _edges(kin, place)
+    return _least_jacobian(kin, u, v, w) > 0
 
 
-register_carried(H8, 3, 8)
+register_carried(H8)

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-import numpy as np
-
 from karamelo_py.compiler.compile import real
-from karamelo_py.points.basis.cpdi import domain
-from karamelo_py.points.basis.cpdi.corners import register_carried, upright
-from karamelo_py.points.basis.cpdi.initial import element_corners, turned
+from karamelo_py.points.basis.cpdi import SQUARE, Domain, Element, domain, upright
+from karamelo_py.points.basis.cpdi.corners import register_carried
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain
 
-SIGNS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
 
-
-class Q4(NamedTuple):
+class Q4(Domain):
     """Quadrilaterals of four corners, which neighbouring points move alike.
 
     Domains go on tiling the body without gaps (Sadeghirad, Brannon & Guilkey 2013). In strong shear
@@ -26,21 +19,10 @@ class Q4(NamedTuple):
     method(ulcpdi, FLIP, linear, 1, Q4)
     """
 
+    __slots__ = ()
     dimension = 2
-    cells = 3
-    nodes_per_cell = 1
-    least_nodes = 2
-    steady_moment = True
-    steep_edge = False
-    element = "quad"  # of a mesh
-
-    @staticmethod
-    def shapes(kin: Any, solid: Any) -> np.ndarray:
-        """Corners (n, 8), counter-clockwise."""
-        places = element_corners(solid, SIGNS)
-        x1, y1, x2, y2, x3, y3, x4, y4 = places.T
-        area = (x3 - x1) * (y4 - y2) - (x4 - x2) * (y3 - y1)
-        return turned(places, area < 0, [0, 3, 2, 1], 2)
+    shape = ("corners",)
+    element = Element("quad", 4, ((0, 2), (1, 3)), (0, 3, 2, 1), SQUARE)
 
 
 @domain.on(Q4, PlaneStrain)
@@ -77,4 +59,4 @@ def _(basis, kin, place):
     return least > 0
 
 
-register_carried(Q4, 2, 4)
+register_carried(Q4)

@@ -6,13 +6,7 @@ material, but for pressure, which also rubble bears. Equation of state and stren
 it, so that it enters once. What it remembers is its memory, a flat tuple.
 """
 
-from typing import NamedTuple
-
 from karamelo_py.compiler.compile import point_function
-
-
-class NoDamage(NamedTuple):
-    """Tag of laws without."""
 
 
 @point_function()
@@ -35,14 +29,9 @@ def damage_after(damage, memory, strain, triaxiality, heat, dt):
 
 @point_function()
 def integrity(damage, memory):
-    """(1 - D,), or () where nothing breaks."""
-
-
-@integrity.otherwise
-def _(damage, memory):
-    return ()
+    """1 - D."""
 
 
 @point_function()
-def damage_begun(damage, memory):
+def initiation(damage, memory):
     """What grows to 1 before damage begins."""

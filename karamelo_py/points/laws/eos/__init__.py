@@ -2,13 +2,12 @@
 
 An equation of state is a NamedTuple of parameters (its class is the tag), a part of a composed law
 (`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is
-the volume over the reference volume, `heat` the temperature (T,), or () where the law has none.
+the volume over the reference volume, `heat` the temperature (`Warm`), or () where the law has none.
 What it remembers of the past is its memory, a flat tuple, nothing for most. It also has a
 `specific_volume`, as a law does.
 """
 
 from karamelo_py.compiler.compile import point_function
-from karamelo_py.points.laws import specific_volume
 
 
 @point_function()
@@ -35,11 +34,11 @@ def _(eos, memory, before, j, heating):
 
 
 @point_function()
-def kept_heat(eos, loss):
+def stored_heat(eos, loss):
     """How much of the dissipated energy is in the memory and so in `compression_energy`."""
 
 
-@kept_heat.otherwise
+@stored_heat.otherwise
 def _(eos, loss):
     return loss - loss
 
@@ -72,11 +71,3 @@ def at_pressure(eos, j, memory, p, heat):
 @at_pressure.otherwise
 def _(eos, j, memory, p, heat):
     return ratio_at_pressure(eos, p, heat), memory
-
-
-def give_specific_volume(eos: type) -> None:
-    """Give `eos` (a class with a field ``specific_volume``) the point function of that name."""
-
-    @specific_volume.on(eos)
-    def _(eos):
-        return eos.specific_volume

@@ -1,27 +1,49 @@
-"""Pressure in proportion to the change of volume."""
+"""eos linear: pressure in proportion to the change of volume."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real
+from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws.eos import (
     bulk_modulus,
     compression_energy,
-    give_specific_volume,
     pressure,
     ratio_at_pressure,
 )
 
 
 class LinearPressure(NamedTuple):
-    """p = K (1 - J)."""
+    """Pressure in proportion to the change of volume.
+
+    Parameters
+    ----------
+    rho0
+        Density before deformation.
+    K
+        Bulk modulus.
+
+    Example
+    -------
+    eos(bulk, linear, 7850, 160e9)
+
+    Notes
+    -----
+    p = K (1 - J), with J the volume over the volume before deformation; positive in compression.
+
+    See Also
+    --------
+    strength, material eos-strength
+    """
 
     specific_volume: float  # reference volume per mass
-    K: float  # bulk modulus
+    K: float
 
-
-give_specific_volume(LinearPressure)
+    @classmethod
+    def given(cls, rho0: Annotated[float, Positive], K: Annotated[float, Positive]):
+        """The law from density and bulk modulus."""
+        return cls(1 / rho0, K)
 
 
 @pressure.on(LinearPressure)

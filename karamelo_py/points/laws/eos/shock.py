@@ -1,27 +1,69 @@
-"""Mie-Grueneisen equation of state with the Hugoniot curve as its reference."""
+"""eos shock: Mie-Grueneisen equation of state."""
 
 from __future__ import annotations
 
 from math import log1p, sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.tuples import plus
+from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.eos import (
     bulk_modulus,
     compression_energy,
-    give_specific_volume,
     pressure,
     ratio_at_pressure,
 )
-from karamelo_py.points.laws.temperatures import excess
+from karamelo_py.points.laws.temperatures import Warm
+from karamelo_py.points.laws.viscosity.artificial import artificial_viscosity
 
 # S (1 - J) from where on the pressure goes on along its tangent: at 1 the Hugoniot has a pole.
 _STEEPEST = 0.9
 
 
 class Shock(NamedTuple):
-    """Shock speed U = c0 + S u in proportion to the particle speed u."""
+    """Pressure of shocked metals: the Hugoniot curve, heat, and artificial viscosity.
+
+    Parameters
+    ----------
+    rho0
+        Density before deformation.
+    K
+        Bulk modulus, as Karamelo's scripts have it. Nothing depends on it: the stiffness is that of
+        the Hugoniot curve, rho0 c0^2 at first.
+    c0
+        Speed of sound without shear, at zero pressure.
+    S
+        Slope of the shock speed U = c0 + S u over the speed u of the material behind the shock.
+    Gamma
+        Grueneisen's parameter, of the density before deformation.
+    cv
+        Heat capacity per mass.
+    Tr
+        Temperature above which heat adds to the pressure.
+    Q1, Q2
+        Coefficients of artificial viscosity, quadratic and linear; 0 and 0 for none.
+
+    Example
+    -------
+    eos(copper, shock, 8940, 110e9, 3933, 1.5, 1.99, 385, 294, 1.5, 0.06)
+
+    Notes
+    -----
+    With mu = rho/rho0 - 1, p = rho0 c0^2 mu (1 + mu) / (1 - (S - 1) mu)^2 + Gamma rho0 cv (T - Tr)
+    for T above Tr (Meyers 1994, chapter 5): the curve of the shocked states, shifted by the heat of
+    plastic work. There is heat where the material has a temperature. In tension the first part is
+    rho0 c0^2 mu. The curve has a pole at (S - 1) mu = 1; from where S (1 - rho0/rho) = 0.9 the
+    pressure goes on along the tangent.
+
+    Where the material is compressed at a rate d < 0 of its volume, the viscous pressure
+    rho h (Q1 h d^2 - Q2 c d) is added, with the cell size h and the speed of sound c (von Neumann &
+    Richtmyer 1950; Landshoff 1955). It spreads a shock over a few cells, and the time step takes
+    account of it.
+
+    See Also
+    --------
+    linear, ideal-gas, strength johnson_cook, material eos-strength
+    """
 
     specific_volume: float  # reference volume per mass
     modulus: float  # rho0 c0^2
@@ -29,8 +71,22 @@ class Shock(NamedTuple):
     thermal: float  # Gamma rho0 cv, pressure per kelvin above Tr
     Tr: float
 
-
-give_specific_volume(Shock)
+    @classmethod
+    def given(
+        cls,
+        rho0: Annotated[float, Positive],
+        K: Annotated[float, Positive],
+        c0: Annotated[float, Positive],
+        S: Annotated[float, NonNegative],
+        Gamma: Annotated[float, NonNegative],
+        cv: Annotated[float, NonNegative],
+        Tr: float,
+        Q1: Annotated[float, NonNegative],
+        Q2: Annotated[float, NonNegative],
+    ):
+        """The equation of state and its artificial viscosity."""
+        eos = cls(1 / rho0, rho0 * c0**2, S, Gamma * rho0 * cv, Tr)
+        return {"eos": eos, **artificial_viscosity(Q1, Q2)}
 
 
 @shared
@@ -54,9 +110,24 @@ def cold_pressure(eos, j):
     return eos.modulus * (inside / (flat * flat) + slope * (closed - inside))
 
 
+@point_function()
+def heated(heat, p, Tr, factor):
+    """p + factor (T - Tr) above the temperature Tr, p without a temperature."""
+
+
+@heated.otherwise
+def _(heat, p, Tr, factor):
+    return p
+
+
+@heated.on(Warm)
+def _(heat, p, Tr, factor):
+    return p + max(heat.T - Tr, real(0, Tr)) * factor
+
+
 @pressure.on(Shock)
 def _(eos, j, memory, heat):
-    return plus(cold_pressure(eos, j), excess(heat, eos.Tr, eos.thermal))
+    return heated(heat, cold_pressure(eos, j), eos.Tr, eos.thermal)
 
 
 @bulk_modulus.on(Shock)
@@ -95,7 +166,7 @@ def _(eos, j, memory):
 def _(eos, p, heat):
     one = real(1, p)
     two = real(2, p)
-    cold = (p - plus(real(0, p), excess(heat, eos.Tr, eos.thermal))) / eos.modulus
+    cold = (p - heated(heat, real(0, p), eos.Tr, eos.thermal)) / eos.modulus
     if cold < 0:
         return one / max(one + cold, real(1e-6, p))
     inside = tangent_from(eos, cold)

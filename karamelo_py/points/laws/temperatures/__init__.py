@@ -1,22 +1,24 @@
 """Temperature of one point, as far as the law itself changes it. One file each.
 
 A temperature is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Its memory `heat` is (T,), or () where the law has
-no temperature, which the other parts see.
+(`karamelo_py.points.laws.eos_strength`). Its memory is the temperature itself (`Warm`), which the
+other parts see as `heat`: () where the law has no temperature.
 """
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import by_type, point_function, real
+from karamelo_py.compiler.compile import point_function, real, shared
 
 
-class Isothermal(NamedTuple):
-    """Tag of laws without temperature."""
+class Warm(NamedTuple):
+    """Temperature of a point, and the tag of laws that have one."""
+
+    T: float
 
 
 @point_function()
 def initial_heat(temperature, like):
-    """(T,) at the start, or ()."""
+    """Warm(T) at the start, or ()."""
 
 
 @initial_heat.otherwise
@@ -44,27 +46,22 @@ def _(temperature, heat):
     return ()
 
 
-def excess(heat, Tr, factor):
-    """(factor (T - Tr),) above the temperature Tr, () without a temperature."""
-    return (max(heat[0] - Tr, real(0, Tr)) * factor,) if len(heat) else ()
+@point_function()
+def heat_from(like, numbers):
+    """The flat tuple `numbers` as `like` is: Warm(T), or ()."""
 
 
-@by_type(excess)
-def _excess(heat, Tr, factor):
-    if len(heat) == 0:
-        return lambda heat, Tr, factor: ()
-    return lambda heat, Tr, factor: (max(heat[0] - Tr, real(0, Tr)) * factor,)
+@heat_from.otherwise
+def _(like, numbers):
+    return ()
 
 
+@heat_from.on(Warm)
+def _(like, numbers):
+    return Warm(numbers[0])
+
+
+@shared
 def homologous(heat, Tr, Tm):
-    """((T - Tr) / (Tm - Tr),) between 0 and 1, () without a temperature."""
-    if len(heat) == 0:
-        return ()
-    return (min(max((heat[0] - Tr) / (Tm - Tr), real(0, Tr)), real(1, Tr)),)
-
-
-@by_type(homologous)
-def _homologous(heat, Tr, Tm):
-    if len(heat) == 0:
-        return lambda heat, Tr, Tm: ()
-    return lambda heat, Tr, Tm: (min(max((heat[0] - Tr) / (Tm - Tr), real(0, Tr)), real(1, Tr)),)
+    """(T - Tr) / (Tm - Tr), between 0 and 1."""
+    return min(max((heat.T - Tr) / (Tm - Tr), real(0, Tr)), real(1, Tr))

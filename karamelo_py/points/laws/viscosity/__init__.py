@@ -4,13 +4,9 @@ A viscosity is a NamedTuple of parameters (its class is the tag), a part of a co
 (`karamelo_py.points.laws.eos_strength`). Its memory, a flat tuple, is the viscous pressure.
 """
 
-from typing import NamedTuple
+from math import sqrt
 
-from karamelo_py.compiler.compile import point_function
-
-
-class NoViscosity(NamedTuple):
-    """Tag of laws without."""
+from karamelo_py.compiler.compile import point_function, shared
 
 
 @point_function()
@@ -28,16 +24,17 @@ def viscous_pressure(viscosity, rate, density, sound):
     """The memory at a rate of volume change: viscous pressure, positive in compression."""
 
 
-@viscous_pressure.otherwise
-def _(viscosity, rate, density, sound):
-    return ()
-
-
 @point_function()
 def viscous_speed(viscosity, memory, density, sound):
-    """(nu / h,), nu the kinematic viscosity against compression and h the cell size, or ()."""
+    """nu / h, nu the kinematic viscosity against compression and h the cell size."""
 
 
-@viscous_speed.otherwise
-def _(viscosity, memory, density, sound):
-    return ()
+@shared
+def damped(squared, a):
+    """Square of c' = sqrt(c^2 + a^2) + a, from c^2 and a = nu / h.
+
+    Viscosity nu damps the shortest wave of a cell by xi = nu / (c h), which takes c dt / h down to
+    sqrt(1 + xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10): as if c were c'.
+    """
+    speed = sqrt(squared + a * a) + a
+    return speed * speed

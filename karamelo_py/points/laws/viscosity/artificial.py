@@ -21,6 +21,11 @@ class ArtificialViscosity(NamedTuple):
     cell_size: float  # h, known when the scene is lowered
 
 
+def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
+    """The part that an equation of state with these coefficients brings; none where both are 0."""
+    return {"viscosity": ArtificialViscosity(Q1, Q2, 0.0)} if Q1 > 0 or Q2 > 0 else {}
+
+
 @initial_viscous_pressure.on(ArtificialViscosity)
 def _(viscosity, like):
     return (real(0, like),)
@@ -36,4 +41,4 @@ def _(viscosity, rate, density, sound):
 @viscous_speed.on(ArtificialViscosity)
 def _(viscosity, memory, density, sound):
     # nu / h = Q1 h |d| + Q2 c, and q / rho >= Q1 (h d)^2
-    return (sqrt(viscosity.Q1 * memory[0] / density) + viscosity.Q2 * sound,)
+    return sqrt(viscosity.Q1 * memory[0] / density) + viscosity.Q2 * sound

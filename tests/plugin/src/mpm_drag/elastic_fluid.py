@@ -1,4 +1,4 @@
-"""material elastic-fluid: a law of its own, as functions of one point."""
+"""material elastic-fluid: a law of its own, as functions of one point. Its state is (det F,)."""
 
 from typing import Annotated, NamedTuple
 
@@ -14,70 +14,11 @@ from karamelo_py.points.laws import (
     initial_state,
     jacobian,
     kirchhoff_stress,
-    specific_volume,
     wave_speed_squared,
 )
-from karamelo_py.scene.material import Material
 
 
-class ElasticFluidLaw(NamedTuple):
-    """Parameters of the law; the state of a point is (det F,)."""
-
-    specific_volume: float  # reference volume per mass
-    K: float  # bulk modulus
-
-
-@initial_state.on(ElasticFluidLaw)
-def _(law, kin, like):
-    return (real(1, like),)
-
-
-@advance.on(ElasticFluidLaw)
-def _(law, kin, state, dl, dt):
-    return (state[0] * volume_ratio(kin, dl),)
-
-
-@cauchy_stress.on(ElasticFluidLaw)
-def _(law, kin, state):
-    # Without shear: sigma = K (J - 1) I.
-    zero = zero_symmetric(kin, law.K)
-    return add_pressure(kin, real(1, law.K), zero, law.K * (state[0] - real(1, law.K)))
-
-
-@kirchhoff_stress.on(ElasticFluidLaw)
-def _(law, kin, state):
-    return scale(state[0], cauchy_stress(law, kin, state))
-
-
-@jacobian.on(ElasticFluidLaw)
-def _(law, kin, state):
-    return state[0]
-
-
-@wave_speed_squared.on(ElasticFluidLaw)
-def _(law, kin, state):
-    # dp/d(density), with density = rho0 / J
-    return law.K * law.specific_volume * state[0] * state[0]
-
-
-@energy_density.on(ElasticFluidLaw)
-def _(law, kin, state):
-    excess = state[0] - real(1, law.K)
-    return real(0.5, law.K) * law.K * excess * excess
-
-
-@elastic_strain.on(ElasticFluidLaw)
-def _(law, kin, state):
-    third = (state[0] - real(1, law.K)) / real(3, law.K)
-    return add_pressure(kin, real(1, law.K), zero_symmetric(kin, law.K), third)
-
-
-@specific_volume.on(ElasticFluidLaw)
-def _(law):
-    return law.specific_volume
-
-
-class ElasticFluid(Material):
+class ElasticFluid(NamedTuple):
     """A fluid without viscosity whose pressure follows its volume: p = K (1 - J).
 
     Parameters
@@ -92,5 +33,55 @@ class ElasticFluid(Material):
     material(water, elastic-fluid, 1000, 2e9)
     """
 
-    def __init__(self, hub, rho: Annotated[float, Positive], K: Annotated[float, Positive]):
-        self.law = ElasticFluidLaw(1 / rho, K)
+    specific_volume: float  # reference volume per mass
+    K: float
+
+    @classmethod
+    def given(cls, rho: Annotated[float, Positive], K: Annotated[float, Positive]):
+        """The law from density and bulk modulus."""
+        return cls(1 / rho, K)
+
+
+@initial_state.on(ElasticFluid)
+def _(law, kin, like):
+    return (real(1, like),)
+
+
+@advance.on(ElasticFluid)
+def _(law, kin, state, dl, dt):
+    return (state[0] * volume_ratio(kin, dl),)
+
+
+@cauchy_stress.on(ElasticFluid)
+def _(law, kin, state):
+    # Without shear: sigma = K (J - 1) I.
+    zero = zero_symmetric(kin, law.K)
+    return add_pressure(kin, real(1, law.K), zero, law.K * (state[0] - real(1, law.K)))
+
+
+@kirchhoff_stress.on(ElasticFluid)
+def _(law, kin, state):
+    return scale(state[0], cauchy_stress(law, kin, state))
+
+
+@jacobian.on(ElasticFluid)
+def _(law, kin, state):
+    return state[0]
+
+
+@wave_speed_squared.on(ElasticFluid)
+def _(law, kin, state):
+    # dp/d(density), with density = rho0 / J
+    return law.K * law.specific_volume * state[0] * state[0]
+
+
+@energy_density.on(ElasticFluid)
+def _(law, kin, state):
+    excess = state[0] - real(1, law.K)
+    return real(0.5, law.K) * law.K * excess * excess
+
+
+@elastic_strain.on(ElasticFluid)
+def _(law, kin, state):
+    third = (state[0] - real(1, law.K)) / real(3, law.K)
+    return add_pressure(kin, real(1, law.K), zero_symmetric(kin, law.K), third)

@@ -1,0 +1,285 @@
+"""Compiled kernels on disk: found again by what they are made of, and never a reason to stop.
+
+One file holds one kernel for one list of argument types. Its name says which, and ends in the
+fingerprint of all that the code depends on (:mod:`~karamelo_py.compiler.fingerprint`); a checksum
+tells whether it is whole. Whatever is wrong with a file or the folder, the kernel is compiled as if
+it were not there, and the user told once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import pickle
+import platform
+import re
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+import platformdirs
+from numba.core import config, sigutils
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from karamelo_py.compiler import melting
+from karamelo_py.compiler.fingerprint import (
+    Choice,
+    Unknown,
+    contents,
+    describe,
+    fingerprint,
+    keep_choices,
+    name_of,
+)
+
+VARIANTS = 4  # of a kernel for the same types: as many states of the sources are kept
+ROOM = 400e6  # bytes; of what takes more, the files that were used least recently are forgotten
+
+_ENDING = ".kernel"
+_OURS = re.compile(r"[\w.]+-[0-9a-f]{24}-[0-9a-f]{24}\.kernel")
+_TIMES = "times.json"
+
+
+def folder() -> Path:
+    """Where kernels are kept."""
+    home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
+    return Path(home) / "kernels"
+
+
+# --- telling of what is wrong -------------------------------------------------------------------
+
+_tell: Callable[[str], None] | None = None
+_told = False
+
+
+def _trouble(error: OSError) -> None:
+    _say(f"compiled loops cannot be kept in {folder()}: {error.strerror or error}")
+
+
+def _say(text: str) -> None:
+    """Tell of a fault of the folder, the first time."""
+    global _told
+    if _told:
+        return
+    _told = True
+    if _tell is not None:
+        _tell(text)
+    else:
+        warnings.warn(text, RuntimeWarning, stacklevel=2)
+
+
+@contextlib.contextmanager
+def telling(tell: Callable[[str], None]) -> Iterator[None]:
+    """Within this, `tell` is given what is wrong with the folder, once."""
+    global _tell, _told
+    before = _tell, _told
+    _tell, _told = tell, False
+    try:
+        yield
+    finally:
+        _tell, _told = before
+
+
+# --- kernels ------------------------------------------------------------------------------------
+
+
+class KernelCache(_Cache):
+    """The files of one function, for Numba's dispatchers and callbacks.
+
+    Parameters
+    ----------
+    function
+        What is compiled.
+    options
+        How: two ways are two kernels.
+    """
+
+    def __init__(self, function: Callable, options: dict):
+        self._function = function
+        self._options = repr(sorted(options.items()))
+
+    @property
+    def cache_path(self) -> str:
+        """The folder."""
+        return str(folder())
+
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        """The kernel for these argument types, or None where it has to be compiled."""
+        target_context.refresh()
+        try:
+            arguments, key = self._key(sig, target_context.codegen())
+        except Unknown:
+            return None
+        for path in self._files(key):
+            choices, data = _read(path)
+            if choices is None or self._stamp(arguments, choices) != path.stem.rpartition("-")[2]:
+                continue
+            try:
+                compiled = CompileResult._rebuild(target_context, *pickle.loads(data))
+            except Exception:
+                _discard(path)
+                continue
+            keep_choices(compiled.library, choices)
+            with contextlib.suppress(OSError):
+                os.utime(path)
+            return compiled
+        return None
+
+    def save_overload(self, sig: Any, data: CompileResult) -> None:
+        """Keep a kernel that was compiled just now, if that can be done."""
+        if data.library.has_dynamic_globals or data.lifted:
+            return
+        try:
+            arguments, key = self._key(sig, data.codegen)
+            choices, codes = contents(data.library)
+            stamp = fingerprint([self._function, self._options], arguments, choices, codes)
+        except Unknown as what:
+            # Never without a word: somebody would wait for it in every run.
+            _say(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
+            return
+        content = dumps((tuple(sorted(choices)), dumps(data._reduce())))
+        try:
+            path = folder() / f"{key}-{stamp[:24]}{_ENDING}"
+            _write(path, hashlib.sha256(content).digest() + content)
+            self._forget(key)
+        except OSError as error:
+            _trouble(error)
+
+    def enable(self) -> None:
+        """It always is."""
+
+    def disable(self) -> None:
+        """It never is."""
+
+    def flush(self) -> None:
+        """Forget all files of the function."""
+        for path in self._files(self._name() + "-"):
+            path.unlink(missing_ok=True)
+
+    def _name(self) -> str:
+        return re.sub(r"[^\w.]", "", f"{self._function.__module__}.{self._function.__qualname__}")
+
+    def _key(self, sig: Any, codegen: Any) -> tuple[tuple, str]:
+        """Argument types, and the name of the function with a hash of these and of the machine."""
+        arguments, result = sigutils.normalize_signature(sig)
+        words = [name_of(self._function), *(describe(a) for a in arguments)]
+        words += [describe(result) if result is not None else "", repr(codegen.magic_tuple())]
+        words += [_SETTING]
+        digest = hashlib.sha256("|".join(words).encode()).hexdigest()
+        return tuple(arguments), f"{self._name()}-{digest[:24]}"
+
+    def _stamp(self, arguments: tuple, choices: frozenset[Choice]) -> str | None:
+        try:
+            return fingerprint([self._function, self._options], arguments, choices)[:24]
+        except Unknown:
+            return None
+
+    def _files(self, key: str) -> list[Path]:
+        try:
+            names = [name for name in os.listdir(folder()) if name.startswith(key)]
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            _trouble(error)
+            return []
+        return [folder() / name for name in names if _OURS.fullmatch(name)]
+
+    def _forget(self, key: str) -> None:
+        """Make room: of this kernel's states all but the last, of all files the oldest."""
+        ages = []
+        for path in folder().iterdir():
+            if _OURS.fullmatch(path.name):
+                with contextlib.suppress(FileNotFoundError):
+                    about = path.stat()
+                    ages.append((about.st_mtime, about.st_size, path))
+        ages.sort(reverse=True, key=lambda item: item[0])
+        variants = [path for _, _, path in ages if path.name.startswith(key)]
+        old = set(variants[VARIANTS:])
+        room = ROOM
+        for _, size, path in ages:
+            room -= size
+            if room < 0:
+                old.add(path)
+        for path in old:
+            path.unlink(missing_ok=True)
+
+
+def _setting() -> str:
+    """What all kernels depend on."""
+    versions = (platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__)
+    how = (config.OPT, config.BOUNDSCHECK, config.LOOP_VECTORIZE, config.SLP_VECTORIZE)
+    return repr((versions, [str(h) for h in how], Path(melting.__file__).read_bytes()))
+
+
+_SETTING = _setting()
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix="new-")
+    try:
+        with open(handle, "wb") as file:
+            file.write(content)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _read(path: Path) -> tuple[frozenset[Choice] | None, bytes]:
+    """The choices and the code in a file; None where it is not whole."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return None, b""
+    except OSError as error:
+        _trouble(error)
+        return None, b""
+    if hashlib.sha256(data[32:]).digest() != data[:32]:
+        _discard(path)
+        return None, b""
+    choices, code = pickle.loads(data[32:])
+    return frozenset(choices), code
+
+
+def _discard(path: Path) -> None:
+    """Tell of a file that cannot be used, and take it away."""
+    _say(f"a file in {folder()} is damaged; the loop in it is compiled anew")
+    with contextlib.suppress(OSError):
+        path.unlink()
+
+
+# --- how long it took ---------------------------------------------------------------------------
+
+
+def _times() -> dict[str, float]:
+    try:
+        times = json.loads((folder() / _TIMES).read_text(encoding="utf-8"))
+        return {str(key): float(value) for key, value in times.items()}
+    except (OSError, ValueError, TypeError, AttributeError):
+        return {}
+
+
+def time_for(scene: str) -> float | None:
+    """Seconds that compilation took the last time for a scene, or for the last one compiled."""
+    times = _times()
+    return times.get(scene, next(reversed(times.values()), None))
+
+
+def keep_time(scene: str, seconds: float) -> None:
+    """Keep for the next time how long compilation took."""
+    times = _times()
+    times.pop(scene, None)
+    times[scene] = round(seconds, 1)
+    with contextlib.suppress(OSError):  # told of by the kernels
+        _write(folder() / _TIMES, json.dumps(dict(list(times.items())[-200:])).encode())

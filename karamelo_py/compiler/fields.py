@@ -1,0 +1,192 @@
+"""Declared fields: what points and nodes carry, each declared once, by the part that owns it.
+
+A field is a NamedTuple class with one member, its array. The class is what kernels ask for it by,
+and its attributes are all that lowering, sorting, restarts, dumps and `karamelo-py check` need::
+
+    class Dose(NamedTuple):
+        \"\"\"Radiation that a point has taken up, in gray.\"\"\"
+
+        array: Any
+
+        shape = scalar
+        columns = ("dose",)
+
+shape
+    function of the kinematics: the number of components (`scalar`, `vector`, `tensor`, `planar`);
+kept
+    whether it outlives a step (the default): then it is carried from run to run;
+start
+    what it starts from: a number (0 by default), or a function of the kinematics that returns one
+    number for each component;
+columns
+    names under which dumps, the log, plots and pictures show its components.
+
+A part names its fields in ``point_fields`` or ``node_fields``. Arrays of points have the shape
+(components, points), those of nodes (nodes, components).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numba.core.imputils import impl_ret_borrowed
+from numba.extending import lower_builtin, type_callable
+
+from karamelo_py.compiler.compile import by_type, define
+
+
+def scalar(kin: Any) -> int:
+    """One number."""
+    return 1
+
+
+def vector(kin: Any) -> int:
+    """The components of a vector."""
+    return kin.dimension
+
+
+def tensor(kin: Any) -> int:
+    """The components of a tensor, the one around the axis among them."""
+    return kin.tensor_size
+
+
+def planar(kin: Any) -> int:
+    """The components of a plain matrix of two vectors."""
+    return kin.dimension**2
+
+
+def name_of(kind: type) -> str:
+    """The name of a field: that of its class, in small letters."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
+
+
+def is_kept(kind: type) -> bool:
+    """Whether a field outlives a step."""
+    return getattr(kind, "kept", True)
+
+
+def columns_of(kind: type) -> tuple[str, ...]:
+    """Names under which the components of a field are shown, perhaps none."""
+    return getattr(kind, "columns", ())
+
+
+def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
+    """The fields that the `owners` declare in ``point_fields`` or ``node_fields``, each once."""
+    return tuple(dict.fromkeys(kind for owner in owners for kind in getattr(owner, attribute, ())))
+
+
+def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
+    """The field of `count` points, (components, count), as it starts."""
+    array = np.zeros((kind.shape(kin), count), real)
+    start = getattr(kind, "start", 0.0)
+    array[:] = np.array(start(kin) if callable(start) else [start], real)[:, None]
+    return kind(array)
+
+
+def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
+    """The field of `count` nodes, (count, components), zero: untouched pages cost no memory."""
+    return kind(np.zeros((count, kind.shape(kin)), real))
+
+
+def field(fields: tuple, kind: type) -> Any:
+    """The array of the field of this class, or None where the scene does not have it."""
+    return next((one.array for one in fields if type(one) is kind), None)
+
+
+def _place_of(kind: Any, fields: Any) -> int | None:
+    """Where in a tuple of fields that of a class stands."""
+    for k, one in enumerate(fields):
+        if one.instance_class is kind.instance_class:
+            return k
+    return None
+
+
+# Not by_type: functions that return arrays are not for kernels without reference counting.
+@type_callable(field)
+def _type_field(context):
+    def typed(fields, kind):
+        k = _place_of(kind, fields)
+        return types.none if k is None else tuple(fields)[k][0]
+
+    return typed
+
+
+@lower_builtin(field, types.BaseTuple, types.Any)
+def _lower_field(context, builder, signature, arguments):
+    fields, kind = signature.args
+    k = _place_of(kind, fields)
+    if k is None:
+        return context.get_dummy_value()
+    array = builder.extract_value(builder.extract_value(arguments[0], k), 0)
+    return impl_ret_borrowed(context, builder, signature.return_type, array)
+
+
+# --- rows of arrays that may be absent --------------------------------------------------------
+
+
+def load(array, p, like):
+    """Components 0, 1, ... of point `p`, as many as `like` has; none where there is no array."""
+    return () if array is None else tuple(array[k, p] for k in range(len(like)))
+
+
+@by_type(load)
+def _load(array, p, like):
+    if isinstance(array, types.NoneType):
+        return lambda array, p, like: ()
+    items = "".join(f"array[{k}, p], " for k in range(len(like)))
+    return define("array, p, like", f"return ({items})")
+
+
+def store(array, p, values):
+    """Components 0, 1, ... of point `p` become `values`; nothing where there is no array."""
+    store_from(array, p, 0, values)
+
+
+@by_type(store)
+def _store(array, p, values):
+    return lambda array, p, values: store_from(array, p, 0, values)
+
+
+def store_from(array, p, first, values):
+    """Components from `first` on of point `p` become those of `values`; earlier ones stay."""
+    if array is not None:
+        for k in range(first, len(values)):
+            array[k, p] = values[k]
+
+
+@by_type(store_from)
+def _store_from(array, p, first, values):
+    if isinstance(array, types.NoneType):
+        return lambda array, p, first, values: None
+    lines = [f"if first <= {k}: array[{k}, p] = values[{k}]" for k in range(len(values))]
+    return define("array, p, first, values", *lines)
+
+
+def increase(array, p, values):
+    """Add `values` to components 0, 1, ... of point `p`; nothing where there is no array."""
+    if array is not None:
+        for k, value in enumerate(values):
+            array[k, p] += value
+
+
+@by_type(increase)
+def _increase(array, p, values):
+    if isinstance(array, types.NoneType):
+        return lambda array, p, values: None
+    lines = [f"array[{k}, p] += values[{k}]" for k in range(len(values))]
+    return define("array, p, values", *lines)
+
+
+def load_vector(kin, array, p):
+    """The first components of point `p`, as many as a vector has."""
+    return tuple(array[k, p] for k in range(kin.dimension))
+
+
+@by_type(load_vector)
+def _load_vector(kin, array, p):
+    items = "".join(f"array[{k}, p], " for k in range(kin.instance_class.dimension))
+    return define("kin, array, p", f"return ({items})")

@@ -1,0 +1,474 @@
+"""Grid to points: what a visit of the points gathers from the nodes, and what follows from it.
+
+A task names, for `karamelo-py check` and `bench`, the fields of points and of nodes that it goes
+through.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, NamedTuple
+
+from numba import types
+
+from karamelo_py.compiler.compile import by_type, fma, point_function, real, shared
+from karamelo_py.compiler.fields import (
+    field,
+    increase,
+    load_vector,
+    scalar,
+    store,
+    store_from,
+)
+from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
+from karamelo_py.kernels.visit import (
+    deformation_of,
+    for_tags,
+    in_turn,
+    law_of,
+    place_at,
+    state_of,
+)
+from karamelo_py.points.basis import carried, carrier, carriers, carry, deformed, entry, extent
+from karamelo_py.points.boundary import Bounces, reflected
+from karamelo_py.points.frames import (
+    DeformationGradient,
+    follows,
+    scaled_increment,
+    spatial_increment,
+    thinning,
+)
+from karamelo_py.points.grid import inside
+from karamelo_py.points.kinematics import (
+    add_outer,
+    deform,
+    dimension,
+    largest_component,
+    vector_at,
+    volume_ratio,
+    zero_tensor,
+)
+from karamelo_py.points.laws import advance, constrained_velocity, jacobian, wave_speed_squared
+from karamelo_py.points.transfers import (
+    Moment,
+    add_moment,
+    displacing_velocity,
+    gradient_weight,
+    kept_gradient,
+    straining,
+    updated_velocity,
+    zero_moment,
+)
+from karamelo_py.points.transfers.xpic import Series, TermOfSeries
+
+
+class Move(NamedTuple):
+    """Gather v* and its change; settle velocity and new position."""
+
+    strains = False
+    says = "g2p, move"
+    reads = ("x", "v")
+    writes = ("x moved", "v", "moment", "bounces")
+
+
+class Strain(NamedTuple):
+    """Gather the gradient of the nodal velocity; settle the state of the law."""
+
+    strains = True
+    says = "stress"
+    reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
+    writes = ("state", "deformation gradient")
+
+
+class SecondStrain(NamedTuple):
+    """The same for the second of two strain increments of a step."""
+
+    strains = True
+    says = "second half of the stress"
+    reads = Strain.reads
+    writes = Strain.writes
+
+
+class StrainInMove(NamedTuple):
+    """`Strain` in one visit with `Move`, behind it: what v* gave already is not gathered again."""
+
+    strains = True
+    says = "stress"
+    reads = Strain.reads
+    writes = Strain.writes
+
+
+class TrialStrain(NamedTuple):
+    """Gather the gradient; settle only by what factor it would change the volume (F-bar)."""
+
+    strains = False
+    says = "trial volume"
+    reads = Strain.reads
+    writes = ("volume ratio",)
+
+
+class SeriesTerm(NamedTuple):
+    """Gather the present term of the series of XPIC."""
+
+    strains = False
+    says = "term of the series to the points"
+    reads = ("x",)
+    writes = ("term of series",)
+
+
+# --- F-bar: changes of volume averaged over the surroundings ----------------------------------
+
+
+class VolumeRatio(NamedTuple):
+    """Ratio of volumes of the trial increment of a point."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+    start = 1.0
+
+
+class NodalMean(NamedTuple):
+    """Sum of weight times value, and of weights, at a node; then the mean in place of the first.
+
+    Of ratios of volumes, weighted with volumes (F-bar); of temperatures, weighted with conductance.
+    """
+
+    array: Any
+
+    kept = False
+
+    @staticmethod
+    def shape(kin):
+        """Two numbers."""
+        return 2
+
+
+class PointByPoint(NamedTuple):
+    """Every point has its own change of volume."""
+
+
+class FBar(NamedTuple):
+    """Changes of volume are averaged over the surroundings, against volumetric locking."""
+
+    point_fields = (VolumeRatio,)
+    node_fields = (NodalMean,)
+
+
+@point_function()
+def no_ratio(averaging, like):
+    """What the gather of the averaged ratio of volumes starts from; empty where there is none."""
+
+
+@no_ratio.on(PointByPoint)
+def _(averaging, like):
+    return ()
+
+
+@no_ratio.on(FBar)
+def _(averaging, like):
+    return (real(0, like),)
+
+
+@point_function()
+def gathered_ratio(averaging, w, stencil, k, total):
+    """`total` with the ratio of volumes at the k-th node."""
+
+
+@gathered_ratio.on(PointByPoint)
+def _(averaging, w, stencil, k, total):
+    return total
+
+
+@gathered_ratio.on(FBar)
+def _(averaging, w, stencil, k, total):
+    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    return (fma(weight, field(w.nodes.fields, NodalMean)[i, 0], total[0]),)
+
+
+@point_function()
+def averaged(averaging, w, p, dl, ratio):
+    """`dl` with the change of volume that the surroundings have on average."""
+
+
+@averaged.on(PointByPoint)
+def _(averaging, w, p, dl, ratio):
+    return dl
+
+
+@averaged.on(FBar)
+def _(averaging, w, p, dl, ratio):
+    # The ratio of volumes of the increment is replaced by its average over the points nearby,
+    # weighted with their volumes (after Coombs et al. 2018, "Overcoming volumetric locking in
+    # material point methods", eq. 23; there over the points of a cell). In the total frame, `dl`
+    # is dt Fdot, and F + dl is scaled.
+    law = law_of(w, p)
+    state = state_of(w, law, p, ratio[0])
+    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    own = field(w.points.fields, VolumeRatio)[0, p]
+    return scaled_increment(w.frame, w.kin, dl, f, ratio[0] / own)
+
+
+# --- gather -----------------------------------------------------------------------------------
+
+
+@point_function()
+def empty(task, w, x):
+    """What a gather sums up, before the first node."""
+
+
+@empty.on(Move)
+def _(task, w, x):
+    zero = subtract(x, x)
+    return zero, zero, zero_moment(w.transfer, w.kin, x[0])
+
+
+@empty.on(Strain)
+@empty.on(SecondStrain)
+def _(task, w, x):
+    return zero_tensor(w.kin, x[0]), no_ratio(w.averaging, x[0])
+
+
+@empty.on(StrainInMove)
+def _(task, w, x):
+    gradient = zero_tensor(w.kin, x[0])
+    return kept_out(w.averaging, w, gradient), no_ratio(w.averaging, x[0])
+
+
+@empty.on(TrialStrain)
+def _(task, w, x):
+    return zero_tensor(w.kin, x[0])
+
+
+@empty.on(SeriesTerm)
+def _(task, w, x):
+    return subtract(x, x)
+
+
+@point_function()
+def kept_out(averaging, w, gradient):
+    """The gradient to gather, or nothing where the transfer has it from v* already."""
+
+
+@kept_out.on(PointByPoint)
+def _(averaging, w, gradient):
+    return straining(w.transfer, w.kin, gradient)
+
+
+@kept_out.on(FBar)
+def _(averaging, w, gradient):
+    return gradient
+
+
+@point_function()
+def gathered(task, w, stencil, k, total):
+    """`total` with the part of the k-th node of the stencil."""
+
+
+@gathered.on(Move)
+def _(task, w, stencil, k, total):
+    i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
+    g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
+    v = row(w.nodes.update, i, 0, total[0])
+    dv = row(w.nodes.update, i, len(v), v)
+    return (
+        add_scaled(total[0], weight, v),
+        add_scaled(total[1], weight, dv),
+        add_moment(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, g, v, total[2]),
+    )
+
+
+@shared
+def _gradient(w, stencil, k, total):
+    i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
+    g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
+    return add_outer(w.kin, total, vector_at(w.kin, w.nodes.velocity, i), g)
+
+
+def add_gradient(w, stencil, k, total):
+    """`_gradient`, where it is gathered at all."""
+    return _gradient(w, stencil, k, total) if len(total) else total
+
+
+@by_type(add_gradient)
+def _add_gradient(w, stencil, k, total):
+    if len(total) == 0:
+        return lambda w, stencil, k, total: total
+    return lambda w, stencil, k, total: _gradient(w, stencil, k, total)
+
+
+@gathered.on(Strain)
+@gathered.on(SecondStrain)
+@gathered.on(StrainInMove)
+def _(task, w, stencil, k, total):
+    return (
+        add_gradient(w, stencil, k, total[0]),
+        gathered_ratio(w.averaging, w, stencil, k, total[1]),
+    )
+
+
+@gathered.on(TrialStrain)
+def _(task, w, stencil, k, total):
+    return _gradient(w, stencil, k, total)
+
+
+@gathered.on(SeriesTerm)
+def _(task, w, stencil, k, total):
+    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    return add_scaled(total, weight, row(field(w.nodes.fields, Series), i, 0, total))
+
+
+# --- settle -----------------------------------------------------------------------------------
+
+
+@point_function()
+def settled(task, w, stencil, p, dt, total, totals, fastest):
+    """Store what follows from `total`; return how far the point moved in cells, and its rate.
+
+    The rate, c + max |v_i|, bounds the stable step; what is returned is the larger of it and
+    `fastest`, the largest so far. A point that went wrong (det F <= 0, NaN, outside the domain)
+    returns a distance or a rate of NaN or infinity. `totals` are those of all tasks of the visit.
+    """
+
+
+@settled.on(Strain)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    return _strain(w, w.places.x, p, dt, total[0], total[1], fastest)
+
+
+@settled.on(SecondStrain)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    return _strain(w, w.places.y, p, dt, total[0], total[1], fastest)
+
+
+@settled.on(StrainInMove)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    gradient = known_gradient(w.averaging, w, totals[0][2], total[0])
+    return _strain(w, w.places.x, p, dt, gradient, total[1], fastest)
+
+
+@point_function()
+def known_gradient(averaging, w, moment, gradient):
+    """The velocity gradient, gathered or kept by the transfer."""
+
+
+@known_gradient.on(PointByPoint)
+def _(averaging, w, moment, gradient):
+    return kept_gradient(w.transfer, w.kin, moment, gradient)
+
+
+@known_gradient.on(FBar)
+def _(averaging, w, moment, gradient):
+    return gradient
+
+
+@settled.on(TrialStrain)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    law = law_of(w, p)
+    state = state_of(w, law, p, dt)
+    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    dl = spatial_increment(w.frame, w.kin, scale(dt, total), f)
+    field(w.points.fields, VolumeRatio)[0, p] = volume_ratio(w.kin, dl)
+    return real(0, dt), fastest
+
+
+@settled.on(SeriesTerm)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    store(field(w.points.fields, TermOfSeries), p, total)
+    return real(0, dt), fastest
+
+
+@shared
+def further_reach(basis, kin, grid, before, after):
+    """By how many cells the domain of a point reaches further than before."""
+    further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
+    return max(further, real(0, further))
+
+
+@settled.on(Move)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    return _move(w, stencil, p, dt, total), fastest
+
+
+@shared
+def _move(w, stencil, p, dt, total):
+    """New velocity, position and carried corners; how far that is in cells."""
+    law = law_of(w, p)
+    old = load_vector(w.kin, w.points.v, p)
+    v = constrained_velocity(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
+    x = load_vector(w.kin, w.places.x, p)
+    step = scale(dt, constrained_velocity(law, v, displacing_velocity(w.transfer, v, total[0])))
+    y = add_scaled(x, real(1, dt), step)
+    y, v, moment, hits = reflected(w.grid, w.kin, y, v, total[2])
+    increase(field(w.points.fields, Bounces), p, hits)
+    store(w.points.v, p, v)
+    store(field(w.points.fields, Moment), p, moment)
+    store(w.places.y, p, y)
+    moved = largest_component(w.kin, step) * w.grid.inv_h
+    if not follows(w.frame):
+        return moved
+    if carried(w.basis, w.kin) > 0:
+        before = place_at(w.basis, w.kin, w.places.x, p)
+        new = add_row(before, 0, step)
+        for corner in range(carried(w.basis, w.kin)):
+            u = subtract(x, x)
+            for j in range(carriers(w.basis, w.kin)):
+                i, weight = carrier(w.basis, w.kin, w.grid, stencil, corner, j)
+                u = add_scaled(u, weight, vector_at(w.kin, w.nodes.update, i))
+            new = carry(w.basis, w.kin, new, before, corner, scale(dt, u))
+        store(w.places.y, p, new)
+        moved += further_reach(w.basis, w.kin, w.grid, before, new)
+    if not inside(w.grid, w.kin, y):
+        return real(inf, dt)
+    return moved
+
+
+@shared
+def _strain(w, x, p, dt, gradient, ratio, fastest):
+    """State of the law and shape of the domain after a step; growth in cells, and rate.
+
+    `x` are the places whose shapes grow.
+    """
+    dl = averaged(w.averaging, w, p, scale(dt, gradient), ratio)
+    law = law_of(w, p)
+    old = state_of(w, law, p, dt)
+    f = deformation_of(w.frame, w.kin, law, old, w.points, p)
+    increment = spatial_increment(w.frame, w.kin, dl, f)
+    state = advance(law, w.kin, old, increment, dt)
+    store(w.points.state, p, state)
+    store_deformation(field(w.points.fields, DeformationGradient), w.kin, p, increment, f)
+    grown = real(0, dt)
+    if follows(w.frame) and carried(w.basis, w.kin) == 0:
+        before = place_at(w.basis, w.kin, x, p)
+        after = deformed(w.basis, w.kin, before, increment)
+        store_from(w.places.y, p, dimension(w.kin), after)
+        grown = further_reach(w.basis, w.kin, w.grid, before, after)
+    if not jacobian(law, w.kin, state) > 0:
+        return real(inf, dt), fastest
+    # The square root is only taken of the few points that are faster than all before them.
+    now = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    squared = wave_speed_squared(law, w.kin, state) * thinning(w.frame, w.kin, now, dt)
+    speed = largest_component(w.kin, load_vector(w.kin, w.points.v, p))
+    slack = fastest - speed
+    if slack < 0 or not squared <= slack * slack:  # so written, NaN is noticed too
+        return grown, sqrt(squared) + speed
+    return grown, fastest
+
+
+def store_deformation(array, kin, p, increment, f):
+    """Store F after the increment, where there is an array for it."""
+    if array is not None:
+        store(array, p, deform(kin, increment, f))
+
+
+@by_type(store_deformation)
+def _store_deformation(array, kin, p, increment, f):
+    if isinstance(array, types.NoneType):
+        return lambda array, kin, p, increment, f: None
+    return lambda array, kin, p, increment, f: store(array, p, deform(kin, increment, f))
+
+
+empty_all = for_tags(empty, "w, x")
+gathered_all = for_tags(gathered, "w, stencil, k, totals", each="totals")
+settled_all = in_turn(settled)

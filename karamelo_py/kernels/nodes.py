@@ -1,0 +1,186 @@
+"""What is done at the nodes between two visits of the points."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.tuples import clear_optional
+from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
+from karamelo_py.kernels.g2p import NodalMean
+from karamelo_py.kernels.p2g import Normal
+from karamelo_py.points.kinematics import dimension
+from karamelo_py.points.transfers.xpic import Series
+
+
+class ClearSums(NamedTuple):
+    """Mass, momentum, force and normal of the nodes start from zero."""
+
+    goes_through = ("sums",)
+
+
+class ClearVelocity(NamedTuple):
+    """The velocity array starts from zero, to take momentum."""
+
+    goes_through = ("velocity",)
+
+
+class ClearMean(NamedTuple):
+    """The sums of a weighted mean start from zero."""
+
+    goes_through = ("nodal mean",)
+
+
+class TakeMean(NamedTuple):
+    """The weighted mean from its two sums, at the nodes."""
+
+    goes_through = ("nodal mean", "nodal mean")
+
+
+class StartSeries(NamedTuple):
+    """First term of the series of XPIC: the velocity v, and its part in the new velocity."""
+
+    factor: float
+
+    goes_through = ("sums", "series", "update", "update")
+
+
+class ExtendSeries(NamedTuple):
+    """Next term of the series of XPIC, and its part in the new velocity."""
+
+    factor: float
+
+    goes_through = ("sums", "series", "series", "update", "update")
+
+
+class Update(NamedTuple):
+    """v* = v + dt f / m from the sums."""
+
+    says = "update v*"
+    goes_through = ("sums", "update")
+
+
+class MomentumToVelocity(NamedTuple):
+    """The momentum in the velocity array over the mass: the re-mapped velocity of MUSL."""
+
+    says = "re-mapped velocity"
+    goes_through = ("sums", "velocity", "velocity")
+
+
+class SumsToVelocity(NamedTuple):
+    """Velocity from the momentum in the sums, before the update (USF)."""
+
+    says = "nodal velocity"
+    goes_through = ("sums", "velocity")
+
+
+class UpdateToVelocity(NamedTuple):
+    """The velocity whose gradient deforms the points is v*, limited at light nodes (USL).
+
+    A point of mass m that gives a node the share N of it gets back the strain of f dt / (N m) from
+    there: an oscillation that grows when (c dt / h)^2 > N, in d directions at once. Nodes lighter
+    than `light` = d (c dt / h)^2 m count as such; the limit vanishes with the step.
+    """
+
+    light: float
+
+    goes_through = ("sums", "update", "velocity")
+
+
+@point_function()
+def at_node(task, kin, nodes, n, dt):
+    """Do `task` at node `n`. Nodes without mass stay at rest."""
+
+
+@shared
+def per_mass(nodes, n, like):
+    """One over the mass of a node, 0 where it has none."""
+    mass = nodes.sums[n, MASS]
+    return real(1, like) / mass if mass > 0 else real(0, like)
+
+
+@at_node.on(ClearSums)
+def _(task, kin, nodes, n, dt):
+    for k in range(1 + 2 * dimension(kin)):
+        nodes.sums[n, k] = 0
+    clear_optional(field(nodes.fields, Normal), n)
+
+
+@at_node.on(ClearVelocity)
+def _(task, kin, nodes, n, dt):
+    for k in range(dimension(kin)):
+        nodes.velocity[n, k] = 0
+
+
+@at_node.on(Update)
+def _(task, kin, nodes, n, dt):
+    factor = per_mass(nodes, n, dt)
+    for k in range(dimension(kin)):
+        dv = dt * nodes.sums[n, of_force(kin) + k] * factor
+        nodes.update[n, k] = nodes.sums[n, of_momentum(kin) + k] * factor + dv
+        nodes.update[n, of_change(kin) + k] = dv
+
+
+@at_node.on(MomentumToVelocity)
+def _(task, kin, nodes, n, dt):
+    factor = per_mass(nodes, n, dt)
+    for k in range(dimension(kin)):
+        nodes.velocity[n, k] *= factor
+
+
+@at_node.on(SumsToVelocity)
+def _(task, kin, nodes, n, dt):
+    factor = per_mass(nodes, n, dt)
+    for k in range(dimension(kin)):
+        nodes.velocity[n, k] = nodes.sums[n, of_momentum(kin) + k] * factor
+
+
+@at_node.on(UpdateToVelocity)
+def _(task, kin, nodes, n, dt):
+    # See UpdateToVelocity.light: the change of a light node's velocity enters the gradient by the
+    # share of its mass. Points take the whole change: momentum is kept.
+    one = real(1, dt)
+    mass = nodes.sums[n, MASS]
+    share = mass / task.light if mass < task.light else one
+    for k in range(dimension(kin)):
+        dv = nodes.update[n, of_change(kin) + k]
+        nodes.velocity[n, k] = nodes.update[n, k] - (one - share) * dv
+
+
+@at_node.on(ClearMean)
+def _(task, kin, nodes, n, dt):
+    mean = field(nodes.fields, NodalMean)
+    mean[n, 0] = 0
+    mean[n, 1] = 0
+
+
+@at_node.on(TakeMean)
+def _(task, kin, nodes, n, dt):
+    mean = field(nodes.fields, NodalMean)
+    if mean[n, 1] > 0:
+        mean[n, 0] /= mean[n, 1]
+
+
+@at_node.on(StartSeries)
+def _(task, kin, nodes, n, dt):
+    d = dimension(kin)
+    series = field(nodes.fields, Series)
+    factor = per_mass(nodes, n, dt)
+    for k in range(d):
+        v = nodes.sums[n, of_momentum(kin) + k] * factor
+        series[n, k] = v
+        series[n, d + k] = 0
+        nodes.update[n, of_change(kin) + k] = nodes.update[n, k] + task.factor * v
+
+
+@at_node.on(ExtendSeries)
+def _(task, kin, nodes, n, dt):
+    d = dimension(kin)
+    series = field(nodes.fields, Series)
+    factor = per_mass(nodes, n, dt)
+    for k in range(d):
+        v = series[n, d + k] * factor
+        series[n, k] = v
+        series[n, d + k] = 0
+        nodes.update[n, of_change(kin) + k] += task.factor * v

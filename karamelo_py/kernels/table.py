@@ -1,0 +1,157 @@
+"""A scheme as a table: visits of the points, tasks at nodes and fixes, in the order of a step.
+
+A scheme names its rows once, stage by stage, as its class attribute ``rows``. From them follow
+
+- the staged step, in which fixes act on points between the stages;
+- the fused step, with as few visits of the points as the rows allow: tasks and scatters that
+  nothing separates share a visit, and the first scatter joins the last visit of the step before;
+- what `karamelo-py check` says of a step, and the traffic that `karamelo-py bench` counts.
+
+Averaged volumes, XPIC, heat and contact are calls that do nothing in scenes without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+from karamelo_py.kernels.g2p import Move, Strain, StrainInMove
+from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
+
+
+class AtPoints(NamedTuple):
+    """Fixes act on the points; `then` is 1 when their new places are known, else 0."""
+
+    stage: int
+    then: int
+
+
+class AtNodes(NamedTuple):
+    """Fixes act on the nodes, on their sums, their update or the velocity that strains."""
+
+    stage: int
+    target: int
+
+
+class Gather(NamedTuple):
+    """Grid to points: a task, with the share of dt that it takes."""
+
+    task: NamedTuple
+    share: float = 1.0
+
+
+class Scatter(NamedTuple):
+    """Points to grid: quantities, by old weights or present ones, to fields that start from zero.
+
+    Present weights are those of the place after the move: of the step to come.
+    """
+
+    quantities: tuple
+    weights: NamedTuple = PresentWeights()
+    clears: NamedTuple | None = None
+
+
+class Nodes(NamedTuple):
+    """A task at every node in use: its tag, or a function of the setup that makes it."""
+
+    task: Any
+
+
+class Call(NamedTuple):
+    """A call ``function(s, mode, hooks)`` of what only some scenes have."""
+
+    function: Callable
+
+
+class Check(NamedTuple):
+    """Look at the new places again, after fixes that may have changed them."""
+
+
+class Sweep(NamedTuple):
+    """A visit of the points, as it is compiled; `gathers` and `scatters` say what of it is done."""
+
+    visit: Visit
+    share: float = 1.0
+    gathers: bool = True
+    scatters: bool = True
+    clears: NamedTuple | None = None
+    moves: bool = True  # whether new places go to the other of the two arrays
+    only_if_more: bool = False  # the scatter belongs to the next step
+
+
+def _tasks(gathers: list[Gather]) -> tuple:
+    """The tasks of one visit; strain behind a move knows what that gathered."""
+    tasks = tuple(g.task for g in gathers)
+    moves = any(isinstance(task, Move) for task in tasks)
+    return tuple(StrainInMove() if moves and isinstance(task, Strain) else task for task in tasks)
+
+
+def _kinds(tags: tuple) -> tuple:
+    """What tells tags apart: tuples without numbers are all equal."""
+    return tuple(type(tag) for tag in tags)
+
+
+def fused(rows: Iterable[Any]) -> list[Any]:
+    """The rows of a step with as few visits as they allow; the sums are on the nodes before it."""
+    kept = [row for row in rows if not isinstance(row, AtPoints | Check)]
+    first = next(k for k, row in enumerate(kept) if isinstance(row, Scatter))
+    next_sums = kept.pop(first)
+    out: list[Any] = []
+    waiting: list[Gather] = []
+
+    def sweep(scatter: Scatter | None, more: bool = False) -> Sweep:
+        found = scatter or Scatter((), OldWeights())
+        visit = Visit(_tasks(waiting), found.quantities, found.weights)
+        return Sweep(visit, waiting[0].share, True, scatter is not None, found.clears, True, more)
+
+    for row in kept:
+        if isinstance(row, Gather):
+            waiting.append(row)
+        elif isinstance(row, Scatter):
+            out.append(sweep(row))
+            waiting = []
+        else:
+            if waiting:
+                out.append(sweep(None))
+                waiting = []
+            out.append(row)
+    out.append(sweep(next_sums, more=True))
+    return out
+
+
+def staged(rows: Iterable[Any]) -> list[Any]:
+    """The rows of a step one by one, as parts of the visits of the fused step where they can be."""
+    rows = list(rows)
+    loops = [row.visit for row in fused(rows) if isinstance(row, Sweep)]
+
+    def loop_of(tasks: tuple, scatter: Scatter | None) -> Visit:
+        for visit in loops:
+            if scatter is None and _kinds(visit.tasks) == _kinds(tasks):
+                return visit
+            if scatter is not None and _kinds(visit.quantities) == _kinds(scatter.quantities):
+                return visit
+        return Visit(tasks, () if scatter is None else scatter.quantities, PresentWeights())
+
+    out: list[Any] = []
+    for row in rows:
+        if isinstance(row, Gather):
+            out.append(Sweep(loop_of((row.task,), None), row.share, True, False))
+        elif isinstance(row, Scatter):
+            visit = loop_of((), row)
+            out.append(Sweep(visit, 1.0, False, True, row.clears, moves=False))
+        else:
+            out.append(row)
+    return out
+
+
+def says(row: Any, setup: Any) -> str | None:
+    """What a row does, in words; None where it does nothing in this scene."""
+    if isinstance(row, Sweep):
+        parts = [tag.says for tag in row.visit.tasks if row.gathers]
+        parts += [tag.says for tag in row.visit.quantities if row.scatters]
+        return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
+    if isinstance(row, Nodes):
+        return getattr(row.task, "says", None)
+    if isinstance(row, Call):
+        return row.function.says(setup)
+    return None

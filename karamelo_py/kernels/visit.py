@@ -1,0 +1,155 @@
+"""What a visit of a point works with, and loops over the tags of what it does.
+
+A visit gathers from the nodes of the point's stencil and settles the point (grid to points,
+:mod:`karamelo_py.kernels.g2p`), then scatters to the nodes (points to grid,
+:mod:`karamelo_py.kernels.p2g`). *What* is gathered and scattered are tuples of tags, so that one
+loop (:mod:`karamelo_py.kernels.sweep`) serves every scheme, fused or stage by stage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from karamelo_py.compiler.compile import by_type, define, index, point_function, real, shared
+from karamelo_py.compiler.fields import field, load, load_vector
+from karamelo_py.compiler.tuples import record
+from karamelo_py.points.basis import blank, locate
+from karamelo_py.points.frames import DeformationGradient, Total, Updated
+from karamelo_py.points.kinematics import zero_tensor
+from karamelo_py.points.laws import deformation, initial_state
+
+
+class Work(NamedTuple):
+    """What a visit of a point works with; made once a tile."""
+
+    frame: NamedTuple
+    kin: NamedTuple
+    basis: NamedTuple
+    grid: NamedTuple
+    transfer: NamedTuple
+    averaging: NamedTuple
+    nodes: NamedTuple
+    points: NamedTuple
+    laws: NamedTuple
+    places: NamedTuple
+
+
+@shared
+def place_at(basis, kin, array, p):
+    """The place of point `p`: its position and the shape of its domain."""
+    return load(array, p, blank(basis, kin, load_vector(kin, array, p)))
+
+
+@shared
+def law_of(w, p):
+    """The law of point `p`, with the parameters of its material."""
+    return record(w.laws, index(w.points.material[p]))
+
+
+@shared
+def state_of(w, law, p, like):
+    """The state of the law at point `p`."""
+    return load(w.points.state, p, initial_state(law, w.kin, like))
+
+
+def stored_or_own(f, law, kin, state):
+    """The deformation gradient `f` that was stored, or that of the law's state."""
+    return f if len(f) else deformation(law, kin, state)
+
+
+@by_type(stored_or_own)
+def _stored_or_own(f, law, kin, state):
+    if len(f):
+        return lambda f, law, kin, state: f
+    return lambda f, law, kin, state: deformation(law, kin, state)
+
+
+@point_function()
+def deformation_of(frame, kin, law, state, points, p):
+    """F of a point where the frame needs it."""
+
+
+@deformation_of.on(Updated)
+def _(frame, kin, law, state, points, p):
+    return ()
+
+
+@deformation_of.on(Total)
+def _(frame, kin, law, state, points, p):
+    f = load(field(points.fields, DeformationGradient), p, zero_tensor(kin, points.mass[p]))
+    return stored_or_own(f, law, kin, state)
+
+
+@point_function()
+def present_stencil(frame, w, stencil, p):
+    """The stencil of the place after the move; in the total frame it never changes."""
+
+
+@present_stencil.on(Updated)
+def _(frame, w, stencil, p):
+    return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
+
+
+@present_stencil.on(Total)
+def _(frame, w, stencil, p):
+    return stencil
+
+
+# --- loops over tags, written out -------------------------------------------------------------
+
+
+def for_tags(function: Callable, names: str, each: str | None = None) -> Callable:
+    """Make ``f(tags, ...)``: the tuple of ``function(tag, ...)`` over a tuple of tags.
+
+    `names` are the other parameters; of the one called `each`, every tag gets its own item.
+    """
+
+    parameters = names.split(", ")
+
+    def item(k: int) -> str:
+        arguments = (f"{name}[{k}]" if name == each else name for name in parameters)
+        return f"function(tags[{k}], {', '.join(arguments)}), "
+
+    def loop(tags, *arguments):
+        given = dict(zip(parameters, arguments, strict=True))
+        return tuple(
+            function(tag, *(v[k] if name == each else v for name, v in given.items()))
+            for k, tag in enumerate(tags)
+        )
+
+    def written_out(tags, *arguments):
+        items = "".join(item(k) for k in range(len(tags)))
+        return define(f"tags, {names}", f"return ({items})", function=function)
+
+    by_type(loop)(written_out)
+    return loop
+
+
+def in_turn(function: Callable) -> Callable:
+    """Make ``f(tags, w, stencil, p, dt, totals, fastest)`` of settling functions, in turn.
+
+    Distances add up, and the rate goes from one to the next (see `g2p.settled`).
+    """
+
+    def loop(tags, w, stencil, p, dt, totals, fastest):
+        moved = real(0, dt)
+        for k, tag in enumerate(tags):
+            further, fastest = function(tag, w, stencil, p, dt, totals[k], totals, fastest)
+            moved += further
+        return moved, fastest
+
+    def written_out(tags, w, stencil, p, dt, totals, fastest):
+        lines = ["moved = real(0, dt)"]
+        for k in range(len(tags)):
+            lines.append(
+                f"further{k}, fastest{k + 1} = function("
+                f"tags[{k}], w, stencil, p, dt, totals[{k}], totals, fastest{k or ''})"
+            )
+            lines.append(f"moved += further{k}")
+        lines.append(f"return moved, fastest{len(tags) or ''}")
+        names = "tags, w, stencil, p, dt, totals, fastest"
+        return define(names, *lines, function=function, real=real)
+
+    by_type(loop)(written_out)
+    return loop

@@ -1,0 +1,135 @@
+"""damage damage_johnson_cook: ductile failure by plastic strain."""
+
+from __future__ import annotations
+
+from math import exp, log
+from typing import Annotated, NamedTuple
+
+from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.language.signature import NonNegative
+from karamelo_py.points.laws import column, damage, damage_initiation
+from karamelo_py.points.laws.checks import check_temperatures, reference_rate
+from karamelo_py.points.laws.damages import (
+    damage_after,
+    initial_damage,
+    initiation,
+    integrity,
+)
+from karamelo_py.points.laws.temperatures import Warm, homologous
+from karamelo_py.script.errors import ScriptError
+
+# Under triaxialities below this, failure strain is without bounds for most metals.
+_CLOSED = -3.0
+_SMALLEST_FAILURE_STRAIN = 1e-6
+# Damage grows from 0 to 1 while the sum of strain over failure strain grows from 1 by 1 / this.
+_BRITTLENESS = 10.0
+
+
+class JohnsonCookDamage(NamedTuple):
+    """Ductile failure of metals by plastic strain.
+
+    Parameters
+    ----------
+    d1, d2, d3
+        Failure strain at the reference rate: d1 + d2 exp(d3 t), with t the mean stress over the von
+        Mises stress.
+    d4
+        Coefficient of the rate; 0 for none.
+    d5
+        Coefficient of temperature; 0 for none.
+    epsdot0
+        Reference rate of plastic strain.
+    Tr, Tm
+        Reference and melting temperature.
+
+    Example
+    -------
+    damage(ductile, damage_johnson_cook, 0.54, 4.89, -3.03, 0.014, 1.12, 1, 298, 1356)
+
+    Notes
+    -----
+    The failure strain is (d1 + d2 exp(d3 t)) (1 + d4 ln(rate/epsdot0)) (1 + d5 T*), T* = (T - Tr) /
+    (Tm - Tr) (Johnson & Cook 1985); at and below the reference rate the second factor is 1, without
+    a temperature the third one is. The sum w of plastic strain over failure strain (the column
+    damage_init of dumps) grows from 0; from 1 on the damage D (the column damage) grows to 1 as
+    10 (w - 1). Under t below -3 nothing fails. d1 may be negative; failure strains are 1e-6 at
+    least.
+
+    D takes its share of the deviatoric stress and of tension, once; pressure in compression stays:
+    sigma = (1 - D) s - p I, p times 1 - D where it is tension. Plastic flow goes on as in what is
+    left of the intact material. The energy that was stored there and is lost with it counts as
+    dissipated.
+
+    See Also
+    --------
+    strength johnson_cook, temperature plastic_work, material eos-strength
+    """
+
+    d1: float
+    d2: Annotated[float, NonNegative]
+    d3: float
+    d4: Annotated[float, NonNegative]
+    d5: Annotated[float, NonNegative]
+    epsdot0: Annotated[float, NonNegative]
+    Tr: float
+    Tm: float
+
+    def checked(self):
+        """The law, after a look at what no annotation says."""
+        check_temperatures(self.Tr, self.Tm)
+        if not self.d1 + self.d2 > 0:
+            raise ScriptError(
+                f"the failure strain in shear, d1 + d2 = {self.d1 + self.d2:g}, is not above 0",
+                argument="d1",
+                expected="d1 + d2 above 0",
+            )
+        return self._replace(epsdot0=reference_rate(self.epsdot0, self.d4, "d4"))
+
+
+column(JohnsonCookDamage, "damage", damage)
+column(JohnsonCookDamage, "damage_init", damage_initiation)
+
+
+@point_function()
+def warmed(heat, damage, one):
+    """1 + d5 T*, and 1 without a temperature."""
+
+
+@warmed.otherwise
+def _(heat, damage, one):
+    return one
+
+
+@warmed.on(Warm)
+def _(heat, damage, one):
+    return one + damage.d5 * homologous(heat, damage.Tr, damage.Tm)
+
+
+@initial_damage.on(JohnsonCookDamage)
+def _(damage, like):
+    return (real(0, like),)
+
+
+@damage_after.on(JohnsonCookDamage)
+def _(damage, memory, strain, triaxiality, heat, dt):
+    if not (strain > 0 and triaxiality > real(_CLOSED, strain)):
+        return memory
+    one = real(1, strain)
+    failure = damage.d1 + damage.d2 * exp(min(damage.d3 * triaxiality, real(50, strain)))
+    rate = max(strain / (dt * damage.epsdot0), one)
+    failure *= one + damage.d4 * log(rate)
+    failure *= warmed(heat, damage, one)
+    return (memory[0] + strain / max(failure, real(_SMALLEST_FAILURE_STRAIN, strain)),)
+
+
+@integrity.on(JohnsonCookDamage)
+def _(damage, memory):
+    one = real(1, memory[0])
+    zero = real(0, memory[0])
+    D = real(_BRITTLENESS, memory[0]) * (memory[0] - one)
+    return one - min(max(D, zero), one)
+
+
+@initiation.on(JohnsonCookDamage)
+def _(damage, memory):
+    return memory[0]

@@ -1,0 +1,112 @@
+"""Parts of a composed law of further kinds, which a plug-in may bring: any number of them.
+
+A part is a NamedTuple of parameters (its class is the tag). It may remember numbers of its own, and
+add a pressure. What is not defined for a class is that of a part that remembers and adds nothing.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.tuples import following, leading, plus
+from karamelo_py.points.laws import Absent
+
+
+class Further(NamedTuple):
+    """A part, and further ones (`Absent` at the end)."""
+
+    part: Any
+    rest: Any
+
+
+def chained(parts: list) -> NamedTuple:
+    """The parts, one after the other."""
+    return reduce(lambda rest, part: Further(part, rest), reversed(parts), Absent())
+
+
+@point_function()
+def initial_part(part, like):
+    """The memory of a point without a past."""
+
+
+@initial_part.otherwise
+def _(part, like):
+    return ()
+
+
+@point_function()
+def part_after(part, memory, law, kin, j, s, memories, dt):
+    """The memory after a step dt to the volume ratio j and the deviatoric stress s.
+
+    `memories` are those of the other parts of the `law`.
+    """
+
+
+@part_after.otherwise
+def _(part, memory, law, kin, j, s, memories, dt):
+    return memory
+
+
+@point_function()
+def part_pressure(part, memory):
+    """(p,), the pressure that the part adds, or ()."""
+
+
+@part_pressure.otherwise
+def _(part, memory):
+    return ()
+
+
+# ---- the same of all ----------------------------------------------------------------------------
+
+
+@point_function()
+def initial_further(parts, like):
+    """The memories of all parts, one after the other."""
+
+
+@initial_further.on(Absent)
+def _(parts, like):
+    return ()
+
+
+@initial_further.on(Further)
+def _(parts, like):
+    return initial_part(parts.part, like) + initial_further(parts.rest, like)
+
+
+@point_function()
+def further_after(parts, memory, law, kin, j, s, memories, dt):
+    """The memories after a step."""
+
+
+@further_after.on(Absent)
+def _(parts, memory, law, kin, j, s, memories, dt):
+    return ()
+
+
+@further_after.on(Further)
+def _(parts, memory, law, kin, j, s, memories, dt):
+    own = leading(memory, initial_part(parts.part, j))
+    rest = following(memory, own)
+    after = part_after(parts.part, own, law, kin, j, s, memories, dt)
+    return after + further_after(parts.rest, rest, law, kin, j, s, memories, dt)
+
+
+@point_function()
+def further_pressure(parts, memory, p):
+    """p and what all parts add to it."""
+
+
+@further_pressure.on(Absent)
+def _(parts, memory, p):
+    return p
+
+
+@further_pressure.on(Further)
+def _(parts, memory, p):
+    own = leading(memory, initial_part(parts.part, p))
+    rest = following(memory, own)
+    return further_pressure(parts.rest, rest, plus(p, part_pressure(parts.part, own)))

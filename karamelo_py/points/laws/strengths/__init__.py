@@ -1,0 +1,161 @@
+"""Strength of one point: deviatoric stress from strain. One file each.
+
+A strength is a NamedTuple of parameters (its class is the tag), a part of a composed law
+(`karamelo_py.points.laws.eos_strength`). What it remembers of the past (plastic strain and
+the like) is its memory, a flat tuple with as many numbers as it needs, none at best (`remembers`).
+`heat` is the temperature (`Warm`), or () where the law has none.
+
+Strengths that depend on pressure, and change the volume, have `pressure_response` in the place of
+`shear_response` (`karamelo_py.points.laws.strengths.frictional`). What is not defined for a class
+is that of an elastic strength with a shear modulus ``G`` that remembers nothing.
+"""
+
+from typing import NamedTuple
+
+from karamelo_py.compiler.compile import define, point_function, real
+from karamelo_py.compiler.tuples import scale
+from karamelo_py.points.kinematics import contract
+from karamelo_py.points.laws import column
+
+
+class Remembered(NamedTuple):
+    """Tag of a number that a strength remembers, by its place in the memory."""
+
+    place: int
+
+
+def remembers(strength: type, **numbers: float | str) -> None:
+    """Declare what `strength` remembers.
+
+    Parameters
+    ----------
+    strength
+        The class.
+    **numbers
+        For each number the name of its column, and what it starts from: a value, or the name of a
+        parameter. ``ep`` is the equivalent plastic strain; it comes first.
+    """
+    starts = [
+        f"strength.{start}" if isinstance(start, str) else f"real({start!r}, like)"
+        for start in numbers.values()
+    ]
+    initial_memory.on(strength)(
+        define("strength, like", f"return ({', '.join(starts)},)", real=real)
+    )
+    for place, name in enumerate(numbers):
+        column(strength, name, Remembered(place))
+    if "ep" in numbers:
+        initial_loss.on(strength)(define("strength, like", "return (real(0, like),)", real=real))
+        equivalent_plastic_strain.on(strength)(define("strength, memory", "return memory[0]"))
+
+
+@point_function()
+def initial_memory(strength, like):
+    """The memory of a point without a past, in the number type of `like`."""
+
+
+@initial_memory.otherwise
+def _(strength, like):
+    return ()
+
+
+@point_function()
+def respond(strength, law, kin, s, strain, j, memories, dt):
+    """Deviatoric stress, memory, and work per volume that is not stored, after a step dt.
+
+    `s` is the old deviatoric stress, turned with the point already; `strain`, the increment, is not
+    deviatoric; `memories` are those of all parts of the `law`.
+    """
+
+
+@respond.otherwise
+def _(strength, law, kin, s, strain, j, memories, dt):
+    return shear_response(strength, kin, s, strain, memories.strength, memories.heat, dt)
+
+
+@point_function()
+def shear_response(strength, kin, s, strain, memory, heat, dt):
+    """The same of strengths that need to know nothing of the other parts."""
+
+
+@point_function()
+def pressure_response(strength, kin, s, p, K, strain):
+    """Deviatoric stress and pressure on or within the yield surface, from an elastic trial.
+
+    `K` is the bulk modulus, `strain` the equivalent plastic strain.
+    """
+
+
+@point_function()
+def initial_loss(strength, like):
+    """(0,) for a strength that dissipates energy, or ()."""
+
+
+@initial_loss.otherwise
+def _(strength, like):
+    return ()
+
+
+@point_function()
+def elastic_ratio(strength, memory, j):
+    """The part of the volume ratio j that is elastic: what makes pressure."""
+
+
+@elastic_ratio.otherwise
+def _(strength, memory, j):
+    return j
+
+
+@point_function()
+def with_elastic_ratio(strength, memory, j, elastic):
+    """The memory with which `elastic_ratio` of j is `elastic`."""
+
+
+@point_function()
+def shear_modulus(strength):
+    """Stiffness against a further change of shape, for the speed of waves."""
+
+
+@shear_modulus.otherwise
+def _(strength):
+    return strength.G
+
+
+@point_function()
+def damped_speed_squared(strength, squared, density):
+    """The square of the speed of waves, with what a viscous strength takes of the stable step."""
+
+
+@damped_speed_squared.otherwise
+def _(strength, squared, density):
+    return squared
+
+
+@point_function()
+def shear_strain(strength, kin, s):
+    """Elastic part of the deviatoric strain, as a symmetric tensor."""
+
+
+@shear_strain.otherwise
+def _(strength, kin, s):
+    return scale(real(0.5, strength.G) / strength.G, s)
+
+
+@point_function()
+def shear_energy(strength, kin, s):
+    """Energy stored by elastic shear, per present volume."""
+
+
+@shear_energy.otherwise
+def _(strength, kin, s):
+    return real(0.25, strength.G) / strength.G * contract(kin, s, s)
+
+
+@point_function()
+def equivalent_plastic_strain(strength, memory):
+    """Sum of sqrt(2/3 d:d) of the plastic strain increments d."""
+
+
+@equivalent_plastic_strain.otherwise
+def _(strength, memory):
+    return real(0, strength[0])

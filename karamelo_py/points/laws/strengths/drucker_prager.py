@@ -1,0 +1,130 @@
+"""strength drucker-prager: cohesion and friction by a cone."""
+
+from __future__ import annotations
+
+from math import cos, inf, sin, sqrt, tan
+from typing import Annotated, Literal, NamedTuple
+
+from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.tuples import scale
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.kinematics import contract
+from karamelo_py.points.laws.strengths import pressure_response
+from karamelo_py.points.laws.strengths.frictional import frictional, surface
+from karamelo_py.points.laws.strengths.soils import angles, residual
+
+
+def cone(fit: str, phi: float) -> tuple[float, float]:
+    """Factors of cohesion and of pressure for a friction angle in radians (see `DruckerPrager`)."""
+    if fit == "plane-strain":
+        root = sqrt(9 + 12 * tan(phi) ** 2)
+        return 3 / root, 3 * tan(phi) / root
+    sign = -1 if fit == "compression" else 1
+    below = sqrt(3) * (3 + sign * sin(phi))
+    return 6 * cos(phi) / below, 6 * sin(phi) / below
+
+
+class DruckerPrager(NamedTuple):
+    """Strength of soil by cohesion and friction: a cone around the axis of pressure.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    cohesion
+        Cohesion c.
+    phi
+        Angle of internal friction in degrees, below 90.
+    psi
+        Angle of dilatancy in degrees, from 0 (no plastic change of volume by shear) to phi.
+    fit
+        Where the cone meets the surface of mohr-coulomb: ``compression`` and ``extension``, the
+        triaxial tests, or ``plane-strain``, the limit load of plane strain.
+    tension
+        Largest mean stress in tension; that of the apex of the cone when left out.
+    residual_cohesion, residual_phi
+        What cohesion and friction angle fall to; they stay as they are when left out.
+    softening
+        Equivalent plastic strain over which they fall, in a straight line of the factors of the
+        cone.
+
+    Example
+    -------
+    eos(ground, linear, 2100, 58.3e6)
+    strength(sand, drucker-prager, 26.9e6, 0, 30, 5, fit=plane-strain)
+    material(soil, eos-strength, ground, sand)
+
+    Notes
+    -----
+    sqrt(s:s/2) <= xi c + eta p (Drucker & Prager 1952). compression: xi = 6 cos(phi)/(sqrt(3) (3 -
+    sin(phi))), eta = 6 sin(phi)/(sqrt(3) (3 - sin(phi))); extension: the same with 3 + sin(phi);
+    plane-strain: xi = 3/sqrt(9 + 12 tan(phi)^2), eta = xi tan(phi) (de Souza Neto et al. 2008,
+    section 6.4). Dilatancy has the factor eta of psi. Tension beyond -p = tension, or the apex, is
+    cut off. The plastic change of volume is kept, and pressure follows from the elastic part of J.
+    While strength falls, a step uses that of its beginning. Where it falls, results depend on the
+    size of the cells.
+
+    See Also
+    --------
+    mohr-coulomb, eos linear, material eos-strength, compute max_plastic_strain
+    """
+
+    G: float  # shear modulus
+    cohesion: float
+    friction: float
+    dilation: float
+    tension: float
+    residual_cohesion: float  # at the end of softening
+    residual_friction: float
+    softening: float  # share of the way to the residual for each unit of plastic strain, or 0
+
+    @classmethod
+    def given(
+        cls,
+        G: Annotated[float, Positive],
+        cohesion: Annotated[float, NonNegative],
+        phi: float,
+        psi: float = 0.0,
+        *,
+        fit: Literal["compression", "extension", "plane-strain"] = "compression",
+        tension: Annotated[float, NonNegative] | None = None,
+        residual_cohesion: Annotated[float, NonNegative] | None = None,
+        residual_phi: Annotated[float, NonNegative] | None = None,
+        softening: Annotated[float, Positive] | None = None,
+    ):
+        """The cone from cohesion and angles: sqrt(s:s / 2) <= cohesion + friction p."""
+        a, b = angles(cohesion, phi, psi)
+        end = residual(cohesion, phi, residual_cohesion, residual_phi, softening)
+        xi, eta = cone(fit, a)
+        peak = (xi * cohesion, eta, cone(fit, b)[1])
+        xi, eta = cone(fit, end.phi)
+        left = (xi * end.cohesion, eta, end.softening)
+        return cls(G, *peak, inf if tension is None else tension, *left)
+
+
+frictional(DruckerPrager)
+
+
+@pressure_response.on(DruckerPrager)
+def _(strength, kin, s, p, K, strain):
+    cohesion, friction, dilation = surface(strength, strain)
+    zero = real(0, p)
+    trial = sqrt(real(0.5, p) * contract(kin, s, s))
+    lowest = -strength.tension
+    if friction > 0:
+        lowest = max(lowest, -cohesion / friction)
+    f = trial - cohesion - friction * p
+    root = trial
+    if f > 0:
+        x = f / (strength.G + K * friction * dilation)
+        p += K * dilation * x
+        root = cohesion + friction * p
+        if p < lowest:
+            # Beyond the end of the cone: the trial pressure counts again, see below.
+            p -= K * dilation * x
+    if p < lowest:
+        p = lowest
+        root = min(trial, cohesion + friction * lowest)
+    if root < trial:
+        return scale(max(root, zero) / trial, s), p
+    return s, p

@@ -1,0 +1,48 @@
+"""strength linear: elastic shear without limit."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.tuples import add_scaled
+from karamelo_py.language.signature import Positive
+from karamelo_py.points.kinematics import deviator
+from karamelo_py.points.laws.strengths import shear_response
+
+
+class Elastic(NamedTuple):
+    """Elastic shear without limit.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+
+    Example
+    -------
+    strength(elastic, linear, 80e9)
+
+    Notes
+    -----
+    The deviatoric stress turns with the point (Jaumann rate) and grows by 2 G dev(d), d the strain
+    increment.
+
+    See Also
+    --------
+    plastic, eos, material eos-strength
+    """
+
+    G: Annotated[float, Positive]
+
+
+@shared
+def elastic_trial(kin, G, s, strain):
+    """Deviatoric stress after a strain increment, were it all elastic."""
+    # The deviator of the sum: rounding errors of many steps would give s a trace otherwise.
+    return deviator(kin, add_scaled(s, real(2, G) * G, strain))
+
+
+@shear_response.on(Elastic)
+def _(strength, kin, s, strain, memory, heat, dt):
+    return elastic_trial(kin, strength.G, s, strain), memory, real(0, strength.G)

@@ -1,0 +1,173 @@
+"""strength mohr-coulomb: cohesion and friction."""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+from typing import Annotated, NamedTuple
+
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.kinematics import contract, from_principal, principal
+from karamelo_py.points.laws.strengths import pressure_response
+from karamelo_py.points.laws.strengths.frictional import frictional, surface
+from karamelo_py.points.laws.strengths.soils import angles, residual
+
+
+class MohrCoulomb(NamedTuple):
+    """Strength of soil by cohesion and friction, with dilatancy and perhaps softening.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    cohesion
+        Cohesion c.
+    phi
+        Angle of internal friction in degrees, below 90.
+    psi
+        Angle of dilatancy in degrees, from 0 (no plastic change of volume by shear) to phi.
+    residual_cohesion, residual_phi
+        What cohesion and friction angle fall to; they stay as they are when left out.
+    softening
+        Equivalent plastic strain over which they fall, in a straight line of c cos(phi) and
+        sin(phi).
+
+    Example
+    -------
+    eos(ground, linear, 2100, 58.3e6)
+    strength(clay, mohr-coulomb, 26.9e6, 10e3, 20, 0)
+    material(soil, eos-strength, ground, clay)
+
+    Notes
+    -----
+    s1 - s3 + (s1 + s3) sin(phi) <= 2 c cos(phi), with s1 the largest and s3 the smallest principal
+    stress (tension positive). A stress beyond is brought back in principal stresses: to the plane,
+    an edge (two equal principal stresses) or the apex of the surface, p = -c cot(phi), in tension
+    (Simpson 2017, Practical Finite Element Modeling in Earth Science using Matlab, section 11.4; de
+    Souza Neto et al. 2008, section 8.2). The plastic change of volume is kept, and pressure follows
+    from the elastic part of J. While strength falls, a step uses that of its beginning. Where it
+    falls, results depend on the size of the cells.
+
+    See Also
+    --------
+    drucker-prager, eos linear, material eos-strength, compute max_plastic_strain
+    """
+
+    G: float  # shear modulus
+    cohesion: float  # c cos(phi)
+    friction: float  # sin(phi)
+    dilation: float  # sin(psi)
+    residual_cohesion: float  # at the end of softening
+    residual_friction: float
+    softening: float  # share of the way to the residual for each unit of plastic strain, or 0
+
+    @classmethod
+    def given(
+        cls,
+        G: Annotated[float, Positive],
+        cohesion: Annotated[float, NonNegative],
+        phi: float,
+        psi: float = 0.0,
+        *,
+        residual_cohesion: Annotated[float, NonNegative] | None = None,
+        residual_phi: Annotated[float, NonNegative] | None = None,
+        softening: Annotated[float, Positive] | None = None,
+    ):
+        """The yield surface from cohesion and angles."""
+        a, b = angles(cohesion, phi, psi)
+        end = residual(cohesion, phi, residual_cohesion, residual_phi, softening)
+        peak = (cohesion * cos(a), sin(a), sin(b))
+        left = (end.cohesion * cos(end.phi), sin(end.phi), end.softening)
+        return cls(G, *peak, *left)
+
+
+frictional(MohrCoulomb)
+
+
+@shared
+def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
+    """Principal stresses s1 >= s2 >= s3 on the surface, from those of an elastic trial above it.
+
+    To a plane of the surface; where that changes their order, to an edge of two planes; where it
+    still does, to the apex (Simpson 2017, section 11.4; de Souza Neto et al. 2008, box 8.4).
+    """
+    one = real(1, G)
+    two = real(2, G)
+    lam = K - two / real(3, G) * G
+    # n and m, normals of yield function and plastic potential, are (1 + sin, 0, sin - 1).
+    mean = real(4, G) * lam * sin_phi * sin_psi
+    up = two * G * (one + sin_phi) * (one + sin_psi)
+    down = two * G * (one - sin_phi) * (one - sin_psi)
+    f = s[0] - s[2] + (s[0] + s[2]) * sin_phi - two * k
+    volume = two * lam * sin_psi  # lam tr(m)
+    rise = two * G * (one + sin_psi) + volume  # C m for the largest
+    fall = volume - two * G * (one - sin_psi)  # for the smallest; `volume` for the other
+    x = f / (up + down + mean)
+    s1, s2, s3 = s[0] - x * rise, s[1] - x * volume, s[2] - x * fall
+    if s1 >= s2 and s2 >= s3:
+        return s1, s2, s3
+    if s2 > s1:
+        # Triaxial extension: planes 1-3 and 2-3.
+        other = s[1] - s[2] + (s[1] + s[2]) * sin_phi - two * k
+        cross = down + mean
+    else:
+        # Triaxial compression: planes 1-3 and 1-2.
+        other = s[0] - s[1] + (s[0] + s[1]) * sin_phi - two * k
+        cross = up + mean
+    a = up + down + mean
+    determinant = a * a - cross * cross
+    x = (a * f - cross * other) / determinant
+    y = (a * other - cross * f) / determinant
+    if s2 > s1:
+        t1 = s[0] - x * rise - y * volume
+        t3 = s[2] - (x + y) * fall
+        # Equal by construction, but for rounding: on both planes.
+        t1 = (two * k + (one - sin_phi) * t3) / (one + sin_phi)
+        if t1 >= t3:
+            return t1, t1, t3
+    else:
+        t1 = s[0] - (x + y) * rise
+        t3 = ((one + sin_phi) * t1 - two * k) / (one - sin_phi)
+        if t1 >= t3:
+            return t1, t3, t3
+    apex = k / sin_phi
+    return apex, apex, apex
+
+
+@pressure_response.on(MohrCoulomb)
+def _(strength, kin, s, p, K, strain):
+    k, sin_phi, sin_psi = surface(strength, strain)
+    half = real(0.5, p)
+    two = real(2, p)
+    # Above this bound of the yield function principal stresses are needed to know it.
+    root = sqrt(half * contract(kin, s, s))
+    bound = two * root + sin_phi * (root / sqrt(real(3, p)) - two * p) - two * k
+    if bound <= 0:
+        return s, p
+    values, frame = principal(kin, s)
+    a, b, c = values
+    # Places in the order from the largest; equal values keep theirs.
+    at_a = (1 if b > a else 0) + (1 if c > a else 0)
+    at_b = (1 if a >= b else 0) + (1 if c > b else 0)
+    at_c = (1 if a >= c else 0) + (1 if b >= c else 0)
+    largest = max(a, max(b, c))
+    smallest = min(a, min(b, c))
+    middle = -largest - smallest
+    ordered = (largest - p, middle - p, smallest - p)
+    f = largest - smallest + (ordered[0] + ordered[2]) * sin_phi - two * k
+    if f <= 0:
+        return s, p
+    new = returned_to_plane(ordered, k, sin_phi, sin_psi, strength.G, K)
+    mean = (new[0] + new[1] + new[2]) / real(3, p)
+    shear = (
+        _of_three(new, at_a) - mean,
+        _of_three(new, at_b) - mean,
+        _of_three(new, at_c) - mean,
+    )
+    return from_principal(kin, shear, frame), -mean
+
+
+@shared
+def _of_three(values, k):
+    """values[k], of a tuple that the compiler keeps in registers."""
+    return values[0] if k == 0 else values[1] if k == 1 else values[2]

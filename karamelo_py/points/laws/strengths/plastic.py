@@ -1,0 +1,84 @@
+"""strength plastic: plasticity of von Mises."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.tuples import scale
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.kinematics import von_mises
+from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.laws.strengths.linear import elastic_trial
+
+
+class LinearHardening(NamedTuple):
+    """Elastic shear up to a yield stress, constant or with linear hardening (von Mises).
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    yield_stress
+        Yield stress in uniaxial tension; in pure shear it yields at 1/sqrt(3) of it.
+    H
+        Hardening modulus: by how much the yield stress rises for each unit of plastic strain.
+
+    Example
+    -------
+    strength(mild, plastic, 80e9, 400e6)
+    strength(copper, plastic, 43.3e9, 400e6, 100e6)
+
+    Notes
+    -----
+    Where the von Mises stress q = sqrt(3/2 s:s) of an elastic step is above the yield stress Y, the
+    equivalent plastic strain (the column ep of dumps) grows by (q - Y)/(3 G + H) and the deviatoric
+    stress s shrinks to the yield stress (radial return; Wilkins 1964; de Souza Neto et al. 2008,
+    section 7.3).
+
+    See Also
+    --------
+    linear, johnson_cook, swift, eos, material eos-strength, compute max_plastic_strain
+    """
+
+    G: Annotated[float, Positive]
+    yield_stress: Annotated[float, Positive]
+    H: Annotated[float, NonNegative] = 0.0
+
+    def checked(self):
+        """The law; that without hardening where there is none."""
+        return self if self.H > 0 else Plastic(self.G, self.yield_stress)
+
+
+class Plastic(NamedTuple):
+    """The same with a yield stress that stays."""
+
+    G: float
+    yield_stress: float
+
+
+remembers(Plastic, ep=0.0)
+remembers(LinearHardening, ep=0.0)
+
+
+@shear_response.on(Plastic)
+def _(strength, kin, s, strain, memory, heat, dt):
+    trial = elastic_trial(kin, strength.G, s, strain)
+    q = von_mises(kin, trial)
+    flow = strength.yield_stress
+    if q > flow:
+        increment = (q - flow) / (real(3, q) * strength.G)
+        return scale(flow / q, trial), (memory[0] + increment,), flow * increment
+    return trial, memory, real(0, q)
+
+
+@shear_response.on(LinearHardening)
+def _(strength, kin, s, strain, memory, heat, dt):
+    trial = elastic_trial(kin, strength.G, s, strain)
+    q = von_mises(kin, trial)
+    flow = strength.yield_stress + strength.H * memory[0]
+    if q > flow:
+        increment = (q - flow) / (real(3, q) * strength.G + strength.H)
+        flow += strength.H * increment
+        return scale(flow / q, trial), (memory[0] + increment,), flow * increment
+    return trial, memory, real(0, q)

@@ -1,0 +1,54 @@
+"""strength swift: hardening by a power of plastic strain, after a plateau."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
+from karamelo_py.points.laws.strengths.johnson_cook import power_law
+
+
+class Swift(NamedTuple):
+    """Hardening by a power of plastic strain, after a plateau.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    A
+        Flow stress on the plateau.
+    B, n
+        Hardening.
+    C
+        Plastic strain at the end of the plateau. A negative one is a strain that the material has
+        been given before.
+
+    Example
+    -------
+    strength(steel, swift, 80e9, 400e6, 500e6, 0.01, 0.5)
+
+    Notes
+    -----
+    Y = A + B (ep - C)^n where the plastic strain ep is above C, else A (after Swift 1952). Each
+    step solves for the plastic strain with the flow stress at its end.
+
+    See Also
+    --------
+    plastic, johnson_cook, material eos-strength
+    """
+
+    G: Annotated[float, Positive]
+    A: Annotated[float, Positive]
+    B: Annotated[float, NonNegative]
+    C: float
+    n: Annotated[float, NonNegative]
+
+
+hardening(Swift)
+
+
+@flow_stress.on(Swift)
+def _(strength, memory, increment, heat, dt):
+    hard, slope = power_law(strength.B, strength.n, memory[0] + increment - strength.C)
+    return strength.A + hard, slope

@@ -1,1 +1,0 @@
-"""Damage: how strength is lost. One style a file, named as in the script."""

@@ -1,1 +1,0 @@
-"""Strengths: deviatoric stress from strain. One style a file, named as in the script."""

@@ -1,1 +1,0 @@
-"""Temperature of a material. One style a file, named as in the script."""

@@ -1,0 +1,468 @@
+"""Kernels on disk: compiled again when what is in them has changed, and never in the way."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import subprocess
+import sys
+import warnings
+from textwrap import dedent
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numba import config, prange
+
+from karamelo_py.compiler import cache, fingerprint
+from karamelo_py.compiler.compile import kernel, point_function
+from karamelo_py.output.console import Console
+from karamelo_py.run.runner import Runner
+from karamelo_py.scene.hub import Hub
+
+pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+
+# A package in small: two shapes in files of their own, what they share, and a loop over points.
+FILES = {
+    "numbers_used.py": "HALF = 0.5\nUNUSED = 7\n",
+    "helpers.py": """
+        from karamelo_py.compiler.compile import by_type, shared
+        import numbers_used
+
+        @shared
+        def halved(x):
+            '''Half of x.'''
+            return numbers_used.HALF * x
+
+        def spelling(n):
+            return f"{n} * x"
+
+        def plus_one(x):
+            return x + 1.0
+
+        @by_type(plus_one)
+        def _(x):
+            return by_amount(1.0)
+
+        def by_amount(amount):
+            return lambda x: x + amount
+        """,
+    "loops.py": """
+        from typing import NamedTuple
+        from karamelo_py.compiler.compile import by_type, kernel, point_function
+
+        class Pair(NamedTuple):
+            first: float
+            second: float
+
+        @point_function()
+        def area(shape):
+            pass
+
+        @point_function()
+        def price(shape):
+            pass
+
+        def paid(shape):
+            return 0.0
+
+        @by_type(paid)
+        def _(shape):
+            if price.defined(shape.instance_class):
+                return lambda shape: price(shape)
+            return lambda shape: 0.0
+
+        @area.otherwise
+        def _(shape):
+            return -1.0
+
+        @kernel
+        def one(shape, pair):
+            return area(shape) + paid(shape) + 0.0 * pair.first
+
+        @kernel
+        def total(shape, pair, n):
+            total = 0.0
+            for _ in range(n):
+                total += one(shape, pair)
+            return total + 100.0 * pair.second
+        """,
+    "disks.py": """
+        from typing import NamedTuple
+        from helpers import halved, plus_one
+        from loops import area
+
+        class Disk(NamedTuple):
+            r: float
+
+        @area.on(Disk)
+        def _(shape):
+            return plus_one(halved(6.0) * shape.r)
+        """,
+    "squares.py": """
+        from typing import NamedTuple
+        from helpers import halved
+        from loops import area
+
+        class Square(NamedTuple):
+            a: float
+
+        @area.on(Square)
+        def _(shape):
+            # a comment
+            return halved(2.0 * shape.a)
+        """,
+    "strips.py": """
+        from typing import NamedTuple
+
+        class Strip(NamedTuple):
+            b: float
+        """,
+    "program.py": """
+        import warnings
+        from numba.core import event
+        from loops import Pair, total
+        from disks import Disk
+        from squares import Square
+        from strips import Strip
+
+        class Compiled(event.Listener):
+            names = []
+            def on_start(self, event):
+                if event.data["dispatcher"].py_func.__name__ == "total":
+                    self.names.append(type(shape).__name__)
+            def on_end(self, event): ...
+
+        event.register("numba:compile", Compiled())
+        values = []
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            for shape in (Disk(1.0), Square(2.0), Strip(3.0)):
+                values.append(total(shape, Pair(1.0, 2.0), 3))
+        print(values)
+        print(Compiled.names)
+        for one in told:
+            print(one.message)
+        """,
+}
+VALUES = [212.0, 206.0, 197.0]
+ALL = ["Disk", "Square", "Strip"]
+
+
+class Shapes:
+    """The package on disk, and runs of its program."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.kernels = folder / "cache" / "kernels"
+        for name, text in FILES.items():
+            (folder / name).write_text(dedent(text))
+
+    def edit(self, name, old, new):
+        """Change a file of the package."""
+        text = (self.folder / name).read_text()
+        assert old in text
+        (self.folder / name).write_text(text.replace(old, new))
+
+    def run(self):
+        """Values of the three totals, the shapes they were compiled for, and what was told."""
+        done = subprocess.run(
+            [sys.executable, "-B", "program.py"],
+            cwd=self.folder,
+            env=os.environ | {"KARAMELO_PY_CACHE": str(self.folder / "cache")},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        values, compiled, *told = done.stdout.splitlines()
+        return eval(values), eval(compiled), told
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory):
+    """The files of the kernels of the package as it is above."""
+    shapes = Shapes(tmp_path_factory.mktemp("shapes"))
+    assert shapes.run() == (VALUES, ALL, [])
+    assert shapes.run() == (VALUES, [], [])
+    return {path.name: path.read_bytes() for path in shapes.kernels.glob("*.kernel")}
+
+
+@pytest.fixture
+def shapes(tmp_path, compiled):
+    """The package in a folder of its own, with its kernels."""
+    shapes = Shapes(tmp_path)
+    shapes.kernels.mkdir(parents=True)
+    for name, content in compiled.items():
+        (shapes.kernels / name).write_bytes(content)
+    return shapes
+
+
+EDITS = {
+    "nothing": ([], VALUES, []),
+    "comment": ([("squares.py", "# a comment", "# another\n    # comment")], VALUES, []),
+    "docstring": ([("helpers.py", "Half of x.", "x / 2.")], VALUES, []),
+    "what nobody uses": ([("numbers_used.py", "7", "8")], VALUES, []),
+    "one implementation": (
+        [("squares.py", "2.0 * shape.a", "3.0 * shape.a")],
+        [212.0, 209.0, 197.0],
+        ["Square"],
+    ),
+    "a constant of another file": (
+        [("numbers_used.py", "0.5", "0.25")],
+        [207.5, 203.0, 197.0],
+        ["Disk", "Square"],
+    ),
+    "a chooser's helper": (
+        [("helpers.py", "x + amount", "x + 2.0 * amount")],
+        [215.0, 206.0, 197.0],
+        ["Disk"],
+    ),
+    "what a chooser was given": (
+        [("helpers.py", "by_amount(1.0)", "by_amount(3.0)")],
+        [218.0, 206.0, 197.0],
+        ["Disk"],
+    ),
+    "a kernel in the kernel": (
+        [("loops.py", "0.0 * pair.first", "1.0 * pair.first")],
+        [215.0, 209.0, 200.0],
+        ALL,
+    ),
+    "what otherwise holds": ([("loops.py", "-1.0", "-2.0")], [212.0, 206.0, 194.0], ["Strip"]),
+    "an implementation where there was none": (
+        [("program.py", "class Compiled", "import more\n\nclass Compiled")],
+        [212.0, 206.0, 209.0],
+        ["Strip"],
+    ),
+    "what a chooser asked for": (
+        [("program.py", "class Compiled", "import dear\n\nclass Compiled")],
+        [212.0, 215.0, 197.0],
+        ["Square"],
+    ),
+    "the order of fields of one type": (
+        [("loops.py", "first: float\n    second: float", "second: float\n    first: float")],
+        [112.0, 106.0, 97.0],
+        ALL,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_what_is_compiled_again(shapes, name):
+    edits, values, again = EDITS[name]
+    more = (
+        "from loops import area\nfrom strips import Strip\narea.on(Strip)(lambda shape: shape.b)\n"
+    )
+    (shapes.folder / "more.py").write_text(more)
+    more = (
+        "from loops import price\nfrom squares import Square\nprice.on(Square)(lambda shape: 3.0)\n"
+    )
+    (shapes.folder / "dear.py").write_text(more)
+    for edit in edits:
+        shapes.edit(*edit)
+    assert shapes.run() == (values, again, [])
+
+
+def test_an_edit_taken_back(shapes):
+    """Several states of the sources are kept, so going to and fro costs nothing."""
+    shapes.edit("squares.py", "2.0", "3.0")
+    assert shapes.run()[1] == ["Square"]
+    assert shapes.run()[1] == []
+    shapes.edit("squares.py", "3.0", "2.0")
+    assert shapes.run() == (VALUES, [], [])
+
+
+# --- faults of the folder -----------------------------------------------------------------------
+
+
+def test_a_file_in_place_of_the_folder(shapes):
+    for path in shapes.kernels.iterdir():
+        path.unlink()
+    shapes.kernels.rmdir()
+    shapes.kernels.write_text("")
+    values, compiled, told = shapes.run()
+    assert (values, compiled) == (VALUES, ALL)
+    assert len(told) == 1
+    assert str(shapes.kernels) in told[0]
+    assert shapes.kernels.read_text() == ""
+
+
+@pytest.mark.parametrize("length", [0, 1000])
+def test_truncated_files(shapes, length):
+    for path in shapes.kernels.iterdir():
+        path.write_bytes(path.read_bytes()[:length])
+    values, compiled, told = shapes.run()
+    assert (values, compiled) == (VALUES, ALL)
+    assert len(told) == 1
+    assert f"a file in {shapes.kernels} is damaged" in told[0]
+    assert shapes.run() == (VALUES, [], [])
+
+
+def test_folders_in_place_of_files(shapes):
+    for path in shapes.kernels.iterdir():
+        path.unlink()
+        path.mkdir()
+    values, compiled, told = shapes.run()
+    assert (values, compiled, len(told)) == (VALUES, ALL, 1)
+    assert str(shapes.kernels) in told[0]
+
+
+class Tag(NamedTuple):
+    """A shape of this file."""
+
+
+@point_function()
+def answer(tag):
+    """A number."""
+
+
+@answer.on(Tag)
+def forty_two(tag):
+    return 42
+
+
+def fresh():
+    """A kernel that has not been compiled yet."""
+
+    def asked(tag):
+        return answer(tag)
+
+    return kernel(asked)
+
+
+def refuse(*arguments, **keywords):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize(
+    "call", ["os.replace", "tempfile.mkstemp", "os.listdir", "pathlib.Path.mkdir"]
+)
+def test_a_full_disk_or_a_forbidden_folder(tmp_path, monkeypatch, call):
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    told = []
+    with monkeypatch.context() as patched, cache.telling(told.append):
+        patched.setattr(call, refuse)
+        assert fresh()(Tag()) == 42
+        assert fresh()(Tag()) == 42
+    assert len(told) == 1
+    assert f"cannot be kept in {tmp_path / 'kernels'}: {os.strerror(errno.ENOSPC)}" in told[0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert fresh()(Tag()) == 42
+    names = [path.name for path in (tmp_path / "kernels").iterdir()]
+    assert all(name.endswith(".kernel") for name in names)
+
+
+def test_room_and_other_files(tmp_path, monkeypatch):
+    """The files used least recently make room; what the cache has not named itself stays."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    folder = tmp_path / "kernels"
+    folder.mkdir()
+    (folder / "mine.kernel").write_bytes(b"0" * 100)
+    old = [folder / f"loops.total-{k:024x}-{k:024x}.kernel" for k in range(3)]
+    for age, path in enumerate(old):
+        path.write_bytes(b"0" * 100)
+        os.utime(path, (1e9 - age, 1e9 - age))
+    assert fresh()(Tag()) == 42
+    (new,) = set(folder.iterdir()) - {folder / "mine.kernel", *old}
+    assert all(path.exists() for path in old)
+    monkeypatch.setattr(cache, "ROOM", new.stat().st_size + 150)
+    new.unlink()
+    assert fresh()(Tag()) == 42
+    assert [path.exists() for path in old] == [True, False, False]
+    assert new.exists()
+    assert (folder / "mine.kernel").exists()
+
+
+def test_a_class_that_cannot_be_named_is_not_kept(tmp_path, monkeypatch):
+    """Two classes of one name would be taken for each other in another run."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+
+    class Local(NamedTuple):
+        pass
+
+    answer.on(Local)(lambda tag: 43)
+    with pytest.warns(RuntimeWarning, match=r"compiled in every run: .*Local cannot be followed"):
+        assert fresh()(Local()) == 43
+    assert not (tmp_path / "kernels").exists()
+
+
+def test_what_threads_do_is_followed(tmp_path, monkeypatch):
+    """Loops over threads are compiled apart from the function that they stand in."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+
+    def asked(tag, out):
+        for i in prange(out.size):
+            out[i] = answer(tag)
+
+    threaded = kernel(asked, parallel=True)
+    out = np.zeros(3)
+    threaded(Tag(), out)
+    assert out.tolist() == [42, 42, 42]
+    (compiled,) = threaded.overloads.values()
+    choices, codes = fingerprint.contents(compiled.library)
+    name = f"{__name__}:answer"
+    assert fingerprint.Choice(name, (f"{__name__}:Tag",)) in choices
+    assert forty_two.__code__ in codes
+
+
+def test_code_that_nothing_leads_to_is_not_kept():
+    """Code that got into a kernel by a way that is not followed could change unseen."""
+    stranger = (lambda: 0).__code__
+    with pytest.raises(fingerprint.Unknown, match=r"the way to .*lambda"):
+        fingerprint.fingerprint([refuse], (), frozenset(), frozenset([stranger]))
+
+
+# --- the wait -----------------------------------------------------------------------------------
+
+
+def test_times(tmp_path, monkeypatch):
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    (tmp_path / "kernels").mkdir()
+    assert cache.time_for("disks") is None
+    cache.keep_time("disks", 12.0)
+    cache.keep_time("slab", 20.0)
+    assert cache.time_for("disks") == 12.0
+    assert cache.time_for("another") == 20.0
+    (tmp_path / "kernels" / "times.json").write_text("{")
+    assert cache.time_for("disks") is None
+
+
+def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
+    """What it is, how long it took the last time, that it happens once; not if nobody waits."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    out = io.StringIO()
+    hub = Hub(Console(out))
+    hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
+    wait = Runner(hub)._telling_of_compilation
+    with wait():
+        assert out.getvalue() == ""
+        one, other = fresh(), fresh()
+        one(Tag())
+        other(Tag())
+    line = "Compiling the loops of this kind of scene, once (the next run starts at once) ...\n"
+    assert out.getvalue() == line
+    cache.keep_time(next(iter(cache._times())), 12.3)
+    with wait():
+        one(Tag())
+        assert out.getvalue() == line
+        kernel(lambda tag: answer(tag))(Tag())
+    assert "once: about 12 s (the next run starts at once) ..." in out.getvalue()
+    # So short a wait was not for all of it.
+    assert list(cache._times().values()) == [12.3]
+
+
+def test_a_folder_that_cannot_be_used_is_warned_of_in_a_run(tmp_path, monkeypatch):
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path / "file"))
+    (tmp_path / "file").write_text("")
+    err = io.StringIO()
+    hub = Hub(Console(io.StringIO(), err))
+    hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
+    with Runner(hub)._telling_of_compilation():
+        assert fresh()(Tag()) == 42
+        assert fresh()(Tag()) == 42
+    assert err.getvalue().count("warning") == 1
+    assert str(tmp_path / "file" / "kernels") in err.getvalue()
+    assert "KARAMELO_PY_CACHE names another folder" in err.getvalue()

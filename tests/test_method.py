@@ -1,0 +1,163 @@
+"""The command method, and parts of a step with parameters of their own, which a plug-in brings."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import block
+
+from karamelo_py.app.cli import main
+from karamelo_py.language import registry
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.points.basis.cpgimp import CPGIMPCorners, CPGIMPStretch
+from karamelo_py.points.transfers.tflip import TFLIP
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+
+PLUGIN = Path(__file__).parent / "plugin_steps"
+
+
+def update(text):
+    """What a script of commands has chosen."""
+    hub = Hub()
+    Interpreter(hub).run_text(text, "in.script")
+    return hub.update
+
+
+@pytest.fixture
+def plugin(monkeypatch):
+    """The parts of the plug-in, by the names of their classes."""
+    monkeypatch.syspath_prepend(str(PLUGIN))
+    registry.forget()
+    yield __import__("mpm_steps")
+    monkeypatch.undo()
+    registry.forget()
+
+
+def test_words_stand_in_any_order():
+    for words in ("corners, 0.5, thermo-mechanical", "0.5, thermo-mechanical, corners"):
+        chosen = update(f"method(ulmpm, FLIP, cpgimp, gradient-enhanced, {words})")
+        assert chosen.transfer == TFLIP(0.5)
+        assert type(chosen.method.basis) is CPGIMPCorners
+        assert chosen.thermal
+    chosen = update("method(ulmpm, FLIP, cpgimp, 1)")
+    assert type(chosen.method.basis) is CPGIMPStretch
+    assert not chosen.thermal
+    assert chosen.words == "ulmpm FLIP (alpha 1) cpgimp stretch musl"
+
+
+def test_a_word_in_a_variable_and_a_word_that_is_a_variable():
+    assert update('how = "thermo-mechanical"\nmethod(ulmpm, PIC, linear, how)').thermal
+    chosen = update("det = 0.3\nalpha = 0.4\nmethod(ulmpm, FLIP, cpgimp, alpha, det)")
+    assert chosen.transfer.alpha == 0.4
+    assert chosen.method.basis_name == "cpgimp det"
+
+
+@pytest.mark.parametrize(
+    ("typed", "column", "part"),
+    [
+        ("ulmpm, FLIP, linear, 1.5", 22, "'alpha' must be a number from 0 (PIC) to 1 (pure FLIP)"),
+        ("ulmpm, XPIC, linear, 2.5", 22, "'order' must be a whole number from 1 to 20, not 2.5"),
+        ("ulmpm, XPIC, linear, 21", 22, "from 1 to 20, not 21"),
+        ("ulmpm, FLIP, linear", 1, "method(ulmpm, FLIP, linear, alpha) with alpha a number from 0"),
+        ("ulmpm, FLIP, linear, time", 22, "value(time)"),
+        ("ulmpm, APIC, linear, gradient-enhanced", 22, "goes with FLIP, not with APIC"),
+        ("ulmpm, FLIP, linear, 1, det", 25, "det goes with cpgimp, not with linear"),
+        ("ulmpm, FLIP, cpgimp, 1, det, stretch", 30, "'det' was chosen already"),
+        ("ulmpm, PIC, linear, mechanical, thermo-mechanical", 33, "was chosen already"),
+        ("ulmpm, PIC, linear, 3", 21, "PIC takes no number"),
+    ],
+)
+def test_what_cannot_be_meant(typed, column, part):
+    with pytest.raises(ScriptError) as caught:
+        update(f"method({typed})")
+    assert part in caught.value.render()
+    assert caught.value.place.column == column + (7 if column > 1 else 0)
+
+
+# --- parts of a plug-in -------------------------------------------------------------------------
+
+
+def test_parameters_of_a_plug_in(plugin):
+    chosen = update("scheme(paced, 2.5)\nmethod(gapped, growing, smooth, 3, 2, 0.25, right, 7)")
+    assert chosen.transfer == plugin.Growing(3.0, 2)
+    assert chosen.method.basis == plugin.Smooth(0.25)
+    assert (chosen.method.gap, chosen.method.side) == (7.0, "right")
+    assert chosen.scheme == plugin.Paced(2.5)
+    assert not chosen.thermal
+    assert "growing (factor 3, times 2) smooth (share 0.25) paced (pace 2.5)" in chosen.words
+    # Those with a default may be left out at the end.
+    assert update("method(ulmpm, growing, smooth, 3)").transfer == plugin.Growing(3.0, 1)
+
+
+@pytest.mark.parametrize(
+    ("typed", "part"),
+    [
+        ("method(ulmpm, growing, linear, 5)", "'factor' must be a number from 0 to 4, not 5"),
+        ("method(ulmpm, growing, linear, 2, 0)", "'times' must be a whole number of at least 1"),
+        ("method(ulmpm, PIC, smooth, 2)", "'share' must be a number from 0 to 1, not 2"),
+        ("method(ulmpm, XPIC, smooth, 2, 1, 1)", "XPIC with smooth takes order, share and no"),
+        ("method(gapped, FLIP, linear, 1)", "method(gapped, FLIP, linear, 1, gap) with gap"),
+        ("method(gapped, PIC, linear, 1, middle)", "one of left, right"),
+        ("method(gapped, PIC, linear, 1, thermo-mechanical)", "is not an option"),
+        ("scheme(paced)", "scheme(paced, pace)"),
+        ("scheme(paced, 0)", "a number above 0, not 0"),
+        ("scheme(musl, 1)", "one argument too many"),
+    ],
+)
+def test_limits_of_a_plug_in(plugin, typed, part):
+    with pytest.raises(ScriptError) as caught:
+        update(typed)
+    assert part in caught.value.render()
+
+
+def test_help_shows_the_parameters(plugin, capsys):
+    for words, parts in {
+        "transfer FLIP": ("method(kind, FLIP, basis, alpha[, gradient-enhanced])", "from 0 (PIC)"),
+        "basis cpgimp": ("method(kind, transfer, cpgimp[, det|diagonal|stretch|corners])",),
+        "transfer growing": ("growing, basis, factor[, times]", "from 0 to 4", "1 when left out"),
+        "scheme paced": ("scheme(paced, pace)", "a number above 0"),
+        "method gapped": ("method(gapped, transfer, basis, gap[, left|right])",),
+    }.items():
+        assert main(["help", *words.split()]) == 0
+        out = capsys.readouterr().out
+        assert all(part in out for part in parts), out
+
+
+def test_a_name_that_is_taken_disturbs_only_scripts_that_ask_for_it(plugin):
+    assert update("method(ulmpm, PIC, linear)").words == "ulmpm PIC linear musl"
+    chosen = update("method(ulmpm, PIC, linear)")
+    assert registry.name_of("basis", type(chosen.method.basis)) == "linear"
+    with pytest.raises(ScriptError, match=r"offered by two packages: karamelo-py .* and mpm-steps"):
+        update("method(ulmpm, PIC, cubic-spline)")
+
+
+def test_a_plug_in_runs(tmp_path):
+    """A body that nothing acts on: a step multiplies its velocity by factor^times, exactly."""
+    (tmp_path / "in.script").write_text(
+        block(
+            2,
+            "fix(v, initial_velocity_particles, all, 1e-3, -2e-3)",
+            "compute(v, average_velocity, all)",
+            "log_modify(custom, step, v_x, v_y)",
+            "set_dt(1e-6)",
+            "run(5)",
+        ).replace("FLIP, linear, 1", "growing, smooth, 1.5, 2, 0.25")
+    )
+    path = os.pathsep.join([str(PLUGIN), os.environ["PYTHONPATH"]])
+    done = subprocess.run(
+        [sys.executable, "-m", "karamelo_py.app.cli", "in.script"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": path, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    step, x, y = np.loadtxt(tmp_path / "log.mpm", skiprows=1).T
+    growth = 1.5 ** (2 * step)
+    np.testing.assert_allclose(x, 1e-3 * growth, rtol=1e-9)  # ten digits
+    np.testing.assert_allclose(y, -2e-3 * growth, rtol=1e-9)  # ten digits
