@@ -22,7 +22,10 @@ def test_an_unknown_subcommand(capsys):
     assert "did you mean 'karamelo-py check'?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("subcommand", ["bench", "help", "styles", "check", "run"])
+SUBCOMMANDS = ("bench", "help", "styles", "check", "run", "sweep", "chart", "advise", "stability")
+
+
+@pytest.mark.parametrize("subcommand", SUBCOMMANDS)
 def test_help_of_subcommands(subcommand, capsys):
     assert main([subcommand, "-h"]) == 0
     explained = capsys.readouterr().out

@@ -65,6 +65,13 @@ def report(hub: Hub, end_time: float = inf) -> None:
         say(f"  {stage}")
 
 
+def bytes_per_point(simulation: Simulation) -> int:
+    """Bytes of all fields of a point, the mean over the points of all kinds."""
+    blocks = simulation.setup.blocks
+    total = sum(sum(size for *_, size in point_fields(b)) * len(b.points.id) for b in blocks)
+    return round(total / max(1, sum(len(b.points.id) for b in blocks)))
+
+
 def materials(hub: Hub, block: Any) -> list[Material]:
     """The materials of the points of this block: those in use whose laws are of its kind."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())

@@ -16,6 +16,7 @@ from karamelo_py.kernels.step import DONE
 from karamelo_py.output.console import duration
 from karamelo_py.run import diagnosis
 from karamelo_py.run.lowering import check_scene
+from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
@@ -70,8 +71,6 @@ class Runner:
             return
         hub.rehearse()
         if hub.checking:
-            from karamelo_py.run.report import report
-
             report(hub, self.end_time)
             raise Quit
         with self._telling_of_compilation():
@@ -249,6 +248,7 @@ class Runner:
                 "method": hub.update.words,
                 "points": int(simulation.present.sum()),
                 "nodes": hub.fields.node_count,
+                "bytes per particle": bytes_per_point(simulation),
                 "dt": simulation.dt,
                 "stable dt": simulation.limit,
                 "threads": simulation.threads,

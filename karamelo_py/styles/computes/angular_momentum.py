@@ -7,10 +7,11 @@ import numpy as np
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
+from karamelo_py.styles.computes.drift import Drift
 
 
 class AngularMomentum(Compute):
-    """Measure sum m (x - c) x v of points about a centre c; published as ID_x, ID_y, ID_z.
+    """Measure sum m (x - c) x v of points about a centre c, and how far it has drifted.
 
     Parameters
     ----------
@@ -26,17 +27,25 @@ class AngularMomentum(Compute):
 
     Notes
     -----
+    Publishes ID_x, ID_y, ID_z, and ID_drift, the length of the change since the first output
+    relative to the largest sum m |x - c| |v| so far.
+
     With an affine transfer (APIC) points carry angular momentum in their moment of velocity too:
     it is part of the sum, which the transfer then conserves.
+
+    See Also
+    --------
+    linear_momentum
     """
 
-    published = ("x", "y", "z")
+    published = ("x", "y", "z", "drift")
 
     def __init__(
         self, hub: Hub, group: ParticleGroup, cx: float = 0.0, cy: float = 0.0, cz: float = 0.0
     ):
         super().__init__(hub, group)
         self.centre = np.array([cx, cy, cz])
+        self._drift = Drift()
 
     def refresh(self) -> None:
         """Measure and publish."""
@@ -59,3 +68,5 @@ class AngularMomentum(Compute):
             )
             total = total + mass @ within
         self.publish_components(total)
+        scale = mass @ (np.linalg.norm(arm - self.centre, axis=1) * np.linalg.norm(v, axis=1))
+        self.publish("drift", self._drift(total, float(scale)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from karamelo_py.scene.modify import Compute
+from karamelo_py.styles.computes.columns import of_group
 
 
 class AverageTemperature(Compute):
@@ -29,5 +30,5 @@ class AverageTemperature(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        values = self.hub.fields.particle("T")[self.hub.fields.members(self.group)]
+        values = of_group(self.hub, self.group, "T")
         self.publish("", float(values.sum() / max(len(values), 1)))

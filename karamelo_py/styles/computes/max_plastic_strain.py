@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from karamelo_py.scene.modify import Compute
+from karamelo_py.styles.computes.columns import of_group
 
 
 class MaxPlasticStrain(Compute):
@@ -29,7 +30,6 @@ class MaxPlasticStrain(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        members = self.hub.fields.members(self.group)
         for published, field in (("Epmax", "ep"), ("Tmax", "T")):
-            values = self.hub.fields.particle(field)[members]
+            values = of_group(self.hub, self.group, field)
             self.publish(published, float(values.max(initial=0)))

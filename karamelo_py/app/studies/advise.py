@@ -1,0 +1,325 @@
+"""karamelo-py advise: the cheapest variant of a script that is accurate enough."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from karamelo_py.app.studies import records
+from karamelo_py.app.studies.case import environment
+from karamelo_py.app.studies.curves import column, order, usable
+from karamelo_py.app.studies.forecast import Forecast, forecast
+from karamelo_py.app.studies.options import (
+    add_combinations,
+    add_family,
+    family,
+    new_parser,
+    out_file,
+    positive,
+    seconds,
+    zipped,
+)  # fmt: skip
+from karamelo_py.app.studies.study import Study, shown, terminal
+from karamelo_py.app.studies.variables import cases, logged, number
+from karamelo_py.script.errors import ScriptError
+
+DESCRIPTION = """\
+Runs the small members of a family, fits how error and cost go on, and says which variant meets a
+target at the least cost, how sure that is, and what to write.
+
+  karamelo-py advise in.file -var N=10,20,40,80,160 -var basis=linear,cubic-spline \\
+    -accuracy err -target 1e-3
+
+One variable, the number with the most values, makes a scene finer; the others are choices. Runs go
+one at a time, since their times count, unless another cost is named. With -run the variant is run,
+and it is told whether it met the target."""
+
+
+@dataclass
+class Choice:
+    """A choice of words and what is known of its runs, coarse ones first."""
+
+    values: dict[str, str]
+    rows: list[Mapping[str, Any]] = field(default_factory=list)
+
+    @property
+    def label(self) -> str:
+        """The choice in words."""
+        return ", ".join(f"{n} = {v}" for n, v in self.values.items()) or "the script"
+
+
+@dataclass
+class Candidate:
+    """A variant that may meet the target."""
+
+    choice: Choice
+    step: int
+    cost: float
+    error: float
+    forecast: Forecast | None = None
+
+
+class Adviser:
+    """Looks for the cheapest variant whose error is at most `target`.
+
+    Parameters
+    ----------
+    study
+        Runs the variants.
+    along
+        The variable that makes a scene finer, and its values, coarse ones first.
+    choices
+        The other variables.
+    accuracy, cost
+        Columns of the table.
+    target
+        The error that is allowed.
+    """
+
+    def __init__(
+        self, study: Study, along: tuple[str, list[str]], choices: list[Choice],
+        accuracy: str, cost: str, target: float,
+    ):  # fmt: skip
+        self.study = study
+        self.name, self.values = along
+        self.xs = [float(value) for value in self.values]
+        self.choices = choices
+        self.accuracy, self.cost, self.target = accuracy, cost, target
+
+    def go_on(self, choice: Choice) -> None:
+        """Run the next finer variant of a choice."""
+        case = {**choice.values, self.name: self.values[len(choice.rows)]}
+        choice.rows += self.study.run([{name: case[name] for name in self.study.names}])
+
+    def pilot(self, count: int) -> None:
+        """Run the coarsest variants of all choices, but none beyond the target."""
+        for _ in range(min(count, len(self.values))):
+            for choice in self.choices:
+                if self._met(choice) is None:
+                    self.go_on(choice)
+
+    def _met(self, choice: Choice) -> int | None:
+        """The first of its runs that meets the target."""
+        errors = column(choice.rows, self.accuracy)
+        return next((k for k, e in enumerate(errors) if e <= self.target), None)
+
+    def candidates(self, choice: Choice, hope: bool = False) -> Iterator[Candidate]:
+        """The cheapest variant of a choice that meets the target, known or expected.
+
+        With `hope` by the lower bound of the error.
+        """
+        k = self._met(choice)
+        if k is not None:
+            row = choice.rows[k]
+            cost = column([row], self.cost)[0]
+            yield Candidate(choice, k, cost, column([row], self.accuracy)[0])
+            return
+        known = self.xs[: len(choice.rows)]
+        for step in range(len(choice.rows), len(self.xs)):
+            found = forecast(self.xs[step], known, choice.rows, self.accuracy, self.cost)
+            if found is None:
+                return
+            if (found.low if hope else found.error) <= self.target:
+                yield Candidate(choice, step, found.cost, found.error, found)
+                return
+
+    def best(self) -> Candidate | None:
+        """The cheapest candidate, after running what lies in between as far as it pays.
+
+        A choice that could become the cheapest is followed until its candidate is the next finer
+        variant, so that its order is known where it matters.
+        """
+        while True:
+            found = [c for choice in self.choices for c in self.candidates(choice)]
+            best = min(found, key=lambda c: c.cost, default=None)
+            limit = best.cost if best else inf
+            doubtful = [
+                c for choice in self.choices for c in self.candidates(choice, hope=True)
+                if c.forecast and c.step > len(c.choice.rows) and c.cost <= limit
+            ]  # fmt: skip
+            if not doubtful:
+                return best
+            self.go_on(min(doubtful, key=lambda c: c.cost).choice)
+
+
+def add_parser(subparsers: Any) -> None:
+    """The subcommand for the command line."""
+    parser = new_parser(
+        subparsers, "advise", "find the cheapest variant that is accurate enough", DESCRIPTION, run
+    )
+    add_family(parser)
+    add_combinations(parser)
+    parser.add_argument(
+        "-accuracy", required=True, metavar="COLUMN", help="log column: err, max:err"
+    )
+    parser.add_argument("-target", required=True, type=seconds, help="the error that is allowed")
+    parser.add_argument("-cost", default="seconds", help="what counts as cost (seconds)")
+    parser.add_argument("-along", metavar="NAME", help="the variable that makes the scene finer")
+    parser.add_argument("-pilot", type=positive, default=3, help="runs of each choice at first (3)")
+    parser.add_argument("-run", action="store_true", help="run what is advised")
+    parser.add_argument("-o", type=Path, default=Path("advise.csv"), help="table (advise.csv)")
+
+
+def run(options: Any) -> int:
+    """Do what the command line says; returns the exit status."""
+    out = out_file(options.o, ".csv")
+    timed = options.cost in ("seconds", "wall_s", "particle_steps_per_s")
+    values, launch, jobs = family(options, timed=timed)
+    items = records.recorded(options.accuracy, logged(options.script), options.script)
+    if len(items) != 1:
+        raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
+    if options.cost not in records.COLUMNS:
+        raise ScriptError(f"-cost {options.cost}", expected="one of " + ", ".join(records.COLUMNS))
+    numeric = [name for name in values if all(number(v) is not None for v in values[name])]
+    name = options.along or max(numeric, key=lambda n: len(values[n]), default=None)
+    if name not in numeric or len(values[name]) < 3:
+        raise ScriptError(
+            "no variable makes the scene finer" if name not in numeric
+            else f"-var {name} has {len(values[name])} values",
+            expected="a number with at least 3 values, such as -var N=10,20,40,80",
+        )  # fmt: skip
+    others = {n: v for n, v in values.items() if n != name}
+    together = zipped(options)
+    if any(name in group for group in together):
+        raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
+    combined = cases(others, together, options.where) if others else [{}]
+    choices = [Choice(case) for case in combined]
+    study = Study(launch, out.with_suffix(""), items, jobs, again=options.again)
+    study.names = list(values)
+    records.describe(
+        out, script=str(options.script), variables=values, record=[items[0].word], timed=timed,
+        repeat=1, threads=launch.threads, jobs=jobs,
+    )  # fmt: skip
+    study.on_row = lambda: records.write(out, list(study.rows.values()))
+    ordered = coarse_first(options.script, name, values[name], choices[0].values)
+    adviser = Adviser(study, (name, ordered), choices, items[0].word, options.cost, options.target)
+    adviser.pilot(options.pilot)
+    best = adviser.best()
+    tell(adviser)
+    if best is None:
+        return _nothing(adviser)
+    advise(adviser, best, options.script)
+    if not options.run:
+        return 0
+    return carry_out(adviser, best, options.script)
+
+
+def coarse_first(
+    script: Path, name: str, values: list[str], others: Mapping[str, str]
+) -> list[str]:
+    """Values in the order of the work they make, by what `karamelo-py check` says of the ends."""
+    ordered = sorted(values, key=float)
+    work = []
+    for value in (ordered[0], ordered[-1]):
+        command = [sys.executable, "-m", "karamelo_py.app.cli", "check", str(script), "--threads"]
+        command += ["1", "-var", name, value]
+        command += [w for n, v in others.items() for w in ("-var", n, v)]
+        said = subprocess.run(
+            command, capture_output=True, text=True, encoding="utf-8", env=environment()
+        ).stdout
+        points = re.search(r"^points +(\d+)", said, re.M)
+        dt = re.search(r"^first dt +([-+.\deE]+)", said, re.M)
+        work.append(float(points[1]) / float(dt[1]) if points and dt else None)
+    if None not in work and work[0] > work[1]:
+        ordered.reverse()
+    return ordered
+
+
+def tell(adviser: Adviser) -> None:
+    """Print what each choice has shown, and what is expected of it."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("choice", style="cyan", no_wrap=True)
+    headings = ("runs", f"finest {adviser.name}", adviser.accuracy, "order", "meets it at", "cost")
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    for choice in adviser.choices:
+        errors = column(choice.rows, adviser.accuracy)
+        last = choice.rows[-1]
+        found = next(adviser.candidates(choice), None)
+        if not usable(errors[-1]):
+            shown_order = f"{last['status']}: {last['reason']}"[:60]
+        else:
+            shown_order = str(order(adviser.xs[: len(errors)], errors))
+        where = "–" if found is None else adviser.values[found.step]
+        cost = "–" if found is None else shown(float(found.cost))
+        if found is not None and found.forecast:
+            cost = f"about {cost}"
+        error = shown(float(errors[-1])) if usable(errors[-1]) else "–"
+        fine = adviser.values[len(choice.rows) - 1]
+        table.add_row(choice.label, str(len(choice.rows)), fine, error, shown_order, where, cost)
+    terminal().print(table)
+
+
+def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
+    """Say what to write, and how sure it is."""
+    values = {**best.choice.values, adviser.name: adviser.values[best.step]}
+    print(f"\nfor {adviser.accuracy} <= {adviser.target:g} at the least {adviser.cost}:")
+    for name, value in values.items():
+        print(f"  {name} = {value}" if number(value) is not None else f'  {name} = "{value}"')
+    words = " ".join(f"-var {name} {value}" for name, value in values.items())
+    print(f"or: karamelo-py {script} {words}")
+    print(sureness(adviser, best))
+
+
+def sureness(adviser: Adviser, best: Candidate) -> str:
+    """How sure a candidate is, in words."""
+    said = f"{adviser.accuracy} {best.error:.3g}, {adviser.cost} {best.cost:.3g}"
+    if best.forecast is None:
+        return f"sure: it was run ({said})"
+    low, high = best.forecast.low, best.forecast.high
+    word = "almost sure" if high <= adviser.target else "likely"
+    fraction = adviser.target / best.error
+    if high > adviser.target and fraction < 1.1:
+        word = "uncertain"
+    return f"{word}: expected {said}; by its orders the error lies between {low:.3g} and {high:.3g}"
+
+
+def _nothing(adviser: Adviser) -> int:
+    """No variant meets the target: say what comes nearest."""
+    print(f"\nno variant is expected to reach {adviser.accuracy} <= {adviser.target:g}")
+    found = [
+        (column([row], adviser.accuracy)[0], choice, row)
+        for choice in adviser.choices for row in choice.rows
+    ]  # fmt: skip
+    found = [item for item in found if usable(item[0])]
+    if found:
+        error, choice, row = min(found, key=lambda item: item[0])
+        print(
+            f"nearest: {choice.label}, {adviser.name} = {row[adviser.name]} with {error:.3g}; "
+            f"finer values of {adviser.name} or other choices may do"
+        )
+    return 1
+
+
+def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
+    """Run what is advised; where it misses the target, go on with what is known then."""
+    while best is not None and best.forecast is not None:
+        advised = best.step == len(best.choice.rows)
+        adviser.go_on(best.choice)
+        row = best.choice.rows[-1]
+        error = column([row], adviser.accuracy)[0]
+        word = "met" if error <= adviser.target else "missed" if advised else "not yet met"
+        said = f"{best.choice.label}, {adviser.name} = {row[adviser.name]}"
+        print(f"\nrun: {said}: {adviser.accuracy} {error:.4g}, the target is {word}")
+        if row["reason"]:
+            print(f"{row['status']}: {row['reason']}")
+        best = adviser.best()
+        if best is not None and best.forecast is not None:
+            advise(adviser, best, script)
+    if best is None:
+        return _nothing(adviser)
+    row = best.choice.rows[best.step]
+    print(
+        f"\nthe target is met: {best.choice.label}, {adviser.name} = {row[adviser.name]} with "
+        f"{adviser.accuracy} {best.error:.4g} at {adviser.cost} {best.cost:.4g}; "
+        f"its files are in {row['folder']}"
+    )
+    return 0

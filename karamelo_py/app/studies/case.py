@@ -1,0 +1,284 @@
+"""One run of a study: a process of its own in a folder of its own, and what is read from it."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+import signal
+import statistics
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import karamelo_py
+
+KEPT = "case.json"
+# Facts are indented by 2, the parts of the time by 4.
+_FACT = re.compile(r"^( {2}| {4})(\S.*?) {2,}(\S.*)$")
+_ERROR = re.compile(r"(?:^|: )error: (.*)")
+
+
+@dataclass
+class Outcome:
+    """What became of a case.
+
+    Attributes
+    ----------
+    status
+        ``done``, ``failed`` (the script ended with an error), ``too long`` or ``killed``.
+    reason
+        Why, of what did not end well; the message of the program.
+    facts
+        Numbers of the run: seconds, points, steps and so on, see `COLUMNS`.
+    folder
+        Where its files are.
+    """
+
+    status: str
+    reason: str = ""
+    facts: dict[str, float] = field(default_factory=dict)
+    folder: Path = Path()
+
+
+# What is measured of every run beside the log, with its meaning.
+COLUMNS = {
+    "seconds": "seconds in the stepping loop, without compilation and output",
+    "seconds_spread": "largest less smallest of the repetitions",
+    "particle_steps_per_s": "steps times points over seconds",
+    "steps": "steps of all runs of the script",
+    "points": "points at the beginning",
+    "dt": "the first step",
+    "stable_dt": "the largest stable step at the beginning",
+    "bytes_per_particle": "bytes of all fields of a point, the mean over points",
+    "peak_memory_mib": "largest resident memory of the process, MiB",
+    "wall_s": "seconds of the whole process",
+}
+
+
+class Stop(Exception):
+    """The study is to end now; what runs is taken down."""
+
+
+@dataclass
+class Launch:
+    """How the cases of a study are run.
+
+    Attributes
+    ----------
+    script
+        The script.
+    threads
+        Threads of each run, None for the program's own choice.
+    repeat
+        How often each is run; the time is the median.
+    limit
+        Seconds after which a run is given up, or None.
+    stop
+        Set when the study is to end.
+    """
+
+    script: Path
+    threads: int | None = 1
+    repeat: int = 1
+    limit: float | None = None
+    texts: tuple[str, ...] = ()
+    stop: threading.Event = field(default_factory=threading.Event)
+
+    def key(self, case: Mapping[str, str]) -> str:
+        """What a result belongs to: it is used again only for the very same."""
+        said = [karamelo_py.__version__, *self.texts, str(self.threads), str(self.repeat)]
+        said += [f"{name}={value}" for name, value in case.items()]
+        said.append(os.environ.get("NUMBA_DISABLE_JIT", "0"))
+        return hashlib.sha256("\0".join(said).encode()).hexdigest()
+
+    def kept(self, case: Mapping[str, str], folder: Path) -> Outcome | None:
+        """What became of this case in an earlier study, if the same was run in this folder."""
+        try:
+            found = json.loads((folder / KEPT).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        if found.get("key") != self.key(case):
+            return None
+        if found["status"] == "killed":
+            return None  # Somebody else's doing, which the next time may not come.
+        # A run that was given up is tried again when it may take longer.
+        if found["status"] == "too long" and (self.limit or 1e300) > found["facts"]["wall_s"]:
+            return None
+        return Outcome(found["status"], found["reason"], found["facts"], folder)
+
+    def run(self, case: Mapping[str, str], folder: Path) -> Outcome:
+        """Run a case and keep what became of it."""
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / KEPT).unlink(missing_ok=True)
+        outcomes = []
+        for _ in range(self.repeat):
+            outcomes.append(self._once(case, folder))
+            if outcomes[-1].status != "done":
+                break
+        outcome = outcomes[-1]
+        seconds = [o.facts["seconds"] for o in outcomes if "seconds" in o.facts]
+        if self.repeat > 1 and seconds:
+            facts = outcome.facts
+            facts["seconds"] = statistics.median(seconds)
+            facts["seconds_spread"] = max(seconds) - min(seconds)
+            if facts["seconds"] > 0:
+                work = facts["steps"] * facts["points"]
+                facts["particle_steps_per_s"] = work / facts["seconds"]
+        record = {
+            "key": self.key(case),
+            "variables": dict(case),
+            "status": outcome.status,
+            "reason": outcome.reason,
+            "facts": outcome.facts,
+        }
+        part = folder / (KEPT + ".part")
+        part.write_text(json.dumps(record, indent=1), encoding="utf-8")
+        part.replace(folder / KEPT)
+        return outcome
+
+    def _once(self, case: Mapping[str, str], folder: Path) -> Outcome:
+        command = [sys.executable, "-m", "karamelo_py.app.cli", str(self.script.resolve())]
+        for name, value in case.items():
+            command += ["-var", name, value]
+        command += ["--threads", str(self.threads or "auto")]
+        (folder / "log.mpm").unlink(missing_ok=True)
+        begun = time.perf_counter()
+        with (
+            (folder / "out.txt").open("w", encoding="utf-8") as out,
+            (folder / "err.txt").open("w", encoding="utf-8") as err,
+        ):
+            process = subprocess.Popen(
+                command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=err,
+                env=environment(), start_new_session=os.name == "posix",
+            )  # fmt: skip
+            memory, overdue = self._wait(process, begun)
+        said = (folder / "out.txt").read_text(encoding="utf-8", errors="replace")
+        facts = read_facts(said)
+        facts["wall_s"] = time.perf_counter() - begun
+        if memory:
+            facts["peak_memory_mib"] = memory
+        if overdue:
+            return Outcome("too long", f"given up after {self.limit:g} s", facts, folder)
+        if process.returncode < 0:
+            reason = f"ended by signal {-process.returncode}"
+            return Outcome("killed", reason, facts, folder)
+        if process.returncode:
+            complaint = (folder / "err.txt").read_text(encoding="utf-8", errors="replace")
+            return Outcome("failed", reason_in(complaint), facts, folder)
+        return Outcome("done", "", facts, folder)
+
+    def _wait(self, process: subprocess.Popen, begun: float) -> tuple[float | None, bool]:
+        """Wait for the end; the peak memory in MiB, where known, and whether it was late."""
+        pause, memory = 0.005, None
+        while process.returncode is None:
+            if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
+                if hasattr(os, "wait4"):
+                    os.kill(process.pid, signal.SIGKILL)  # Popen.kill might reap it before wait4.
+                else:
+                    process.kill()
+            if hasattr(os, "wait4"):
+                number, status, usage = os.wait4(process.pid, os.WNOHANG)
+                if number:
+                    process.returncode = os.waitstatus_to_exitcode(status)
+                    # Linux counts kibibytes, macOS bytes.
+                    memory = usage.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+            else:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(0)
+            if process.returncode is None:
+                time.sleep(pause)
+                pause = min(1.5 * pause, 0.1)
+        if self.stop.is_set():
+            raise Stop
+        late = bool(self.limit) and time.perf_counter() - begun > self.limit
+        return memory, late and process.returncode != 0
+
+
+def environment() -> dict[str, str]:
+    """The environment of a run: it runs this very program, wherever it starts."""
+    paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+
+
+def read_facts(said: str) -> dict[str, float]:
+    """The numbers in what the program says at the beginning and the end of each run."""
+    facts: dict[str, float] = {}
+    seconds = steps = 0.0
+    for line in said.splitlines():
+        match = _FACT.match(line)
+        if not match:
+            continue
+        part, name, text = len(match[1]) == 4, match[2], match[3]
+        value = _leading_number(text)
+        if value is None:
+            continue
+        if name in ("points", "nodes", "dt", "stable dt", "bytes per particle"):
+            facts.setdefault(name.replace(" ", "_"), value)
+        elif name == "steps" and part:
+            seconds += value
+        elif name == "steps":
+            steps += value
+    if steps:
+        facts["steps"] = steps
+        facts["seconds"] = seconds
+        if seconds > 0 and "points" in facts:
+            facts["particle_steps_per_s"] = steps * facts["points"] / seconds
+    return facts
+
+
+def _leading_number(text: str) -> float | None:
+    match = re.match(r"[-+]?(\d[\d ]*\d|\d)?(\.\d+)?([eE][-+]?\d+)?", text.strip())
+    try:
+        return float(match[0].replace(" ", "")) if match else None
+    except ValueError:
+        return None
+
+
+def reason_in(complaint: str) -> str:
+    """The message of an error, without its place and its remedy."""
+    for line in complaint.splitlines():
+        match = _ERROR.search(line)
+        if match:
+            return match[1].strip()
+    lines = [line for line in complaint.splitlines() if line.strip()]
+    return lines[-1].strip() if lines else "ended without a message"
+
+
+def read_log(folder: Path) -> dict[str, np.ndarray]:
+    """The columns of log.mpm in a folder; where they change between runs, all rows of a column."""
+    columns: dict[str, list[float]] = {}
+    names: list[str] = []
+    try:
+        lines = (folder / "log.mpm").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return {}
+    for k, line in enumerate(lines):
+        if k == 0 or line.startswith("#"):
+            names = line.lstrip("# ").split()
+            continue
+        cells = line.split()
+        # The last line of a run that was killed may be cut.
+        if len(cells) == len(names):
+            with contextlib.suppress(ValueError):
+                for name, value in zip(names, [float(cell) for cell in cells], strict=True):
+                    columns.setdefault(name, []).append(value)
+    return {name: np.array(values) for name, values in columns.items()}
+
+
+def folder_name(case: Mapping[str, Any]) -> str:
+    """A folder for a case, named after its values."""
+    said = ",".join(f"{name}={value}" for name, value in case.items())
+    plain = re.sub(r"[^\w.,=+-]", "_", said)
+    if plain == said and len(plain) < 100:
+        return plain
+    return f"{plain[:80]}-{hashlib.sha256(said.encode()).hexdigest()[:8]}"

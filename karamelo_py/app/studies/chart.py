@@ -1,0 +1,133 @@
+"""karamelo-py chart: what accuracy costs, how errors fall, where two variables lead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.app.studies import pictures, records
+from karamelo_py.app.studies.curves import Family, missing, order
+from karamelo_py.app.studies.options import new_parser, out_file
+from karamelo_py.app.studies.study import shown, terminal
+from karamelo_py.app.studies.variables import holds
+from karamelo_py.script.errors import ScriptError
+
+DESCRIPTION = """\
+Draws the table of a sweep: errors over costs on logarithmic axes, a line for each choice, and the
+Pareto front (runs that none beats in both). Prints the same as a table, with fitted orders.
+
+  karamelo-py chart sweep.csv -accuracy err -cost seconds -by basis,transfer -o chart.png
+  karamelo-py chart sweep.csv -accuracy err -x N -o orders.svg       errors over a variable
+  karamelo-py chart sweep.csv -accuracy err -heat N,ppc -o heat.pdf  over two variables
+  karamelo-py chart sweep.csv -accuracy err -o chart.html            a page of runs"""
+SUFFIXES = (".png", ".svg", ".pdf", ".html")
+
+
+def add_parser(subparsers: Any) -> None:
+    """The subcommand for the command line."""
+    parser = new_parser(subparsers, "chart", "draw a table of runs", DESCRIPTION, run)
+    parser.add_argument("table", type=Path, help="what karamelo-py sweep has written")
+    parser.add_argument("-accuracy", required=True, metavar="COLUMN", help="the error")
+    parser.add_argument("-cost", default="seconds", metavar="COLUMN", help="the cost (seconds)")
+    parser.add_argument("-by", default="", metavar="A,B", help="variables that tell lines apart")
+    kinds = parser.add_mutually_exclusive_group()
+    kinds.add_argument("-x", metavar="NAME", help="errors over this variable, not over cost")
+    kinds.add_argument("-heat", metavar="A,B", help="errors over two variables, as colours")
+    parser.add_argument("-where", action="append", default=[], help="rows that fulfil a condition")
+    parser.add_argument("-title", help="heads the chart (the name of the script)")
+    parser.add_argument("-o", type=Path, help="the picture or page: " + ", ".join(SUFFIXES))
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+
+
+def run(options: Any) -> int:
+    """Do what the command line says; returns the exit status."""
+    rows = records.read(options.table)
+    made = {"table": options.table.name, **records.beside(options.table)}
+    if "folder" not in rows[0] and "variables" not in made:
+        raise ScriptError(
+            f"{options.table} does not say which columns are variables",
+            expected=f"{options.table.with_suffix('.json')}, which sweep writes beside it",
+        )
+    variables = list(made.get("variables") or list(rows[0])[: list(rows[0]).index("seconds")])
+    words = {row[name] for row in rows for name in variables}
+    for condition in options.where:
+        rows = [r for r in rows if holds(condition, {n: r[n] for n in variables}, words)]
+    if not rows:
+        raise ScriptError("no row fulfils -where " + " and ".join(options.where))
+    by = [name.strip() for name in options.by.split(",") if name.strip()]
+    family = Family(rows, variables, options.accuracy, options.cost, by, options.x)
+    if len(family.without) == len(rows):
+        raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
+    out = out_file(options.o, *SUFFIXES) if options.o else None
+    title = options.title if options.title is not None else Path(made.get("script", "")).name
+    axes = [name.strip() for name in (options.heat or "").split(",") if name.strip()]
+    for name in axes:
+        if name not in variables:
+            raise missing("-heat", name, variables)
+    if options.heat and len(axes) != 2:
+        raise ScriptError(f"-heat {options.heat}", expected="two variables: -heat N,ppc")
+    if not options.x and not axes and not any(line.shown(line.cost).any() for line in family.lines):
+        raise ScriptError(f"no run has a value of '{options.cost}' above 0")
+    tell(family, made)
+    if out is None:
+        return 0
+    if out.suffix.lower() == ".html":
+        if axes:
+            raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
+        from karamelo_py.app.studies import page
+
+        page.write(family, rows, out, convergence=bool(options.x), title=title or "runs", made=made)
+    elif axes:
+        pictures.heat(family, rows, *axes, out, title)
+    else:
+        pictures.lines(family, out, convergence=bool(options.x), title=title)
+    print(f"drawn: {out}")
+    return 0
+
+
+def tell(family: Family, made: dict) -> None:
+    """Print the runs by cost with the Pareto front marked, and the order of each line."""
+    from rich.table import Table
+
+    front = {id(row) for row in family.front()}
+    table = Table(box=None, pad_edge=False)
+    for name in family.by:
+        table.add_column(name, style="cyan", no_wrap=True)
+    for name in [family.along, family.cost, family.accuracy]:
+        if name:
+            table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("Pareto", no_wrap=True)
+    members = [
+        (cost, x, error, line, row)
+        for line in family.lines
+        for cost, x, error, row in zip(line.cost, line.x, line.error, line.rows, strict=True)
+    ]
+    for cost, x, error, line, row in sorted(members, key=lambda m: (np.isnan(m[0]), m[0])):
+        numbers = [shown(float(x))] if family.along else []
+        numbers += [shown(float(a)) if np.isfinite(a) else "–" for a in (cost, error)]
+        end = "front" if id(row) in front else ""
+        if np.isnan(error):
+            end = (row.get("status", "") + ": " + row.get("reason", ""))[:70]
+        table.add_row(*line.choice.values(), *numbers, end)
+    console = terminal()
+    console.print(table)
+    orders = Table(box=None, pad_edge=False, title="\norders, of all and between neighbours",
+                   title_justify="left")  # fmt: skip
+    orders.add_column("", style="cyan", no_wrap=True)
+    orders.add_column(f"{family.accuracy} by {family.cost}", justify="right")
+    if family.along:
+        orders.add_column(f"{family.accuracy} by {family.along}", justify="right")
+        orders.add_column(f"{family.cost} by {family.along}", justify="right")
+    for line in family.lines:
+        cells = [str(order(line.cost, line.error))]
+        if family.along:
+            cells += [str(order(line.x, line.error)), str(order(line.x, line.cost))]
+        orders.add_row(line.label, *cells)
+    console.print(orders)
+    if family.cost == "seconds" and made.get("timed") is False:
+        print(
+            "note: these runs went side by side, their times disturb each other; "
+            "sweep -time measures"
+        )

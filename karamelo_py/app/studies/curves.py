@@ -1,0 +1,186 @@
+"""What a table of runs shows: lines of ever finer runs, their orders, the Pareto front."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.app.studies.records import value
+from karamelo_py.app.studies.variables import number
+from karamelo_py.script.errors import ScriptError, nearest
+
+
+@dataclass
+class Order:
+    """The exponent of a power law y = c x^exponent, fitted to logarithms by least squares.
+
+    Attributes
+    ----------
+    exponent
+        Of the fit; NaN with fewer than two points.
+    lowest, highest
+        Exponents between neighbouring points.
+    """
+
+    exponent: float
+    lowest: float
+    highest: float
+
+    def __str__(self) -> str:
+        if not isfinite(self.exponent):
+            return "–"
+        if self.highest - self.lowest < 5e-3:
+            return f"{self.exponent:.2f}"
+        return f"{self.exponent:.2f} ({self.lowest:.2f} to {self.highest:.2f})"
+
+
+def order(x: Sequence[float], y: Sequence[float]) -> Order:
+    """The order of y in x; points that have no logarithm are left out."""
+    pairs = sorted((a, b) for a, b in zip(x, y, strict=True) if usable(a) and usable(b))
+    logs = np.log(np.array(pairs).reshape(-1, 2))
+    if len(np.unique(logs[:, 0])) < 2:
+        return Order(np.nan, np.nan, np.nan)
+    slope = np.polyfit(logs[:, 0] - logs[:, 0].mean(), logs[:, 1], 1)[0]
+    run, rise = np.diff(logs, axis=0).T
+    local = rise[run > 0] / run[run > 0]
+    return Order(float(slope), float(local.min()), float(local.max()))
+
+
+def usable(a: float | None) -> bool:
+    """Whether a number can stand on a logarithmic axis."""
+    return a is not None and 0 < a < inf
+
+
+@dataclass
+class Line:
+    """Runs that differ in one variable only.
+
+    Attributes
+    ----------
+    choice
+        Values of the other variables that differ between lines.
+    rows
+        Rows of the table, in the order of that variable.
+    x, cost, error
+        Numbers of each, NaN where there is none.
+    """
+
+    choice: dict[str, str]
+    rows: list[Mapping[str, str]] = field(default_factory=list)
+    x: np.ndarray = field(default_factory=lambda: np.empty(0))
+    cost: np.ndarray = field(default_factory=lambda: np.empty(0))
+    error: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def label(self) -> str:
+        """The choice in words; a bare number says what it is the value of."""
+        parts = [v if number(v) is None else f"{n} = {v}" for n, v in self.choice.items()]
+        return ", ".join(parts) or "all"
+
+    def shown(self, along: np.ndarray) -> np.ndarray:
+        """Which members have a place in a diagram of errors over `along`."""
+        return np.isfinite(self.error) & (self.error > 0) & np.isfinite(along) & (along > 0)
+
+
+class Family:
+    """A table of runs as lines.
+
+    Parameters
+    ----------
+    rows
+        Rows of the table.
+    variables
+        Names of its variables.
+    accuracy, cost
+        Columns to compare.
+    by
+        Variables whose values tell the lines apart; others that differ are added.
+    along
+        The variable that differs along a line; by default the number with the most values.
+
+    Raises
+    ------
+    ScriptError
+        For columns that the table does not have.
+    """
+
+    def __init__(
+        self,
+        rows: Sequence[Mapping[str, str]],
+        variables: Sequence[str],
+        accuracy: str,
+        cost: str,
+        by: Sequence[str] = (),
+        along: str | None = None,
+    ):
+        for option, name in (("-accuracy", accuracy), ("-cost", cost)):
+            require(rows, option, name)
+        for option, names in (("-by", by), ("-x", [along] if along else [])):
+            for name in names:
+                if name not in variables:
+                    raise missing(option, name, variables)
+        values = {name: list(dict.fromkeys(row[name] for row in rows)) for name in variables}
+        differing = [name for name in variables if len(values[name]) > 1]
+        numbers = [
+            name for name in differing
+            if name not in by and all(number(v) is not None for v in values[name])
+        ]  # fmt: skip
+        self.along = along or max(numbers, key=lambda name: len(values[name]), default=None)
+        self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
+        self.accuracy, self.cost, self.variables = accuracy, cost, list(variables)
+        self.lines = self._lines(rows)
+        self.without = [row for row in rows if not usable(value(row, accuracy))]
+
+    def _lines(self, rows: Sequence[Mapping[str, str]]) -> list[Line]:
+        found: dict[tuple[str, ...], Line] = {}
+        for row in rows:
+            key = tuple(row[name] for name in self.by)
+            line = found.setdefault(key, Line(dict(zip(self.by, key, strict=True))))
+            line.rows.append(row)
+        for line in found.values():
+            if self.along:
+                line.rows.sort(key=lambda row: number(row[self.along]))
+            line.x = column(line.rows, self.along) if self.along else np.zeros(len(line.rows))
+            line.cost, line.error = column(line.rows, self.cost), column(line.rows, self.accuracy)
+        return list(found.values())
+
+    def front(self) -> list[Mapping[str, str]]:
+        """The Pareto front: runs that none beats in both cost and error, cheapest first."""
+        members = [
+            (c, e, k, row)
+            for line in self.lines
+            for k, (c, e, row) in enumerate(zip(line.cost, line.error, line.rows, strict=True))
+            if usable(c) and usable(e)
+        ]
+        best, found = inf, []
+        for _, error, _, row in sorted(members, key=lambda m: m[:3]):
+            if error < best:
+                best = error
+                found.append(row)
+        return found
+
+
+def column(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
+    """The numbers of a column, NaN where there is none."""
+    found = [value(row, name) for row in rows]
+    return np.array([np.nan if a is None else a for a in found], float)
+
+
+def require(rows: Sequence[Mapping[str, str]], option: str, name: str) -> None:
+    """See that a table has a column."""
+    if name not in rows[0]:
+        raise missing(option, name, list(rows[0]))
+
+
+def missing(option: str, name: str, known: Sequence[str]) -> ScriptError:
+    """The error for a column or a variable that the table does not have."""
+    close = nearest(name, known)
+    return ScriptError(
+        f"{option}: the table has no '{name}'",
+        expected="one of " + ", ".join(known),
+        hint=f"did you mean '{close}'?" if close else None,
+    )

@@ -1,0 +1,170 @@
+"""How charts of studies look: the same colour for the same method everywhere, also in grey."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from math import ceil, floor, log10
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.app.studies.variables import number
+
+# After Okabe & Ito, for eyes that see colours differently; each has a marker of its own, so that a
+# chart printed in grey can still be read.
+PALETTE = (
+    "#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c510a",
+    "#7a7a7a",
+)  # fmt: skip
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
+DASHES = (
+    "-",
+    (0, (5, 2)),
+    (0, (1, 1.5)),
+    (0, (5, 1.5, 1, 1.5)),
+    (0, (9, 3)),
+    (0, (3, 1, 1, 1, 1, 1)),
+)
+PLOTLY_DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+PLOTLY_MARKERS = (
+    "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
+    "triangle-left", "triangle-right",
+)  # fmt: skip
+FAMILIES = (
+    ("linear", "quadratic-spline", "cubic-spline", "Bernstein-quadratic", "ugimp", "cpgimp"),
+    ("FLIP", "APIC", "PIC", "MLS", "TPIC", "TFLIP", "AFLIP", "ASFLIP", "XPIC"),
+    ("ulmpm", "tlmpm", "ulcpdi", "tlcpdi", "ulmpm/contacts"),
+    ("musl", "usl", "usf", "usavg"),
+)
+LABELS = {
+    "seconds": "time of the stepping loop (s)",
+    "wall_s": "time of the process (s)",
+    "peak_memory_mib": "peak memory (MiB)",
+    "bytes_per_particle": "bytes per particle",
+    "particle_steps_per_s": "particle-steps per second",
+    "points": "points",
+    "steps": "steps",
+    "dt": "first step (time of the script)",
+}
+
+
+def place(word: str, others: Sequence[str] = ()) -> int:
+    """The number of a word's colour and marker: fixed for methods, else in the order of values."""
+    for family in FAMILIES:
+        if word in family:
+            return family.index(word) % len(PALETTE)
+    if word in others:
+        return list(others).index(word) % len(PALETTE)
+    return int(hashlib.sha256(word.encode()).hexdigest(), 16) % len(PALETTE)
+
+
+def style(choice: dict[str, str], values: dict[str, list[str]]) -> tuple[str, int, int]:
+    """Colour, number of the marker and number of the dashes of a line.
+
+    The first variable gives colour and marker, the second the dashes.
+    """
+    names = list(choice)
+    if not names:
+        return PALETTE[0], 0, 0
+    first = choice[names[0]]
+    k = place(first, values[names[0]])
+    colour = PALETTE[k]
+    if all(number(v) is not None for v in values[names[0]]) and len(values[names[0]]) > 1:
+        # Numbers are in order: dark to light.
+        from matplotlib import colormaps
+        from matplotlib.colors import to_hex
+
+        ranked = sorted(values[names[0]], key=number)
+        colour = to_hex(colormaps["viridis"](0.85 * ranked.index(first) / (len(ranked) - 1)))
+    rest = [place(choice[n], values[n]) for n in names[1:]]
+    return colour, k, sum(rest) % len(DASHES)
+
+
+def label(name: str) -> str:
+    """The title of an axis."""
+    return LABELS.get(name, name)
+
+
+def tick_text(a: float, _: Any = None) -> str:
+    """A number at an axis: 0.02, 500, 3·10^-7."""
+    if a == 0 or 1e-3 <= abs(a) < 1e5:
+        return f"{a:g}"
+    exponent = floor(log10(abs(a)) + 1e-9)
+    lead = a / 10**exponent
+    tens = f"10^{{{exponent}}}"
+    return f"${tens}$" if abs(lead - 1) < 1e-9 else rf"${lead:g}\cdot{tens}$"
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Round numbers on a logarithmic axis: at 1, 2 and 5, at 1, or at every so many decades."""
+    decades = log10(high / low)
+    leads = (1, 2, 5) if decades < 2.5 else (1,)
+    every = 1 if decades < 9 else ceil(decades / 8)
+    exponents = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)
+    ticks = [lead * 10.0**k for k in exponents if k % every == 0 for lead in leads]
+    return [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+
+
+def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None = None) -> None:
+    """Make an axis logarithmic, with real numbers at its ticks; `values` if they are few."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+    axes = axis.axes
+    (axes.set_xscale if axis.axis_name == "x" else axes.set_yscale)("log")
+    pad = (high / low) ** 0.06 if high > low else 1.5
+    low, high = low / pad, high * pad
+    (axes.set_xlim if axis.axis_name == "x" else axes.set_ylim)(low, high)
+    distinct = sorted(set(values or ()))
+    axis.set_major_locator(
+        FixedLocator(distinct if 0 < len(distinct) <= 9 else log_ticks(low, high))
+    )
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(tick_text))
+
+
+def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.ndarray:
+    """Places near the wanted ones, in the same order, none nearer to another than `gap`.
+
+    Between `low` and `high` as long as there is room.
+    """
+    rank = np.argsort(wanted, kind="stable")
+    places = np.asarray(wanted, float)[rank]
+    gap = min(gap, (high - low) / max(len(places) - 1, 1))
+    for k in range(1, len(places)):
+        places[k] = max(places[k], places[k - 1] + gap)
+    limit = high
+    for k in range(len(places) - 1, -1, -1):
+        places[k] = min(places[k], limit)
+        limit = places[k] - gap
+    limit = low
+    for k in range(len(places)):
+        places[k] = max(places[k], limit)
+        limit = places[k] + gap
+    found = np.empty(len(places))
+    found[rank] = places
+    return found
+
+
+def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
+    """Names of lines in a column beside the axes, each joined to the end of its line.
+
+    Parameters
+    ----------
+    ends
+        x and y of the end of each line, its name and its colour.
+    """
+    if not ends:
+        return
+    to_axes = axes.transData + axes.transAxes.inverted()
+    at = np.array([to_axes.transform((x, y)) for x, y, *_ in ends])
+    size = 9 if len(ends) <= 16 else 7
+    places = apart(at[:, 1], 0.0052 * size, 0.0, 1.0)
+    for (_, _, name, colour), (x, y), place in zip(ends, at, places, strict=True):
+        axes.plot(
+            [x, 1.0, 1.03], [y, place, place], transform=axes.transAxes, clip_on=False,
+            color=colour, linewidth=0.6, alpha=0.6, zorder=1,
+        )  # fmt: skip
+        axes.text(
+            1.04, place, name, transform=axes.transAxes, color=colour, fontsize=size, va="center"
+        )

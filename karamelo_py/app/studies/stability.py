@@ -1,0 +1,321 @@
+"""karamelo-py stability: where a script is stable, where its energy grows, where it fails."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from math import ceil, isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.app.studies import records
+from karamelo_py.app.studies.case import read_log
+from karamelo_py.app.studies.frontier import Cell, explore
+from karamelo_py.app.studies.options import (
+    add_family,
+    family,
+    new_parser,
+    out_file,
+    positive,
+    seconds,
+)
+from karamelo_py.app.studies.study import Study
+from karamelo_py.app.studies.variables import logged, number
+from karamelo_py.output.figures import blank_figure
+from karamelo_py.output.files import savefig
+from karamelo_py.script.errors import ScriptError, nearest
+
+DESCRIPTION = """\
+Maps where a script is stable over one or two of its variables: stable, growing (its energy exceeds
+a bound), or failed, with the reason. Edges are searched by halves: cells between like ones are not
+run. The table is written beside the picture (map.csv); -var with one value is passed on.
+
+  karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
+
+The script logs an energy that should stay about the same, such as Ek + Es."""
+ENERGIES = ("Etot", "E_total", "Ek+Es", "Ek_s+Es_s", "Ek+Es+Ed", "Ek", "Ek_s")
+CLASSES = ("stable", "growing", "failed")
+COLOURS = {"stable": "#d9ecf7", "growing": "#f0a53c", "failed": "#7d2a3a"}  # light to dark
+# What the program says of failures, in short.
+REASONS = {
+    r"det F": "det F <= 0",
+    r"not a number|NaN": "NaN",
+    r"thrown out|leaves the domain|left the domain": "point lost",
+    r"cells in one step": "point moves more than a cell",
+    r"stable step has fallen": "stable step collapsed",
+    r"stable limit, which has fallen": "step above the limit",
+    r"tangled": "domain of a point tangled",
+    r"temperature": "temperature out of bounds",
+}
+
+
+def add_parser(subparsers: Any) -> None:
+    """The subcommand for the command line."""
+    parser = new_parser(subparsers, "stability", "map where a method is stable", DESCRIPTION, run)
+    add_family(parser)
+    parser.add_argument("-energy", metavar="COLUMN", help="log column that should not grow")
+    parser.add_argument(
+        "-bound", type=seconds, default=2.0,
+        help="growing: energy above this times the largest of the first tenth of the log (2)",
+    )  # fmt: skip
+    parser.add_argument("-stride", type=positive, default=6, help="cells between first runs (6)")
+    parser.add_argument("-o", type=Path, default=Path("map.png"), help="the picture (map.png)")
+
+
+def run(options: Any) -> int:
+    """Do what the command line says; returns the exit status."""
+    out = out_file(options.o, ".png", ".svg", ".pdf")
+    values, launch, jobs = family(options)
+    axes = [name for name in values if len(values[name]) > 1]
+    for name in axes:
+        if any(number(value) is None for value in values[name]):
+            raise ScriptError(f"-var {name}: not numbers", expected=f"-var {name}=0.1:2:20")
+    if not 1 <= len(axes) <= 2:
+        raise ScriptError(
+            f"{len(axes)} variables have several values",
+            expected="one or two, such as -var dt_factor=0.1:2:20 -var xi=0:1:20",
+        )
+    for name in axes:
+        values[name].sort(key=float)
+    energy = energy_column(options.energy, logged(options.script), options.script)
+    table = out.with_suffix(".csv")
+    items = [records.Recorded(f"max:{energy}")]
+    study = Study(launch, out.with_suffix(""), items, jobs, again=options.again)
+    records.describe(
+        table, script=str(options.script), variables=values, energy=energy, bound=options.bound,
+        threads=launch.threads, jobs=jobs,
+    )  # fmt: skip
+    chart = Map(study, values, axes, energy, options.bound, out.parent)
+    known, inferred = explore(chart.shape, chart.classify, options.stride)
+    rows = chart.rows(known, inferred)
+    records.write(table, rows)
+    chart.draw(known, inferred, out, options.script.name)
+    chart.tell(known, inferred)
+    print(f"drawn: {out}; the table is {table}")
+    return 0
+
+
+def energy_column(asked: str | None, headings: Sequence[str] | None, script: Path) -> str:
+    """The log column to watch.
+
+    Raises
+    ------
+    ScriptError
+        If the script does not log it, or logs no energy that is known by its name.
+    """
+    if asked is not None:
+        return records.recorded(asked, headings, script)[0].column
+    for name in ENERGIES:
+        if headings is None or name in headings:
+            return name
+    close = nearest("Ek+Es", headings or [])
+    raise ScriptError(
+        f"{script} logs no energy under a usual name",
+        expected="-energy COLUMN, or log_modify(custom, step, dt, time, Ek + Es) in the script",
+        hint=f"-energy {close}" if close else None,
+    )
+
+
+def growth(energy: np.ndarray, bound: float) -> float:
+    """The largest energy over the largest of the first tenth of the outputs; inf for NaN."""
+    if not len(energy):
+        return 0.0
+    if not np.isfinite(energy).all():
+        return np.inf
+    scale = np.abs(energy[: max(1, ceil(0.1 * len(energy)))]).max()
+    if scale == 0:
+        # From rest: what is usual stands for the beginning.
+        scale = float(np.median(np.abs(energy)))
+    largest = float(np.abs(energy).max())
+    return largest / scale if scale > 0 else (np.inf if largest > 0 else 0.0)
+
+
+def in_short(row: Mapping[str, Any]) -> str:
+    """The reason of a failure in a few words."""
+    if row["status"] == "too long":
+        return "too long"
+    for pattern, words in REASONS.items():
+        if re.search(pattern, row["reason"]):
+            return words
+    return str(row["reason"])[:40]
+
+
+class Map:
+    """The plane of a stability map.
+
+    Parameters
+    ----------
+    study
+        Runs the cases.
+    values, axes
+        Values of all variables, and the names of the one or two that vary.
+    energy, bound
+        The log column to watch, and how much it may grow.
+    folder
+        What folders in the table are relative to.
+    """
+
+    def __init__(
+        self, study: Study, values: dict[str, list[str]], axes: list[str], energy: str,
+        bound: float, folder: Path,
+    ):  # fmt: skip
+        self.study, self.values, self.axes = study, values, axes
+        self.energy, self.bound, self.folder = energy, bound, folder
+        self.shape = (len(values[axes[0]]), len(values[axes[1]]) if len(axes) > 1 else 1)
+        self.found: dict[Cell, dict[str, Any]] = {}
+
+    def case(self, cell: Cell) -> dict[str, str]:
+        """The values of the variables of a cell."""
+        at = dict(zip(self.axes, cell, strict=False))
+        return {name: values[at.get(name, 0)] for name, values in self.values.items()}
+
+    def classify(self, cells: Sequence[Cell]) -> list[str]:
+        """Run cells; the class of each."""
+        rows = self.study.run([self.case(cell) for cell in cells])
+        classes = []
+        for cell, row in zip(cells, rows, strict=True):
+            log = read_log(self.folder / row["folder"])
+            if row["status"] == "done" and self.energy not in log:
+                raise ScriptError(
+                    f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
+                )
+            factor = growth(log.get(self.energy, np.empty(0)), self.bound)
+            kind = "failed" if row["status"] != "done" else "stable"
+            if kind == "stable" and factor > self.bound:
+                kind = "growing"
+            reason = in_short(row) if kind == "failed" else ""
+            if kind == "growing":
+                reason = f"{self.energy} grows {factor:.3g} times"
+            self.found[cell] = {**row, "class": kind, "why": reason, "growth": factor}
+            classes.append(kind)
+        return classes
+
+    def rows(self, known: Mapping[Cell, Any], inferred: Mapping[Cell, Any]) -> list[dict]:
+        """The table: every cell, whether it was run, and what it showed."""
+        rows = []
+        for cell in sorted({**known, **inferred}):
+            row = self.found.get(cell, {})
+            rows.append(
+                {
+                    **self.case(cell),
+                    "class": known.get(cell) or inferred.get(cell),
+                    "run": "yes" if cell in known else "no",
+                    "reason": row.get("why", ""),
+                    "growth": row.get("growth"),
+                    "dt": row.get("dt"),
+                    "stable_dt": row.get("stable_dt"),
+                    "message": row.get("reason", ""),
+                    "folder": row.get("folder", ""),
+                }
+            )
+        return rows
+
+    def limit(self, j: int) -> float | None:
+        """The first variable where the first step is the program's stable step, in row j."""
+        x = [float(v) for v in self.values[self.axes[0]]]
+        points = []
+        for (i, other), row in sorted(self.found.items()):
+            dt, stable = row.get("dt"), row.get("stable_dt")
+            if other == j and dt and stable and isfinite(dt / stable):
+                points.append((x[i], dt / stable))
+        for (xa, a), (xb, b) in pairwise(points):
+            if (a - 1) * (b - 1) <= 0 and a != b:
+                return xa + (1 - a) / (b - a) * (xb - xa)
+        return None
+
+    def margins(self, classes: Mapping[Cell, Any]) -> list[float]:
+        """The largest stable step over the program's stable step, in each row that has an edge."""
+        found = []
+        for j in range(self.shape[1]):
+            column = [classes[i, j] for i in range(self.shape[0])]
+            edge = next((i for i, kind in enumerate(column) if kind != "stable"), None)
+            row = self.found.get((edge - 1, j)) if edge else None
+            if row and row.get("dt") and row.get("stable_dt"):
+                found.append(row["dt"] / row["stable_dt"])
+        return found
+
+    def tell(self, known: Mapping[Cell, Any], inferred: Mapping[Cell, Any]) -> None:
+        """Print how many cells are of each class and why runs failed."""
+        classes = {**inferred, **known}
+        count = Counter(classes.values())
+        print(f"{len(known)} of {len(classes)} cells were run (the others lie between like ones)")
+        for kind in CLASSES:
+            if count[kind]:
+                print(f"  {kind:<8} {count[kind]} cells")
+        why = Counter(row["why"] for row in self.found.values() if row["class"] == "failed")
+        for reason, times in why.most_common():
+            print(f"    {reason}: {times} runs")
+        margins = self.margins(classes)
+        if margins:
+            low, high = min(margins), max(margins)
+            ends = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
+            print(f"the largest stable first step is {ends} times the program's stable step")
+
+    def draw(
+        self, known: Mapping[Cell, Any], inferred: Mapping[Cell, Any], path: Path, title: str
+    ) -> None:
+        """Draw the map."""
+        from matplotlib.colors import ListedColormap
+        from matplotlib.patches import Patch
+
+        classes = {**inferred, **known}
+        x = [float(v) for v in self.values[self.axes[0]]]
+        two = len(self.axes) > 1
+        y = [float(v) for v in self.values[self.axes[1]]] if two else [0.0]
+        grid = np.array(
+            [[CLASSES.index(classes[i, j]) for i in range(len(x))] for j in range(len(y))]
+        )
+        figure = blank_figure(9.0, 5.6 if two else 2.8)
+        axes = figure.subplots()
+        axes.pcolormesh(
+            edges(x), edges(y), grid, cmap=ListedColormap([COLOURS[k] for k in CLASSES]),
+            vmin=-0.5, vmax=2.5,
+        )  # fmt: skip
+        reasons = Counter(row["why"] for row in self.found.values() if row["class"] == "failed")
+        number_of = {reason: str(k) for k, (reason, _) in enumerate(reasons.most_common(), 1)}
+        for (i, j), row in self.found.items():
+            failed = row["class"] == "failed"
+            axes.text(
+                x[i], y[j], number_of[row["why"]] if failed else "·", ha="center", va="center",
+                fontsize=7 if failed else 9, color="white" if failed else "black",
+            )  # fmt: skip
+        handles = [
+            Patch(facecolor=COLOURS[k], edgecolor="0.4", label=k)
+            for k in CLASSES if k in classes.values()
+        ]  # fmt: skip
+        handles += [
+            Patch(facecolor="none", edgecolor="none", label=f"{k}  {reason}")
+            for reason, k in number_of.items()
+        ]  # fmt: skip
+        own = [(limit, y[j]) for j in range(len(y)) if (limit := self.limit(j)) is not None]
+        if own:
+            at, up = zip(*own, strict=True)
+            if len(up) == 1:
+                at, up = at * 2, axes.get_ylim()
+            line = axes.plot(at, up, "k--", linewidth=1.4, label="first step = the program's limit")
+            handles += line
+        handles.append(Patch(facecolor="none", edgecolor="none", label="·  run; others inferred"))
+        axes.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
+            fontsize=8, borderaxespad=0,
+        )  # fmt: skip
+        axes.set_xlabel(self.axes[0])
+        axes.set_ylabel(self.axes[1] if two else "")
+        fixed = [f"{n} = {v[0]}" for n, v in self.values.items() if len(v) == 1]
+        axes.set_title(", ".join([title, *fixed]), loc="left", fontsize=10)
+        if not two:
+            axes.set_yticks([])
+        savefig(figure, path)
+
+
+def edges(centres: Sequence[float]) -> np.ndarray:
+    """Edges of cells around centres."""
+    at = np.asarray(centres, float)
+    if len(at) == 1:
+        return np.array([at[0] - 0.5, at[0] + 0.5])
+    middle = (at[:-1] + at[1:]) / 2
+    return np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])

@@ -1,0 +1,304 @@
+"""Runs the cases of a study: some at once, those that are known not again, all of them shown."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.app.studies.case import Launch, Outcome, folder_name
+from karamelo_py.app.studies.records import Recorded, row
+from karamelo_py.app.studies.variables import number
+from karamelo_py.output.console import duration
+
+_SHOWN = ("seconds", "points", "steps", "status")
+
+
+class Study:
+    """A family of runs of one script.
+
+    Parameters
+    ----------
+    launch
+        How a case is run.
+    folder
+        Where the folders of the runs are.
+    items
+        What is recorded of their logs.
+    jobs
+        How many run at once.
+    again
+        Whether to run also what has been run before.
+    title
+        Heads the table on the terminal.
+
+    Attributes
+    ----------
+    rows
+        The rows of finished runs, by the values of the case.
+    names
+        The variables.
+    ran
+        How many were run, not taken from an earlier study.
+    """
+
+    def __init__(
+        self,
+        launch: Launch,
+        folder: Path,
+        items: Sequence[Recorded],
+        jobs: int,
+        *,
+        again: bool = False,
+        title: str = "",
+    ):
+        self.launch = launch
+        self.folder = folder
+        self.items = items
+        self.jobs = max(1, jobs)
+        self.again = again
+        self.title = title
+        self.rows: dict[tuple[str, ...], dict[str, Any]] = {}
+        self.names: list[str] = []
+        self.ran = 0
+        self.on_row: Callable[[], None] = lambda: None
+
+    def run(self, cases: Sequence[Mapping[str, str]]) -> list[dict[str, Any]]:
+        """The rows of these cases, in order; runs what is not known yet.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            When the user interrupts; the runs in progress are taken down, finished ones are kept.
+        """
+        self.names = list(cases[0])
+        waiting = []
+        for case in cases:
+            key = tuple(case.values())
+            if key in self.rows:
+                continue
+            place = self.folder / folder_name(case)
+            known = None if self.again else self.launch.kept(case, place)
+            if known is not None:
+                self._put(case, known)
+            else:
+                waiting.append((case, place))
+        if len(self.rows):
+            self.on_row()
+        if waiting:
+            with _Display(self, cases, len(waiting)) as display:
+                self._run(waiting, display)
+        return [self.rows[tuple(case.values())] for case in cases]
+
+    def _run(self, waiting: list[tuple[Mapping[str, str], Path]], display: _Display) -> None:
+        pool = ThreadPoolExecutor(self.jobs)
+        running: dict[Future, Mapping[str, str]] = {}
+        started: set[tuple] = set()
+        compiled = {kind_of(dict(zip(self.names, key, strict=True))) for key in self.rows}
+        try:
+            queue = list(waiting)
+            while queue or running:
+                while len(running) < self.jobs and (ready := self._ready(queue, started, compiled)):
+                    case, place = ready
+                    queue.remove(ready)
+                    started.add(kind_of(case))
+                    running[pool.submit(self.launch.run, case, place)] = case
+                    display.begin(case)
+                done, _ = wait(running, timeout=0.25, return_when=FIRST_COMPLETED)
+                for future in done:
+                    case = running.pop(future)
+                    self.ran += 1
+                    compiled.add(kind_of(case))
+                    self._put(case, future.result())
+                    display.finish(case, self.rows[tuple(case.values())])
+                    self.on_row()
+                display.tick([case for case, _ in queue], list(running.values()))
+        except BaseException:
+            self.launch.stop.set()
+            raise
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    @staticmethod
+    def _ready(queue: list, started: set, compiled: set) -> Any:
+        """The next case to run; the first of a kind goes ahead, so that only it has to compile."""
+        for item in queue:
+            if kind_of(item[0]) in compiled or kind_of(item[0]) not in started:
+                return item
+        return None
+
+    def _put(self, case: Mapping[str, str], outcome: Outcome) -> None:
+        found = row(case, outcome, self.items, self.folder.parent)
+        if outcome.status == "done" and any(found[item.word] is None for item in self.items):
+            missing = next(item for item in self.items if found[item.word] is None)
+            found["reason"] = f"the log has no column '{missing.column}'"
+        self.rows[tuple(case.values())] = found
+
+
+class _Display:
+    """The table of a study on the terminal while it runs; plain lines where nobody looks."""
+
+    def __init__(self, study: Study, cases: Sequence[Mapping[str, str]], count: int):
+        self.study = study
+        self.names = study.names
+        self.count = count
+        self.finished = 0
+        self.begun = time.perf_counter()
+        self.started: dict[tuple[str, ...], float] = {}
+        self.live: Any = None
+
+    def __enter__(self) -> _Display:
+        if sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
+            from rich.live import Live
+
+            self.live = Live(refresh_per_second=4, transient=True)
+            self.live.start()
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        if self.live is not None:
+            self.live.stop()
+
+    def begin(self, case: Mapping[str, str]) -> None:
+        self.started[tuple(case.values())] = time.perf_counter()
+
+    def finish(self, case: Mapping[str, str], found: Mapping[str, Any]) -> None:
+        self.finished += 1
+        if self.live is None:
+            said = " ".join(f"{name}={value}" for name, value in case.items())
+            numbers = [f"{i.word} {shown(found[i.word])}" for i in self.study.items]
+            end = found["status"] + (f": {found['reason']}" if found["reason"] else "")
+            line = ", ".join([said, *numbers, f"{shown(found['seconds'])} s", end])
+            print(f"{self.finished}/{self.count}  {line}", flush=True)
+
+    def tick(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> None:
+        if self.live is None:
+            return
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        rows = list(self.study.rows.values())
+        room = max(4, self.live.console.height - 8 - len(running))
+        table = results_table(rows[-room:], self.names, self.study.items, self.study.title)
+        for case in running:
+            spent = time.perf_counter() - self.started[tuple(case.values())]
+            blank = [""] * (len(self.study.items) + len(_SHOWN) - 1)
+            table.add_row(*case.values(), *blank, f"running, {duration(spent)}", style="dim")
+        left = self.left(queue, running)
+        line = Table.grid(padding=(0, 1))
+        said = f"{self.finished} of {self.count} runs, {duration(self.elapsed)}"
+        line.add_row(
+            ProgressBar(total=self.count, completed=self.finished, width=30),
+            Text(said + (f", about {duration(left)} left" if left is not None else "")),
+        )
+        self.live.update(Group(table, line))
+
+    @property
+    def elapsed(self) -> float:
+        return time.perf_counter() - self.begun
+
+    def left(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> float | None:
+        """Seconds that remain, from the times of finished runs and how they grow with variables."""
+        done = [found for found in self.study.rows.values() if found.get("wall_s")]
+        if not self.finished or not done:
+            return None
+        predict = growth([{n: f[n] for n in self.names} for f in done], [f["wall_s"] for f in done])
+        now = time.perf_counter()
+        rest = sum(predict(case) for case in queue)
+        for case in running:
+            rest += max(predict(case) - (now - self.started[tuple(case.values())]), 0.0)
+        return rest / min(self.study.jobs, max(len(queue) + len(running), 1))
+
+
+def kind_of(case: Mapping[str, str]) -> tuple[str, ...]:
+    """What the loops of a case are compiled for, as far as variables tell: words, not numbers."""
+    return tuple(value for value in case.values() if number(value) is None)
+
+
+def growth(
+    cases: Sequence[Mapping[str, str]], times: Sequence[float]
+) -> Callable[[Mapping[str, str]], float]:
+    """A guess of the time of a case: a product of powers of its numbers and factors of its words.
+
+    Fitted by least squares of logarithms, with a pull towards "changes nothing" where little is
+    known.
+    """
+    terms = sorted({_term(n, v) for case in cases for n, v in case.items()})
+
+    def features(case: Mapping[str, str]) -> list[float]:
+        have = {_term(n, v): v for n, v in case.items()}
+        return [
+            0.0 if t not in have else np.log(number(have[t])) if t[1] is None else 1.0
+            for t in terms
+        ]
+
+    matrix = np.array([features(case) for case in cases], float).reshape(len(cases), -1)
+    logs = np.log(times)
+    centre, mean = matrix.mean(axis=0), logs.mean()
+    shifted = matrix - centre
+    normal = shifted.T @ shifted + 0.05 * np.eye(matrix.shape[1])
+    slopes = np.linalg.solve(normal, shifted.T @ (logs - mean))
+    return lambda case: float(np.exp(mean + (np.array(features(case)) - centre) @ slopes))
+
+
+def _term(name: str, value: str) -> tuple[str, Any]:
+    as_number = number(value)
+    return (name, None) if as_number is not None and as_number > 0 else (name, value)
+
+
+def shown(value: Any) -> str:
+    """A number or a word as a table shows it."""
+    if value is None or value == "":
+        return "–"
+    if isinstance(value, float):
+        return f"{value:.4g}" if abs(value) < 1e5 or value != round(value) else f"{value:.3e}"
+    return str(value)
+
+
+def results_table(
+    rows: Sequence[Mapping[str, Any]],
+    names: Sequence[str],
+    items: Sequence[Recorded],
+    title: str = "",
+) -> Any:
+    """A table of runs for the terminal."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=title or None, title_justify="left", box=None, pad_edge=False)
+    for name in names:
+        table.add_column(name, style="cyan", no_wrap=True, min_width=min(len(name), 12))
+    for name in [*(item.word for item in items), *_SHOWN]:
+        last = name == "status"
+        justify = "left" if last else "right"
+        width = 6 if last else min(len(name), 12)
+        table.add_column(name, justify=justify, no_wrap=True, min_width=width)
+    for each in rows:
+        cells = [Text(shown(each[name])) for name in names]
+        cells += [Text(shown(each[item.word])) for item in items]
+        cells += [Text(shown(each[name])) for name in _SHOWN[:-1]]
+        end = each["status"] + (f": {each['reason']}" if each["reason"] else "")
+        style = {"done": "green", "failed": "red"}.get(each["status"], "yellow")
+        cells.append(Text(end if len(end) < 60 else end[:59] + "…", style=style))
+        table.add_row(*cells)
+    return table
+
+
+def default_jobs() -> int:
+    """As many as there are cores."""
+    return max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
+
+
+def terminal() -> Any:
+    """Where tables are shown; a file or a pipe is wide enough for whole rows."""
+    from rich.console import Console
+
+    return Console() if sys.stdout.isatty() else Console(width=200)

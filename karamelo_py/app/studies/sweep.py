@@ -1,0 +1,97 @@
+"""karamelo-py sweep: every combination of values of variables, run and put into one table."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from karamelo_py.app.studies import records
+from karamelo_py.app.studies.options import (
+    add_combinations,
+    add_family,
+    family,
+    new_parser,
+    out_file,
+    positive,
+    zipped,
+)
+from karamelo_py.app.studies.study import Study, results_table, terminal
+from karamelo_py.app.studies.variables import cases, logged
+from karamelo_py.script.errors import ScriptError
+
+DESCRIPTION = """\
+Runs a script with every combination of values of its variables, and writes one table (CSV).
+
+  karamelo-py sweep in.file -var N=10,20,40 -var basis=linear,quadratic-spline -record err,max:Etot
+
+Each run has a folder of its own, named after its values, in a folder named after the table. A run
+that fails is recorded with its reason and stops nothing. An interrupted sweep goes on where it
+stopped when the same command is given again. Processor, threads and versions are written beside
+the table (sweep.json)."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """The subcommand for the command line."""
+    parser = new_parser(subparsers, "sweep", "run a family of variants", DESCRIPTION, run)
+    add_family(parser)
+    add_combinations(parser)
+    parser.add_argument(
+        "-record", default="", metavar="COLUMNS",
+        help="log columns: err (the last value), max:err, min:err, mean:err; with commas",
+    )  # fmt: skip
+    parser.add_argument(
+        "-time", action="store_true",
+        help="measure time: one run at a time, each repeated; seconds are the median",
+    )  # fmt: skip
+    parser.add_argument("-repeat", type=positive, default=3, help="repetitions of -time (3)")
+    parser.add_argument("-o", type=Path, default=Path("sweep.csv"), help="the table (sweep.csv)")
+
+
+def run(options: Any) -> int:
+    """Do what the command line says; returns the exit status."""
+    out = out_file(options.o, ".csv")
+    repeat = options.repeat if options.time else 1
+    values, launch, jobs = family(options, timed=options.time, repeat=repeat)
+    combinations = cases(values, zipped(options), options.where)
+    items = records.recorded(options.record, logged(options.script), options.script)
+    folder = out.with_suffix("")
+    if folder.exists() and not folder.is_dir():
+        raise ScriptError(f"{folder} is a file", expected="a free name for the folder of the runs")
+    study = Study(launch, folder, items, jobs, again=options.again, title=str(options.script))
+    records.describe(
+        out,
+        script=str(options.script),
+        variables=values,
+        record=[item.word for item in items],
+        timed=options.time,
+        repeat=repeat,
+        threads=launch.threads,
+        jobs=jobs,
+    )
+    study.on_row = lambda: records.write(out, list(study.rows.values()))
+    try:
+        rows = study.run(combinations)
+    except KeyboardInterrupt:
+        print(
+            f"{len(study.rows)} of {len(combinations)} runs are in {out}; "
+            "the same command goes on with the others",
+            file=sys.stderr,
+        )
+        raise
+    records.write(out, rows)
+    tell(rows, values, items, study, out)
+    return 0
+
+
+def tell(rows: list, values: dict, items: list, study: Study, out: Path) -> None:
+    """Show the whole table and what became of the runs."""
+    terminal().print(results_table(rows, list(values), items, study.title))
+    done = sum(row["status"] == "done" for row in rows)
+    old = len(rows) - study.ran
+    print(
+        f"{done} of {len(rows)} runs are done"
+        + (f", {len(rows) - done} are not (see reason)" if done < len(rows) else "")
+        + (f"; {old} were known" if old > 0 else "")
+        + f"; the table is {out}"
+    )

@@ -1,0 +1,50 @@
+"""compute linear_momentum."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Compute
+from karamelo_py.styles.computes.drift import Drift
+
+
+class LinearMomentum(Compute):
+    """Measure the momentum sum m v of points, and how far it has drifted.
+
+    Parameters
+    ----------
+    group
+        Group of points, or ``all``.
+
+    Example
+    -------
+    compute(p, linear_momentum, all)
+    log_modify(custom, time, p_x, p_drift)
+
+    Notes
+    -----
+    Publishes ID_x, ID_y, ID_z, and ID_drift, the length of the change since the first output
+    relative to the largest sum m |v| so far.
+
+    See Also
+    --------
+    angular_momentum, average_velocity
+    """
+
+    published = ("x", "y", "z", "drift")
+
+    def __init__(self, hub: Hub, group: ParticleGroup):
+        super().__init__(hub, group)
+        self._drift = Drift()
+
+    def refresh(self) -> None:
+        """Measure and publish."""
+        fields = self.hub.fields
+        ids = fields.members(self.group)
+        mass, velocity = fields.mass[ids], fields.velocity[ids]
+        total = mass @ velocity
+        self.publish_components(total)
+        scale = float(mass @ np.linalg.norm(velocity, axis=1))
+        self.publish("drift", self._drift(total, scale))

@@ -1,0 +1,140 @@
+"""compute reference: how far a value or a field is from a curve in a file."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.language.signature import Argument, InputFile
+from karamelo_py.output.quantity import Quantity
+from karamelo_py.scene.group import ALL, ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Compute
+from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.styles.computes.columns import Norm, of_group, refuse_absent, table
+
+
+class GroupOrValue:
+    """For signatures: a group of points, or a number that changes in time."""
+
+    script_kind = "a group of points, or a value"
+
+    @staticmethod
+    def from_script(hub: Scene, argument: Argument) -> ParticleGroup | Quantity:
+        """The group of that name if there is one, else the value."""
+        name = argument.text.strip().strip('"')
+        if name == ALL or name in hub.groups:
+            return ParticleGroup.from_script(hub, argument)
+        return Quantity.from_script(hub, argument)
+
+
+class Reference(Compute):
+    """Measure the difference between a value or a field of points and a curve in a file.
+
+    Parameters
+    ----------
+    subject
+        A value (``v_x``, a variable, a formula of values) is compared over time; the points of a
+        group, or ``all``, over a coordinate.
+    file
+        Columns of numbers, with commas, semicolons or blanks between them, and their names in the
+        first row (or named 1, 2, ... where there is no such row); lines that begin with # are
+        comments. The first column is the time or, for points, the coordinate, whose name it bears:
+        x, y, z, x0, y0, z0 or any other column of points.
+    column
+        The column of the file to compare with; for points also the column of the points, such as
+        s11 or vx.
+    norm
+        ``L1``, ``L2`` (without a word) or ``max``, and ``absolute`` (without a word) or
+        ``relative``, in any order.
+
+    Example
+    -------
+    compute(v, average_velocity, all)
+    compute(tip, reference, v_x, measured.csv, velocity, max, relative)
+    compute(profile, reference, all, exact.csv, s11)
+    log_modify(custom, step, time, tip, tip_curve, profile)
+
+    Notes
+    -----
+    The curve is linear between its rows. What lies beyond its ends is not compared.
+
+    Of a value, ID is the norm of its difference over the time so far, each output with the time
+    since the one before; ID_now is the difference now and ID_curve the curve now.
+    Of points, ID is the norm over the points now, each with its volume at first, ID_now is the
+    same, and ID_curve the mean of the curve at the points.
+
+    See Also
+    --------
+    error
+    """
+
+    syntax = "group|value, file, column[, L1|L2|max][, absolute|relative]"
+    published = ("", "now", "curve")
+
+    def __init__(
+        self,
+        hub: Hub,
+        subject: GroupOrValue,
+        file: InputFile,
+        column: Argument,
+        *norm: Literal["L1", "L2", "max", "absolute", "relative"],
+    ):
+        self.points = isinstance(subject, ParticleGroup)
+        super().__init__(hub, subject if self.points else None)
+        self.subject = subject
+        columns = table(file)
+        name = column.text.strip('"')
+        if name not in columns:
+            close = nearest(name, columns)
+            raise ScriptError(
+                f"{file} has no column '{name}'",
+                place=column.place,
+                expected="one of " + ", ".join(columns),
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+        self.along, self.column = next(iter(columns)), name
+        order = np.argsort(columns[self.along], kind="stable")
+        self.curve = columns[self.along][order], columns[name][order]
+        self.norm = Norm(norm)
+        if self.points:
+            self._check_columns(hub, file, column)
+
+    def _check_columns(self, hub: Hub, file: InputFile, column: Argument) -> None:
+        known = [*hub.fields.particle_names(), "ux", "uy", "uz"]
+        for name in (self.along, self.column):
+            if name not in known:
+                close = nearest(name, known)
+                raise ScriptError(
+                    f"points have no column '{name}'",
+                    place=column.place,
+                    expected=f"in {file} the coordinate first, then columns named as those of a "
+                    f"dump: {' '.join(known)}",
+                    hint=f"name it '{close}' in the file" if close else None,
+                )
+        refuse_absent(hub, (self.column,))
+
+    def refresh(self) -> None:
+        """Measure and publish."""
+        if self.points:
+            volume = self.hub.fields.reference_volume[self.hub.fields.members(self.group)]
+            at = of_group(self.hub, self.group, self.along)
+            value = of_group(self.hub, self.group, self.column)
+        else:
+            at = np.array([self.hub.update.time])
+            value, volume = np.array([float(self.subject.read())]), np.ones(1)
+        within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
+        exact = np.interp(at[within], *self.curve)
+        difference = value[within] - exact
+        sizes = np.abs(difference), np.abs(exact), volume[within]
+        if self.points:
+            now = self.norm.now(*sizes)
+            self.publish("", now)
+            self.publish("now", now)
+        elif within.all():
+            self.norm.follow(self.hub.update.time, *sizes)
+            self.publish("", self.norm.history)
+            self.publish("now", float(difference[0]))
+        self.publish("curve", float(exact.mean()) if len(exact) else 0.0)

@@ -1,0 +1,176 @@
+"""Advice: the cheapest variant that is accurate enough, on laws whose cheapest variant is known."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from karamelo_py.app.cli import main
+from karamelo_py.app.studies import records
+from karamelo_py.app.studies.forecast import forecast
+
+INPUTS = Path(__file__).parent.parent / "inputs"
+# A block at rest. Its "error" is a law of N and of the choice, its steps are the cost.
+SCRIPT = """
+N = 10
+slope = 2
+least = 0
+price = 1
+method(ulmpm, FLIP, linear, 1)
+dimension(1, 0, 10, 1)
+region(line, block, 1, 2)
+material(rubber, linear, 2, 100, 0)
+solid(body, region, line, 1, rubber, 1, 0)
+set_dt(1e-3/N)
+set_output(100000)
+err = max((10/N)^slope, least)
+log_modify(custom, step, time, err)
+run(price*N)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    (tmp_path / "in.law").write_text(SCRIPT, encoding="utf-8")
+    return tmp_path
+
+
+def advise(*words, status=0, target="0.02", N="10,20,40,80,160"):
+    words = [*words, "-accuracy", "err", "-target", target, "-cost", "steps"]
+    assert main(["advise", "in.law", "-var", f"N={N}", *words]) == status
+
+
+def test_the_cheapest_choice_is_found_before_it_is_run(folder, capsys):
+    # (10/N)^p <= 0.02: order 1 needs N = 500; order 2 needs 70.7, thus 80, at 240 steps; order 4
+    # needs 26.6, thus 40, at 400 steps.
+    words = ["-var", "slope=1,2,4", "-var", "price=1,3,10", "-zip", "slope,price"]
+    advise(*words)
+    out = capsys.readouterr().out
+    assert "  N = 80\n" in out and "  slope = 2\n" in out and "  price = 3\n" in out
+    assert "likely: expected err 0.0156, steps 240" in out
+    ran = {(row["slope"], row["N"]) for row in records.read(folder / "advise.csv")}
+    assert ("2", "80") not in ran and ("1", "160") not in ran
+    advise(*words, "-run")
+    out = capsys.readouterr().out
+    assert "slope = 2, price = 3, N = 80: err 0.01562, the target is met" in out
+    assert "the target is met: slope = 2" in out.splitlines()[-1]
+
+
+def test_what_has_been_run_is_sure(folder, capsys):
+    advise(target="0.3")
+    out = capsys.readouterr().out
+    assert "  N = 20\n" in out and "sure: it was run (err 0.25, steps 20)" in out
+    assert "-var N 20" in out
+
+
+def test_errors_that_stop_falling_are_no_promise(folder, capsys):
+    """Order 4 that ends at 0.03: the last order is 1, and it is told that it may be 0 next."""
+    advise("-var", "slope=4", "-var", "least=0.03", "-run", status=1)
+    out = capsys.readouterr().out
+    assert re.search(r"likely: expected err 0.0144, .* between .* and 0.03\b", out)
+    assert "N = 80: err 0.03, the target is missed" in out
+    assert "no variant is expected to reach err <= 0.02" in out
+    assert "with 0.03; finer values of N or other choices may do" in out
+
+
+def test_a_variable_that_coarsens_is_turned_round(folder, capsys):
+    """With the cell size as variable small values are fine."""
+    (folder / "in.law").write_text(SCRIPT.replace("N = 10", "h = 0.1\nN = 1/h"), encoding="utf-8")
+    words = ["-var", "h=0.0125,0.1,0.05,0.025", "-accuracy", "err", "-target", "0.02"]
+    assert main(["advise", "in.law", *words, "-cost", "steps"]) == 0
+    assert "  h = 0.0125\n" in capsys.readouterr().out
+    ran = [row["h"] for row in records.read(folder / "advise.csv")]
+    assert ran == ["0.1", "0.05", "0.025"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-var", "N=1,2"], "at least 3 values"),
+        (["-var", "slope=a,b,c"], "no variable makes the scene finer"),
+        (["-var", "N=1,2,3", "-cost", "money"], "one of seconds"),
+        (["-var", "N=1,2,3", "-accuracy", "error"], "did you mean 'err'?"),
+        (["-var", "N=1,2,3", "-accuracy", "err,err"], "one column"),
+        (["-var", "N=1,2,3", "-target", "0"], "not a number above 0"),
+    ],
+)
+def test_mistakes(folder, capsys, words, said):
+    assert main(["advise", "in.law", "-accuracy", "err", "-target", "1", *words]) == 1
+    assert said in capsys.readouterr().err
+
+
+def runs(xs, order, per_step, per_point):
+    """Runs of N cells: N^2 points, N steps, errors N^-order."""
+    return [
+        {
+            "err": x**-order, "steps": x, "points": x**2,
+            "seconds": x * (per_step + per_point * x**2),
+        }
+        for x in xs
+    ]  # fmt: skip
+
+
+def test_a_forecast_of_laws_is_exact():
+    xs = [10.0, 20.0, 40.0]
+    found = forecast(160.0, xs, runs(xs, 2, 1e-3, 1e-6), "err", "seconds")
+    assert found.error == pytest.approx(160**-2)
+    # Small runs cost by the step, large ones by the point: 0.16 + 4.1 s; a power law of the last
+    # two runs would say 0.7 s.
+    assert found.cost == pytest.approx(160 * (1e-3 + 1e-6 * 160**2))
+    assert found.low < found.error < found.high
+    assert found.high == pytest.approx(40**-2 * 4 ** (-2 * 2 / 3))
+
+
+def test_no_forecast_without_a_fall():
+    xs = [10.0, 20.0, 40.0]
+    rows = runs(xs, 2, 1, 1)
+    assert forecast(80.0, xs[:1], rows[:1], "err", "seconds") is None
+    rows[-1]["err"] = rows[-2]["err"] * 1.1
+    assert forecast(80.0, xs, rows, "err", "seconds") is None
+    rows[-1]["err"] = None
+    assert forecast(80.0, xs, rows, "err", "seconds") is None
+
+
+SCENES = {
+    "in.axis_aligned_1d": ("error_z", 2e-3),
+    "in.axis_aligned": ("error_z", 5e-3),
+    "in.vibrating_bar": ("error_z", 5e-3),
+    "in.vortex": ("error_z", 2e-2),
+    "in.axis_aligned_3d": ("error_z", 2e-2),
+}
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("script", SCENES)
+def test_advice_meets_the_target_at_little_more_than_the_least_cost(
+    script, tmp_path, monkeypatch, capsys
+):
+    """Five exact solutions: what is advised costs at most 1.5 times the best of the full sweep.
+
+    Costs are particle-steps, which do not depend on what else the machine does.
+    """
+    monkeypatch.chdir(tmp_path)
+    column, target = SCENES[script]
+    fine = "0.25,0.5,1,2" if "3d" in script else "0.25,0.5,1,2,4"
+    family = ["-var", f"refine={fine}", "-var", "basis=linear,quadratic-spline,cubic-spline"]
+    path = str(INPUTS / script)
+    words = ["-accuracy", column, "-target", str(target), "-run", "-threads", "1"]
+    status = main(["advise", path, *family, *[w.replace("-threads", "--threads") for w in words]])
+    said = capsys.readouterr().out
+    assert main(["sweep", path, *family, "-record", column]) == 0
+    rows = [row for row in records.read(tmp_path / "sweep.csv") if row["status"] == "done"]
+    error, steps, points = (
+        np.array([float(row[name]) for row in rows]) for name in (column, "steps", "points")
+    )
+    work = steps * points
+    good = error <= target
+    if not good.any():
+        assert status == 1
+        return
+    assert status == 0
+    basis, refine = re.search(r"basis = ([\w-]+), refine = ([\d.]+) with", said).groups()
+    k = next(k for k, row in enumerate(rows) if (row["basis"], row["refine"]) == (basis, refine))
+    assert good[k] and work[k] <= 1.5 * work[good].min()

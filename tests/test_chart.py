@@ -1,0 +1,188 @@
+"""Charts of sweeps: orders, Pareto front, and pictures in which nothing hides anything."""
+
+import json
+import re
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from karamelo_py.app.cli import main
+from karamelo_py.app.studies import look, pictures
+from karamelo_py.app.studies.curves import Family, order
+
+ORDERS = {"linear": 1, "quadratic-spline": 2, "cubic-spline": 4}
+
+
+def rows():
+    """Errors N^-order and times 1e-3 N^2 of three bases; the finest linear run has failed."""
+    found = []
+    for basis, p in ORDERS.items():
+        for n in (10, 20, 40, 80):
+            failed = basis == "linear" and n == 80
+            found.append(
+                {
+                    "N": str(n),
+                    "basis": basis,
+                    "err": "" if failed else f"{n**-p:.12g}",
+                    "seconds": "" if failed else f"{1e-3 * n**2 * (1 + p / 10):.12g}",
+                    "status": "failed" if failed else "done",
+                    "reason": "point 3 <leaves>" if failed else "",
+                    "folder": f"sweep/N={n},basis={basis}",
+                }
+            )
+    return found
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    lines = [",".join(rows()[0])] + [
+        ",".join(f'"{cell}"' for cell in row.values()) for row in rows()
+    ]
+    (tmp_path / "sweep.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    made = {"script": "in.x", "variables": {"N": [], "basis": []}, "timed": True, "threads": 1}
+    (tmp_path / "sweep.json").write_text(json.dumps(made), encoding="utf-8")
+    return tmp_path
+
+
+def test_the_order_of_a_power_law():
+    found = order([10, 20, 40], [3 * n**-2.0 for n in (10, 20, 40)])
+    assert (found.exponent, found.lowest, found.highest) == pytest.approx((-2, -2, -2))
+    # 1 between the first two, 2 between the last two; what has no logarithm does not count.
+    found = order([1, 2, 4, 8], [8, 4, 1, np.inf])
+    assert (found.lowest, found.highest) == pytest.approx((-2, -1))
+    assert found.exponent == pytest.approx(-1.5)
+    assert str(order([1], [1])) == "–"
+
+
+def test_the_table_tells_orders_and_front(table, capsys):
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-by", "basis"]) == 0
+    out = capsys.readouterr().out
+    # Errors fall with N^-p, and with the cost, N^2, to half that power.
+    for basis, p in ORDERS.items():
+        assert re.search(rf"{basis} +-{p / 2:.2f} +-{p:.2f} +2.00", out)
+    assert re.search(r"cubic-spline +80 +8.96 .* front", out)
+    assert not re.search(r"quadratic-spline +40 .*front", out)
+    assert "failed: point 3 <leaves>" in out
+
+
+@given(st.lists(st.tuples(st.floats(1e-3, 1e3), st.floats(1e-9, 1)), min_size=1, max_size=30))
+def test_nothing_beats_the_front_and_the_front_beats_the_rest(runs):
+    table = [{"c": str(c), "e": str(e), "k": str(k)} for k, (c, e) in enumerate(runs)]
+    front = Family(table, ["k"], "e", "c").front()
+    chosen = [(float(row["c"]), float(row["e"])) for row in front]
+    for cost, error in runs:
+        beaten = any(c <= cost and e <= error for c, e in chosen)
+        assert beaten  # by itself, if it is on the front
+    for a, b in combinations(chosen, 2):
+        assert a[0] <= b[0] and a[1] > b[1]
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=20))
+def test_labels_are_moved_apart(wanted):
+    places = look.apart(wanted, 0.05, 0.0, 1.0)
+    ranked = np.sort(places)
+    assert (np.diff(ranked) > 0.05 - 1e-9).all()
+    assert ranked[0] > -1e-9 and ranked[-1] < 1 + 1e-9
+    inverse = np.argsort(wanted, kind="stable")
+    assert (np.diff(places[inverse]) > 0).all()  # no leader line crosses another
+
+
+def overlap(a, b):
+    return min(a.x1, b.x1) - max(a.x0, b.x0) > 1 and min(a.y1, b.y1) - max(a.y0, b.y0) > 1
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["-x", "N"], ["-heat", "N,basis"]], ids=["cost", "convergence", "heat"]
+)
+def test_no_text_hides_another(table, monkeypatch, words):
+    from matplotlib.text import Text
+
+    drawn = []
+    monkeypatch.setattr(pictures, "savefig", lambda figure, path: drawn.append(figure))
+    assert main(["chart", "sweep.csv", "-accuracy", "err", *words, "-o", "chart.png"]) == 0
+    figure = drawn[0]
+    figure.canvas.draw()
+    texts = [t for t in figure.findobj(Text) if t.get_visible() and t.get_text().strip()]
+    boxes = {t: t.get_window_extent() for t in texts}
+    inside = [t for t in texts if figure.bbox.overlaps(boxes[t])]
+    for a, b in combinations(inside, 2):
+        assert not overlap(boxes[a], boxes[b]), (a.get_text(), b.get_text())
+    said = {t.get_text() for t in inside}
+    if not words:
+        assert {*ORDERS, "time of the stepping loop (s)", "err"} <= said
+    if words == ["-x", "N"]:
+        assert {"10", "20", "40", "80", "× at the top: no value (failed)"} <= said
+    if words[:1] == ["-heat"]:
+        assert {"0.1", "2.4e-08", "×\nfailed", *ORDERS} <= said
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_pictures_are_written(table, suffix):
+    name = f"chart.{suffix}"
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-o", name]) == 0
+    magic = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix]
+    assert (table / name).read_bytes().startswith(magic)
+
+
+def test_a_method_has_its_colour_in_every_chart():
+    alone = look.style({"basis": "cubic-spline"}, {"basis": ["cubic-spline"]})
+    among = look.style(
+        {"basis": "cubic-spline", "N": "3"}, {"basis": list(ORDERS), "N": ["3", "4"]}
+    )
+    assert alone[:2] == among[:2]
+    methods = {name: look.place(name) for name in look.FAMILIES[0]}
+    assert len(set(methods.values())) == len(methods)
+
+
+def test_round_ticks():
+    assert look.log_ticks(0.9, 55) == [1, 2, 5, 10, 20, 50]
+    assert look.log_ticks(1e-7, 1) == pytest.approx([10.0**k for k in range(-7, 1)])
+    assert look.tick_text(0.02) == "0.02" and look.tick_text(1e-7) == "$10^{-7}$"
+    assert look.tick_text(2e-7) == r"$2\cdot10^{-7}$"
+
+
+def test_a_page_needs_nothing_else(table):
+    pytest.importorskip("plotly")
+    from PIL import Image
+
+    folder = table / "sweep" / "N=10,basis=linear"
+    folder.mkdir(parents=True)
+    Image.new("RGB", (900, 300), "red").save(folder / "plot.png")
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-o", "chart.html"]) == 0
+    page = (table / "chart.html").read_text(encoding="utf-8")
+    assert not re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=\"?http", page)
+    runs = json.loads(re.search(r"const runs = (\[.*?\]), aside", page, re.S)[1])
+    assert len(runs) == 12 and runs[0]["command"] == "karamelo-py in.x -var N 10 -var basis linear"
+    assert runs[0]["picture"].startswith("data:image/png;base64,") and not runs[1]["picture"]
+    assert "point 3 &lt;leaves&gt;" in page and "<leaves>" not in page.split("const runs")[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-accuracy", "error"], "did you mean 'err'?"),
+        (["-accuracy", "err", "-cost", "second"], "did you mean 'seconds'?"),
+        (["-accuracy", "err", "-by", "base"], "did you mean 'basis'?"),
+        (["-accuracy", "err", "-heat", "N"], "two variables"),
+        (["-accuracy", "err", "-heat", "N,M"], "no 'M'"),
+        (["-accuracy", "err", "-where", "N > 100"], "no row fulfils"),
+        (["-accuracy", "err", "-o", "chart.gif"], "unknown kind of file"),
+        (["-accuracy", "status"], "no run has a value"),
+        ([], "-accuracy"),
+    ],
+)
+def test_mistakes(table, capsys, words, said):
+    assert main(["chart", "sweep.csv", *words]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_tables_that_are_none(tmp_path, capsys):
+    assert main(["chart", str(tmp_path / "none.csv"), "-accuracy", "err"]) == 1
+    assert "cannot read" in capsys.readouterr().err
+    (tmp_path / "odd.csv").write_text("a,b\n1\n", encoding="utf-8")
+    assert main(["chart", str(tmp_path / "odd.csv"), "-accuracy", "err"]) == 1
+    assert "is not a table of runs" in capsys.readouterr().err

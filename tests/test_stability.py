@@ -1,0 +1,131 @@
+"""Stability maps: edges found with few runs, and failures that say why."""
+
+import numpy as np
+import pandas
+import pytest
+
+from karamelo_py.app.cli import main
+from karamelo_py.app.studies import stability
+from karamelo_py.app.studies.frontier import explore
+from karamelo_py.script.errors import ScriptError
+
+# An elastic bar on a Lagrangian grid of equal cells, a point in the middle of each. A wave of
+# number k has the frequency 2 c/h sin(k h/2) on the nodes, and going from the points to the nodes
+# and back multiplies velocities by cos(k h/2) each time: c/h sin(k h) is what is stepped, by
+# central differences, which are stable up to dt = 2/omega = 2 h/c, twice the Courant limit.
+SCRIPT = """
+factor = 0.9
+push = 0
+method(tlmpm, FLIP, linear, 1)
+dimension(1, 0, 8, 1)
+region(line, block, 0, 8)
+material(rubber, linear, 1, 100, 0)
+solid(bar, region, line, 1, rubber, 1, 0)
+fix(mode, initial_velocity_particles, all, 0.001*cos(PI*x0/8) + push)
+compute(Ek, kinetic_energy, all)
+compute(Es, strain_energy, all)
+set_dt(factor*0.1)
+set_output(5)
+log_modify(custom, step, dt, time, Ek, Es, Ek + Es)
+run(200)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    (tmp_path / "in.bar").write_text(SCRIPT, encoding="utf-8")
+    return tmp_path
+
+
+def test_the_courant_limit_of_a_bar_is_found(folder, capsys):
+    words = ["-var", "factor=1:3:21", "-var", "push=0", "-o", "map.svg"]
+    assert main(["stability", "in.bar", *words]) == 0
+    table = pandas.read_csv(folder / "map.csv")
+    assert len(table) == 21 and (table["run"] == "yes").sum() < 12
+    unstable = table["class"] != "stable"
+    assert (np.diff(unstable.astype(int)) >= 0).all()  # one edge
+    edge = table["factor"][unstable].min()
+    assert 2.0 <= edge < 2.15
+    assert (folder / "map.svg").read_text().startswith("<?xml")
+    out = capsys.readouterr().out
+    assert "of 21 cells were run" in out
+    assert "times the program's stable step" in out
+
+
+def test_failures_have_reasons(folder):
+    words = ["-var", "factor=0.5,3", "-var", "push=0", "-o", "map.png"]
+    assert main(["stability", "in.bar", *words]) == 0
+    table = pandas.read_csv(folder / "map.csv")
+    assert list(table["class"]) == ["stable", "failed"]
+    assert table["reason"][1] in set(stability.REASONS.values())
+    assert "point" in table["message"][1]
+
+
+def test_energy_that_grows_is_told_from_failure(folder):
+    """An "energy" that is set to double and to treble beside the bound of 2.5."""
+    text = SCRIPT.replace("Ek + Es)", "Etot)").replace(
+        "log_mod", "Etot = 1 + push*step(time - 5)\nlog_mod"
+    )
+    (folder / "in.bar").write_text(text, encoding="utf-8")
+    words = ["-var", "push=1e-3,1,2", "-var", "factor=0.5", "-bound", "2.5", "-o", "map.pdf"]
+    assert main(["stability", "in.bar", *words]) == 0
+    table = pandas.read_csv(folder / "map.csv")
+    assert list(table["class"]) == ["stable", "stable", "growing"]
+    assert table["reason"][2] == "Etot grows 3 times"
+
+
+def test_a_map_of_400_cells_takes_about_100_runs():
+    def kind(cell):
+        i, j = cell
+        return "stable" if i < 8 + 0.35 * j else "failed"
+
+    asked = []
+
+    def classify(cells):
+        asked.extend(cells)
+        return [kind(cell) for cell in cells]
+
+    known, inferred = explore((20, 20), classify, 6)
+    assert len(asked) == len(set(asked)) == len(known) <= 110
+    assert len(known) + len(inferred) == 400
+    assert all(found == kind(cell) for cell, found in inferred.items())
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (2, 1), (1, 7), (9, 2), (6, 6)])
+def test_all_cells_have_a_class(shape):
+    known, inferred = explore(shape, lambda cells: [sum(cell) > 4 for cell in cells])
+    classes = {**inferred, **known}
+    assert len(classes) == shape[0] * shape[1]
+    assert all(found == (sum(cell) > 4) for cell, found in classes.items())
+
+
+def test_growth():
+    assert stability.growth(np.array([1.0, 1.0, 3.0]), 2) == 3
+    assert stability.growth(np.array([1.0, np.nan]), 2) == np.inf
+    # From rest: the median stands for the beginning.
+    assert stability.growth(np.array([0.0, 1.0, 1.0, 5.0]), 2) == 5
+    assert stability.growth(np.zeros(4), 2) == 0
+
+
+def test_energies_by_name(tmp_path):
+    assert stability.energy_column(None, ["Step", "Ek", "Ek+Es"], tmp_path) == "Ek+Es"
+    assert stability.energy_column("Ek", ["Step", "Ek"], tmp_path) == "Ek"
+    with pytest.raises(ScriptError, match="logs no energy"):
+        stability.energy_column(None, ["Step", "v_x"], tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-var", "factor=a,b"], "not numbers"),
+        (["-var", "factor=1"], "one or two"),
+        (["-var", "factor=0.5:1:3", "-energy", "Et"], "does not log 'Et'"),
+        (["-var", "factor=0.5:1:3", "-o", "map.csv"], "unknown kind of file"),
+        (["-var", "factr=0.5:1:3"], "did you mean 'factor'?"),
+    ],
+)
+def test_mistakes(folder, capsys, words, said):
+    assert main(["stability", "in.bar", *words]) == 1
+    assert said in capsys.readouterr().err

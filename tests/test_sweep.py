@@ -1,0 +1,258 @@
+"""Sweeps: every combination, run and put into one table, whatever becomes of single runs."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pandas
+import pytest
+
+from karamelo_py.app.cli import main
+from karamelo_py.app.studies import case, records, study, variables
+from karamelo_py.script.errors import ScriptError
+
+# A block in free flight: its velocity is 3 times the word's factor, and it leaves where it is told.
+SCRIPT = """
+N = 2
+speed = 3
+kind = "linear"
+steps = 4
+never = 1
+method(ulmpm, FLIP, kind, 1)
+dimension(1, 0, 10, 1/N)
+region(line, block, 1, 2)
+material(rubber, linear, 2, 100, 0)
+solid(body, region, line, 2, rubber, 1/N, 0)
+fix(v, initial_velocity_particles, all, speed)
+set_dt(0.01)
+compute(v, average_velocity, all)
+compute(c, centre_of_mass, all)
+log_modify(custom, step, time, v_x, c_x)
+run(steps)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the script, and interpreted runs: they need no compiling."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    (tmp_path / "in.flight").write_text(SCRIPT, encoding="utf-8")
+    return tmp_path
+
+
+def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
+    words = ["-var", "N=2,4", "-var", "kind=linear,cubic", "-var", "speed=3", "-record"]
+    assert main(["sweep", "in.flight", *words, "v_x,mean:c_x,min:c_x,max:Step", "-jobs", "2"]) == 0
+    table = pandas.read_csv(folder / "sweep.csv")
+    assert list(table["N"]) == [2, 2, 4, 4] and list(table["kind"]) == ["linear", "cubic"] * 2
+    good, bad = table[table.kind == "linear"], table[table.kind == "cubic"]
+    assert (good.status == "done").all() and (bad.status == "failed").all()
+    # Free flight at speed 3 from a centre of 1.5: 5 lines, at 0, 0.01, ... 0.04.
+    assert good["v_x"].to_numpy() == pytest.approx(3)
+    assert good["mean:c_x"].to_numpy() == pytest.approx(1.5 + 3 * 0.02)
+    assert good["min:c_x"].to_numpy() == pytest.approx(1.5)
+    assert list(good["max:Step"]) == list(good["steps"]) == [4, 4]
+    assert list(good["points"]) == [4, 8]  # two in each of N cells, N a unit of length
+    assert (good[["seconds", "particle_steps_per_s", "peak_memory_mib", "wall_s"]] > 0).all(
+        axis=None
+    )
+    assert (good["bytes_per_particle"] > 8 * 5).all() and (good["dt"] == 0.01).all()
+    assert bad["reason"].str.contains("unknown basis style 'cubic'").all()
+    assert (folder / good["folder"].iloc[0] / "log.mpm").exists()
+    assert "2 of 4 runs are done, 2 are not" in capsys.readouterr().out
+    beside = json.loads((folder / "sweep.json").read_text())
+    assert beside["threads"] == 1 and beside["versions"]["numba"] and beside["processor"]
+
+
+def test_a_run_that_breaks_off_has_no_values(folder):
+    words = ["-var", "speed=3,300", "-record", "v_x,max:c_x"]
+    assert main(["sweep", "in.flight", *words]) == 0
+    good, bad = records.read(folder / "sweep.csv")
+    assert good["v_x"] == "3" and bad["status"] == "failed" and "moves by 6 cells" in bad["reason"]
+    assert case.read_log(folder / bad["folder"])["v_x"].size > 0  # though it has a log
+    assert bad["v_x"] == bad["max:c_x"] == ""
+
+
+def test_what_is_known_is_not_run_again(folder, capsys):
+    command = ["sweep", "in.flight", "-var", "speed=3,4", "-record", "v_x", "-o", "s.csv"]
+    assert main(command) == 0
+    marked = folder / "s" / "speed=4" / "out.txt"
+    marked.write_text("not run again", encoding="utf-8")
+    command[3] = "speed=3,4,5"
+    assert main(command) == 0
+    assert marked.read_text() == "not run again"
+    assert "; 2 were known" in capsys.readouterr().out
+    assert [row["v_x"] for row in records.read(folder / "s.csv")] == ["3", "4", "5"]
+    # Another script is another run.
+    (folder / "in.flight").write_text(SCRIPT.replace("steps = 4", "steps = 5"), encoding="utf-8")
+    assert main(command) == 0
+    assert marked.read_text() != "not run again"
+    marked.write_text("not run again", encoding="utf-8")
+    assert main([*command, "-again"]) == 0
+    assert marked.read_text() != "not run again"
+
+
+def test_an_interrupted_sweep_goes_on(folder, capsys):
+    words = [
+        "in.flight",
+        "-var",
+        "speed=0,1e-9,2e-9",
+        "-var",
+        "steps=4000000",
+        "-where",
+        "speed > 0",
+    ]
+    slow = [sys.executable, "-m", "karamelo_py.app.cli", "sweep", *words, "-jobs", "1"]
+    (folder / "in.flight").write_text(
+        SCRIPT.replace("run(steps)", "run(if(speed == 1e-9, 4, steps))"), encoding="utf-8"
+    )
+    process = subprocess.Popen(slow, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout.readline().startswith("1/2  speed=1e-9")
+    second = folder / "sweep" / "speed=2e-9,steps=4000000" / "log.mpm"
+    until = time.monotonic() + 60
+    while not second.exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "1 of 2 runs are in sweep.csv; the same command goes on" in said
+    # The run that was in progress has ended, too: its log does not grow any more.
+    size = second.stat().st_size
+    time.sleep(0.3)
+    assert second.stat().st_size == size
+    assert main(["sweep", *words, "-limit", "3"]) == 0
+    rows = records.read(folder / "sweep.csv")
+    assert [row["status"] for row in rows] == ["done", "too long"]
+    assert rows[1]["reason"] == "given up after 3 s"
+
+
+def test_times_are_medians_of_repetitions(folder):
+    command = ["sweep", "in.flight", "-var", "N=2,4", "-time", "-repeat", "2", "-record", "v_x"]
+    assert main(command) == 0
+    table = pandas.read_csv(folder / "sweep.csv")
+    assert (table.seconds > 0).all() and (table.seconds_spread >= 0).all()
+    assert (table.seconds_spread <= 2 * table.seconds).all()
+    assert json.loads((folder / "sweep.json").read_text())["timed"] is True
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-var", "n=1"], "did you mean 'N'?"),
+        (["-var", "never=1"], "sets it and never reads it"),
+        (["-var", "N"], "not a list of values"),
+        (["-var", "N=1,,2"], "not a list of values"),
+        (["-var", "N=1,1"], "has a value twice"),
+        (["-var", "N=1", "-var", "N=2"], "given twice"),
+        (["-var", "N=1:2"], "not a range"),
+        (["-var", "N=1:2:1"], "at least 2 values"),
+        (["-var", "N=1,2", "-var", "speed=1,2,3", "-zip", "N,speed"], "speed has 3 values"),
+        (["-var", "N=1,2", "-zip", "N,other"], "there is no -var other"),
+        (["-var", "N=1,2", "-where", "N > 5"], "no combination fulfils"),
+        (["-var", "N=1,2", "-where", "M > 5"], "unknown name 'M'"),
+        (["-var", "N=1,2", "-where", "N >"], "error: "),
+        (["-var", "N=1", "-record", "v_y"], "did you mean 'v_x'?"),
+        (["-var", "N=1", "-record", "mx:v_x"], "did you mean 'max:v_x'?"),
+        (["-var", "N=1", "-time", "-jobs", "2"], "one at a time"),
+        (["-var", "N=1", "-o", "sweep.txt"], "unknown kind of file"),
+        (["-var", "N=1", "-o", "none/sweep.csv"], "mkdir none"),
+        (["-var", "N=1", "-jobs", "0"], "whole number of at least 1"),
+        ([], "nothing varies"),
+    ],
+)
+def test_mistakes_are_told_before_anything_runs(folder, capsys, words, said):
+    assert main(["sweep", "in.flight", *words]) == 1
+    assert said in capsys.readouterr().err
+    assert not (folder / "sweep").exists() and not (folder / "sweep.csv").exists()
+
+
+def test_a_script_that_is_not_there(folder, capsys):
+    assert main(["sweep", "in.fligth", "-var", "N=1"]) == 1
+    assert "did you mean in.flight?" in capsys.readouterr().err
+
+
+def test_combinations():
+    values = variables.choices(["a=1,2", "b=x,y-z", "c=0:1:3"])
+    assert values["c"] == ["0", "0.5", "1"]
+    assert len(variables.cases(values)) == 12
+    some = variables.cases(values, where=['a < 2 || b == "y-z"', "c == 0.5"])
+    assert [(c["a"], c["b"]) for c in some] == [("1", "x"), ("1", "y-z"), ("2", "y-z")]
+    together = variables.cases({"a": ["1", "2"], "b": ["3", "4"], "c": ["5"]}, [["a", "b"]])
+    assert together == [{"a": "1", "b": "3", "c": "5"}, {"a": "2", "b": "4", "c": "5"}]
+
+
+def test_variables_of_included_scripts_count(tmp_path):
+    (tmp_path / "in.main").write_text("include(part)\nN = 3\n", encoding="utf-8")
+    (tmp_path / "part").write_text('print("speed")\nh = 1/N\nk = 2*h', encoding="utf-8")
+    variables.check_script(tmp_path / "in.main", ["N", "h"])
+    with pytest.raises(ScriptError, match=r"-var k: .* never reads it"):
+        variables.check_script(tmp_path / "in.main", ["k"])
+    with pytest.raises(ScriptError, match="has no such variable"):
+        variables.check_script(tmp_path / "in.main", ["speed"])
+
+
+def test_the_time_that_remains_grows_as_the_runs_do():
+    """Times 2^-6 N^3 of two kinds, one twice as slow: the guess for N = 64 is right to a third."""
+    cases = [{"N": str(n), "basis": b} for n in (8, 16, 32) for b in ("fast", "slow")]
+    times = [float(c["N"]) ** 3 / 64 * (2 if c["basis"] == "slow" else 1) for c in cases]
+    guess = study.growth(cases, times)
+    assert guess({"N": "64", "basis": "slow"}) == pytest.approx(64**3 / 32, rel=0.33)
+
+
+def test_facts_and_logs_of_several_runs(tmp_path):
+    said = """Run
+  method     ulmpm
+  points     1 234
+  dt         0.01
+  stable dt  0.02
+Run finished
+  wall time         0.7 s
+  steps             252
+  particle-steps/s  2e+05
+    steps           0.5 s       7 %
+Run
+  points     1 300
+Run finished
+  steps             100
+    steps           0.25 s       7 %
+"""
+    facts = case.read_facts(said)
+    assert facts["points"] == 1234 and facts["stable_dt"] == 0.02
+    assert facts["steps"] == 352 and facts["seconds"] == 0.75
+    assert facts["particle_steps_per_s"] == pytest.approx(352 * 1234 / 0.75)
+    (tmp_path / "log.mpm").write_text("Step a\n0 1\n1 2\n# Step b\n2 nan\n3 4\n3 ", "utf-8")
+    log = case.read_log(tmp_path)
+    assert list(log["Step"]) == [0, 1, 2, 3] and list(log["a"]) == [1, 2]
+    assert np.isnan(log["b"][0]) and log["b"][1] == 4
+
+
+def test_names_of_folders():
+    assert case.folder_name({"N": "2", "basis": "cubic-spline"}) == "N=2,basis=cubic-spline"
+    contacts, other = ({"kind": kind} for kind in ("ulmpm/contacts", "ulmpm:contacts"))
+    assert case.folder_name(contacts) != case.folder_name(other)
+    assert not set('/\\:*"<>|') & set(case.folder_name(contacts))
+    assert len(case.folder_name({"a": "x" * 500})) < 100
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_a_run_that_is_killed_is_recorded(folder):
+    (folder / "in.flight").write_text(SCRIPT.replace("steps = 4", "steps = 9000000"), "utf-8")
+    launch = case.Launch(folder / "in.flight")
+    import threading
+
+    def kill():
+        log = folder / "run" / "log.mpm"
+        until = time.monotonic() + 60
+        while not log.exists() and time.monotonic() < until:
+            time.sleep(0.05)
+        found = subprocess.run(["pgrep", "-f", str(folder / "in.flight")], capture_output=True)
+        os.kill(int(found.stdout.split()[0]), signal.SIGKILL)
+
+    threading.Thread(target=kill).start()
+    outcome = launch.run({"speed": "3"}, folder / "run")
+    assert (outcome.status, outcome.reason) == ("killed", "ended by signal 9")
