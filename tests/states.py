@@ -31,11 +31,15 @@ def final_state(script: Path, threads: int | None = None) -> dict[str, np.ndarra
     """Arrays of all points by id, and the clock."""
     hub = final_hub(script, threads)
     state = hub.simulation.state()
-    arrays = {"x": state.places, "v": state.v, "time": np.array([hub.update.time, hub.update.step])}
+    arrays = {
+        "x": state.places.T,
+        "v": state.v.T,
+        "time": np.array([hub.update.time, hub.update.step]),
+    }
     arrays["mass"] = hub.simulation.mass
     arrays["nodal mass"] = hub.simulation.setup.nodes.sums[:, 0].sum()
-    arrays |= {"-".join(k.__name__ for k in kind): rows for kind, rows in state.laws.items()}
-    arrays |= {kind.__name__: rows for kind, rows in state.fields.items()}
+    arrays |= {"-".join(k.__name__ for k in kind): a.T for kind, a in state.laws.items()}
+    arrays |= {kind.__name__: a.T for kind, a in state.fields.items()}
     return arrays
 
 
