@@ -314,11 +314,12 @@ def test_domains_go_with_points_moved_in_python(tmp_path, method, corners):
     path = tmp_path / "in.script"
     path.write_text(block(method), encoding="utf-8")
     simulation = final_hub(path).simulation
-    before = simulation.state().x
+    before = simulation.state().places.T
     group = SimpleNamespace(all=False, ids=np.array([3, 5]))
     view = PointsView(simulation, group, then=False)
     view.position = view.position + [0.01, -0.02]
-    moved = simulation.state().x - before
+    view.write_back()
+    moved = simulation.state().places.T - before
     assert view.moved and np.flatnonzero(moved.any(axis=1)).tolist() == [3, 5]
     wanted = np.zeros(moved.shape[1])
     wanted[: 2 + 2 * corners] = np.tile([0.01, -0.02], 1 + corners)

@@ -110,7 +110,7 @@ class View(PointsView):
     """Three points in 2D."""
 
     def __init__(self):
-        self._handed_out = {}
+        self._handed_out, self._declared = {}, {}
         self.ids = np.arange(3)
         self._v = np.zeros((3, 2))
 

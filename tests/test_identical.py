@@ -12,6 +12,8 @@ import pytest
 from scenes import SCHEMES, TRANSFERS, block
 from states import final_hub, final_state, same_bits
 
+from karamelo_py.kernels.arrays import arrays_of
+
 # --- interpreted: every combination -----------------------------------------------------------
 
 MOVING = (
@@ -167,7 +169,10 @@ def test_single_precision_arrays(tmp_path, monkeypatch):
     script = crossing(2, "run(1)", laws=("linear",), precision="single")
     path.write_text(script, encoding="utf-8")
     setup = final_hub(path).simulation.setup
-    assert {a.dtype for a in setup.nodes if a is not None} == {np.dtype(np.float32)}
-    for b in setup.blocks:
-        fields = [b.points.x, b.points.v, b.points.mass, b.points.state, *b.laws]
-        assert {array.dtype for array in fields} == {np.dtype(np.float32)}
+    *nodes, own = setup.nodes
+    arrays = [*nodes, *(array for kind in own for array in kind)]
+    for one in setup.blocks:
+        arrays += [array for _, array in arrays_of(one.points)] + [*one.laws]
+    real = [array for array in arrays if array.dtype.kind == "f"]
+    assert len(real) > 7
+    assert {array.dtype for array in real} == {np.dtype(np.float32)}

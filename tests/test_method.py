@@ -51,6 +51,7 @@ def test_words_stand_in_any_order():
 
 def test_a_word_in_a_variable_and_a_word_that_is_a_variable():
     assert update('how = "thermo-mechanical"\nmethod(ulmpm, PIC, linear, how)').thermal
+    assert not update('a = "mechanical"\nb = a\nmethod(ulmpm, PIC, linear, a, b)').thermal
     chosen = update("det = 0.3\nalpha = 0.4\nmethod(ulmpm, FLIP, cpgimp, alpha, det)")
     assert chosen.transfer.alpha == 0.4
     assert chosen.method.basis_name == "cpgimp det"

@@ -148,9 +148,11 @@ class _Call:
             if slot is None and not numbers:
                 raise self._unknown(argument, slots)
             family, parameter = slot or numbers.pop(0)
-            if parameter.name in given[family]:
-                raise _chosen_twice(given[family][parameter.name], argument)
-            given[family][parameter.name] = argument
+            before = given[family].setdefault(parameter.name, argument)
+            # Scripts pass "mechanical" for each option that their method may do without.
+            words = parameter.kind.words
+            if _word(before, words) != _word(argument, words):
+                raise _chosen_twice(before, argument)
         for family, parameter in slots:
             if not parameter.optional and parameter.name not in given[family]:
                 word = next((a.text for a in self.options if a not in rest), None)

@@ -44,7 +44,6 @@ INSTEAD = {
         "thermo_modify": _COLUMNS,
         "variable": "a variable is set by name = expression",
         "velocity": _VELOCITY,
-        "units": f"{_NEEDLESS}: any consistent units will do",
         "run_style": "scheme(musl), scheme(usl), scheme(usf) or scheme(usavg)",
         "create_box": _DOMAIN,
         "lattice": _FILL,
@@ -79,7 +78,6 @@ INSTEAD = {
         "angmom": "the style angular_momentum",
         "com": "the style center_of_mass",
         "xcm": "the style center_of_mass, or xcm(group, x) in an expression",
-        "centre_of_mass": "the style center_of_mass",
         "reduce": "compute(ID, average_stress, group) and the like; help compute lists them",
         "stress/atom": "dump(ID, all, particle, every, file, s11, s22, ...) writes stresses",
     },
@@ -113,7 +111,6 @@ INSTEAD = {
         "atom/gz": "the style particle/gz",
         "custom/gz": "the style particle/gz",
         "image": "the style pyplot",
-        "movie": "the style pyplot",
     },
 }
 

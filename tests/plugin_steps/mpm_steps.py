@@ -7,7 +7,7 @@ from typing import Annotated, Literal, NamedTuple
 from karamelo_py.compiler.tuples import add, scale
 from karamelo_py.language.signature import AtLeast, In, Positive
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.points.basis.product import along, register
+from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.methods.ulmpm import ULMPM
@@ -59,7 +59,7 @@ def _(basis, kin, grid, place, direction):
     i, r, _, gradients, affine = along(Linear(), kin, grid, place, direction)
     right = r + basis.share * (r * r * (3.0 - 2.0 * r) - r)
     slope = 1.0 + basis.share * (6.0 * r * (1.0 - r) - 1.0)
-    return i, r, (1.0 - right, right), scale(slope, gradients), affine
+    return Along(i, r, (1.0 - right, right), scale(slope, gradients), affine)
 
 
 register(Smooth, 2)
