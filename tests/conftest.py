@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -23,6 +24,9 @@ INPUTS = ROOT / "inputs"
 
 # Processes that tests start run the tree, whatever is installed.
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+
+# A shell that starts the tests in the background has them ignore Ctrl-C, which is inherited.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # No test asserts a time, and a failure is the same in every run.
 settings.register_profile("tests", deadline=None, derandomize=True, max_examples=40)

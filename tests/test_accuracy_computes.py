@@ -100,7 +100,7 @@ def test_conserved_quantities_and_places(run_interpreted):
         run_interpreted,
         """
 compute(p, linear_momentum, all)
-compute(c, centre_of_mass, all)
+compute(c, center_of_mass, all)
 compute(q, position_quantile, all, 0.5)
 compute(E, energy_balance, all)
 compute(W, energy_balance, all, 9*time)
@@ -149,7 +149,7 @@ def test_a_value_against_a_curve_over_time(run_interpreted, tmp_path):
     log = fly(
         run_interpreted,
         """
-compute(c, centre_of_mass, all)
+compute(c, center_of_mass, all)
 compute(r, reference, c_x, curve.csv, centre)
 compute(m, reference, c_x, curve.csv, centre, max, relative)
 log_modify(custom, time, r, r_now, r_curve, m)

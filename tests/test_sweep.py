@@ -30,7 +30,7 @@ solid(body, region, line, 2, rubber, 1/N, 0)
 fix(v, initial_velocity_particles, all, speed)
 set_dt(0.01)
 compute(v, average_velocity, all)
-compute(c, centre_of_mass, all)
+compute(c, center_of_mass, all)
 log_modify(custom, step, time, v_x, c_x)
 run(steps)
 """

@@ -148,11 +148,11 @@ class _Call:
             if slot is None and not numbers:
                 raise self._unknown(argument, slots)
             family, parameter = slot or numbers.pop(0)
-            before = given[family].setdefault(parameter.name, argument)
-            # Scripts pass "mechanical" for each option that their method may do without.
-            words = parameter.kind.words
-            if _word(before, words) != _word(argument, words):
+            before, words = given[family].get(parameter.name), parameter.kind.words
+            # Scripts with variables in the place of options may say the same word twice.
+            if before and not (words and _word(before, words) == _word(argument, words)):
                 raise _chosen_twice(before, argument)
+            given[family][parameter.name] = argument
         for family, parameter in slots:
             if not parameter.optional and parameter.name not in given[family]:
                 word = next((a.text for a in self.options if a not in rest), None)

@@ -78,6 +78,7 @@ INSTEAD = {
         "angmom": "the style angular_momentum",
         "com": "the style center_of_mass",
         "xcm": "the style center_of_mass, or xcm(group, x) in an expression",
+        "centre_of_mass": "the style center_of_mass",
         "reduce": "compute(ID, average_stress, group) and the like; help compute lists them",
         "stress/atom": "dump(ID, all, particle, every, file, s11, s22, ...) writes stresses",
     },

@@ -22,7 +22,7 @@ class EnergyBalance(Compute):
 
     Example
     -------
-    compute(c, centre_of_mass, all)
+    compute(c, center_of_mass, all)
     compute(E, energy_balance, all, -9.81*1000*(c_y - 0.5))
     log_modify(custom, time, E, E_drift)
 
@@ -35,7 +35,7 @@ class EnergyBalance(Compute):
 
     See Also
     --------
-    kinetic_energy, strain_energy, dissipated_energy, centre_of_mass
+    kinetic_energy, strain_energy, dissipated_energy, center_of_mass
     """
 
     published = ("", "total", "drift")

@@ -36,7 +36,7 @@ class PositionQuantile(Compute):
 
     See Also
     --------
-    max_position, centre_of_mass
+    max_position, center_of_mass
     """
 
     published = ("x", "y", "z")
