@@ -28,8 +28,12 @@ def final_columns(script: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
 
 
 def final_state(script: Path, threads: int | None = None) -> dict[str, np.ndarray]:
+    """The state of the hub after a script has run."""
+    return state_of(final_hub(script, threads))
+
+
+def state_of(hub: Hub) -> dict[str, np.ndarray]:
     """Arrays of all points by id, and the clock."""
-    hub = final_hub(script, threads)
     state = hub.simulation.state()
     arrays = {
         "x": state.places.T,
