@@ -32,6 +32,7 @@ from numba.core.serialize import dumps
 
 from karamelo_py.compiler import melting
 from karamelo_py.compiler.fingerprint import (
+    WHOLE,
     Choice,
     Unknown,
     contents,
@@ -217,7 +218,8 @@ def _setting() -> str:
     """What all kernels depend on."""
     versions = (platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__)
     how = (config.OPT, config.BOUNDSCHECK, config.LOOP_VECTORIZE, config.SLP_VECTORIZE)
-    return repr((versions, [str(h) for h in how], Path(melting.__file__).read_bytes()))
+    whole = [Path(file).read_bytes() for file in (melting.__file__, WHOLE)]
+    return repr((versions, [str(h) for h in how], whole))
 
 
 _SETTING = _setting()

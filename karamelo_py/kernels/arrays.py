@@ -23,13 +23,14 @@ class Nodes(NamedTuple):
     Components are named by the functions below: ``nodes.sums[n, of_force(kin) + k]``.
     """
 
-    sums: np.ndarray  # (N, 1 + 2 d): mass, momentum, force, as the points give them
-    update: np.ndarray  # (N, 2 d): v* after the momentum update, and v* - v
-    velocity: np.ndarray  # (N, d): the velocity whose gradient deforms the points
+    sums: np.ndarray  # mass, momentum, force, as the points give them
+    update: np.ndarray  # v* after the momentum update, and v* - v
+    velocity: np.ndarray  # the velocity whose gradient deforms the points
     fields: tuple  # declared fields, (N, components)
 
 
-MASS = 0  # component of Nodes.sums
+# Components of the records; in space a vector takes the place of four, the width of a register.
+MASS = 0  # of Nodes.sums
 
 
 @shared
@@ -41,13 +42,19 @@ def of_momentum(kin):
 @shared
 def of_force(kin):
     """First component of the force in `Nodes.sums`."""
-    return 1 + dimension(kin)
+    return 2 if dimension(kin) == 1 else 4
 
 
 @shared
 def of_change(kin):
     """First component of v* - v in `Nodes.update`; that of v* is 0."""
-    return dimension(kin)
+    return 4 if dimension(kin) == 3 else dimension(kin)
+
+
+# Widths of the records of Nodes by dimension.
+SUMS_WIDTH = {1: 4, 2: 8, 3: 8}
+UPDATE_WIDTH = {1: 2, 2: 4, 3: 8}
+VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 
 
 class Points(NamedTuple):

@@ -13,6 +13,9 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import (
+    SUMS_WIDTH,
+    UPDATE_WIDTH,
+    VELOCITY_WIDTH,
     Block,
     Control,
     Nodes,
@@ -213,9 +216,9 @@ def lower_nodes(kinds: tuple[type, ...], kin: NamedTuple, count: int, real: type
     """Fields of `count` nodes, zero: the system gives memory to pages only when touched."""
     d = kin.dimension
     return Nodes(
-        sums=np.zeros((count, 1 + 2 * d), real),
-        update=np.zeros((count, 2 * d), real),
-        velocity=np.zeros((count, d), real),
+        sums=np.zeros((count, SUMS_WIDTH[d]), real),
+        update=np.zeros((count, UPDATE_WIDTH[d]), real),
+        velocity=np.zeros((count, VELOCITY_WIDTH[d]), real),
         fields=tuple(fields.at_nodes(kind, kin, count, real) for kind in kinds),
     )
 

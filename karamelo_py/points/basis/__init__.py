@@ -34,7 +34,7 @@ shape
     :class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
-from karamelo_py.compiler.compile import by_type, define, point_function, tag_class
+from karamelo_py.compiler.compile import by_type, define, point_function, real, tag_class
 
 
 @point_function(tags=2)
@@ -74,6 +74,16 @@ def mapped_again(basis, grid, moment):
 @mapped_again.otherwise
 def _(basis, grid, moment):
     return moment
+
+
+@point_function()
+def first_node(basis, like):
+    """What is added to a position in cells, so that its whole part tells which nodes are seen."""
+
+
+@first_node.otherwise
+def _(basis, like):
+    return real(0, like)
 
 
 # --- the shape of a point's domain ------------------------------------------------------------

@@ -27,6 +27,7 @@ class Linear(NamedTuple):
     least_nodes = 2
     steady_moment = False  # D of the affine transfers vanishes at the nodes
     steep_edge = True
+    in_lanes = True
 
 
 @along.on(Linear)
