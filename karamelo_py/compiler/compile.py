@@ -280,7 +280,7 @@ def accumulate(array: Any, i: int, first: int, values: tuple) -> None:
 
 @by_type(accumulate)
 def _accumulate(array, i, first, values):
-    if lanes_of(i):
+    if lanes_of(i) or any(lanes_of(value) for value in values):
         return None
     lines = [f"array[i, first + {k}] += values[{k}]" for k in range(len(values))]
     return define("array, i, first, values", *lines)
@@ -304,6 +304,26 @@ def first_failing(condition: bool) -> int:
 @by_type(first_failing)
 def _first_failing(condition):
     return None if lanes_of(condition) else lambda condition: 0
+
+
+def is_one(number: int) -> bool:
+    """Whether all lanes have the same number."""
+    return True
+
+
+@by_type(is_one)
+def _is_one(number):
+    return None if lanes_of(number) else lambda number: True
+
+
+def first_lane(number: int) -> int:
+    """The number of the first lane; a number itself."""
+    return number
+
+
+@by_type(first_lane)
+def _first_lane(number):
+    return None if lanes_of(number) else lambda number: number
 
 
 def index(i: int) -> int:

@@ -33,9 +33,11 @@ from karamelo_py.compiler.compile import (
     choose,
     define,
     first_failing,
+    first_lane,
     fma,
     in_all,
     index,
+    is_one,
     largest,
     of_present,
     real,
@@ -670,14 +672,6 @@ def _chunks(count: int) -> list[tuple[int, int]]:
     return out
 
 
-def _same_node(builder: Any, nodes: Any, kind: Lanes) -> Any:
-    """Whether the numbers of all lanes are the same."""
-    first = _shuffle(builder, nodes, nodes, [0] * kind.width)
-    same = builder.icmp_signed("==", nodes, first)
-    bits = builder.bitcast(same, ir.IntType(kind.width))
-    return builder.icmp_signed("==", bits, ir.Constant(bits.type, -1))
-
-
 def _gathered(builder: Any, of: Callable, nodes: Lanes, lanes: Lanes, count: int) -> list:
     """Lanes of `count` components from the records of different nodes."""
     size = lanes.scalar.bitwidth // 8
@@ -692,42 +686,20 @@ def _gathered(builder: Any, of: Callable, nodes: Lanes, lanes: Lanes, count: int
 
 @intrinsic
 def _gather_row(typing_context, array, nodes, first, like):
-    """Components of the records of nodes, as many as `like` has.
-
-    Where all lanes see one node, its record is loaded once.
-    """
+    """Components of the records of nodes, as many as `like` has."""
     lanes = Lanes(array.dtype, nodes.width)
     made = types.UniTuple(lanes, len(like))
 
     def codegen(context, builder, sig, arguments):
-        size = array.dtype.bitwidth // 8
-        chunks = _chunks(len(like))
-
-        def of(begin):
-            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
-            return lambda k: _record(
-                context, builder, array, arguments[0], _lane(builder, arguments[1], k), column
-            )
-
-        together, apart = [], []
-        with builder.if_else(_same_node(builder, arguments[1], nodes)) as (then, otherwise):
-            with then:
-                for begin, count in chunks:
-                    one = builder.load(of(begin)(0)(count), align=size)
-                    together += [
-                        _shuffle(builder, one, one, [j] * nodes.width) for j in range(count)
-                    ]
-                after_then = builder.block
-            with otherwise:
-                for begin, count in chunks:
-                    apart += _gathered(builder, of(begin), nodes, lanes, count)
-                after_otherwise = builder.block
         found = []
-        for one, other in zip(together, apart, strict=True):
-            value = builder.phi(_vector(lanes))
-            value.add_incoming(one, after_then)
-            value.add_incoming(other, after_otherwise)
-            found.append(value)
+        for begin, count in _chunks(len(like)):
+            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
+
+            def of(k, column=column):
+                node = _lane(builder, arguments[1], k)
+                return _record(context, builder, array, arguments[0], node, column)
+
+            found += _gathered(builder, of, nodes, lanes, count)
         return context.make_tuple(builder, made, found[: len(like)])
 
     return made(array, nodes, types.int64, like), codegen
@@ -742,11 +714,9 @@ def _row(array, i, first, like):
 
 @intrinsic
 def _scatter(typing_context, array, nodes, first, values):
-    """Add to components of the records of nodes, lane after lane.
-
-    Where all lanes see one node, they are summed before.
-    """
-    lanes = Lanes(array.dtype, nodes.width)
+    """Add to components of the records of nodes, lane after lane; summed before to one node."""
+    width = max(has_lanes(value) for value in values)
+    lanes = Lanes(array.dtype, width)
 
     def codegen(context, builder, sig, arguments):
         size = array.dtype.bitwidth // 8
@@ -756,37 +726,29 @@ def _scatter(typing_context, array, nodes, first, values):
             for kind, part in zip(values, parts, strict=True)
         ]
         zero = ir.Constant(_vector(lanes), None)
-        given = []  # column, number of components, records by lane
         for begin, count in _chunks(len(parts)):
             column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
             chosen = [*parts[begin : begin + count], *[zero] * 4][:count]
             rows = []
-            for k in range(0, nodes.width, 4):
+            for k in range(0, width, 4):
                 four = chosen
-                if nodes.width == 8:
+                if width == 8:
                     four = [_shuffle(builder, v, v, list(range(k, k + 4))) for v in chosen]
                 rows += _records(builder, four)
-            given.append((column, count, rows))
-
-        def add(k, column, count, number):
-            node = _lane(builder, arguments[1], k)
-            at = _record(context, builder, array, arguments[0], node, column)(count)
-            builder.store(builder.fadd(builder.load(at, align=size), number), at, align=size)
-
-        with builder.if_else(_same_node(builder, arguments[1], nodes)) as (then, otherwise):
-            with then:
-                for column, count, rows in given:
-                    while len(rows) > 1:
-                        pairs = zip(rows[::2], rows[1::2], strict=True)
-                        rows = [builder.fadd(*pair) for pair in pairs]
-                    add(0, column, count, rows[0])
-            with otherwise:
-                for column, count, rows in given:
-                    for k, number in enumerate(rows):
-                        add(k, column, count, number)
+            if not isinstance(nodes, Lanes):
+                while len(rows) > 1:
+                    rows = [builder.fadd(*pair) for pair in zip(rows[::2], rows[1::2], strict=True)]
+            for k, number in enumerate(rows):
+                node = arguments[1]
+                if isinstance(nodes, Lanes):
+                    node = _lane(builder, node, k)
+                at = _record(context, builder, array, arguments[0], node, column)(count)
+                total = builder.fadd(builder.load(at, align=size), number)
+                builder.store(total, at, align=size)
         return context.get_dummy_value()
 
-    return types.void(array, nodes, types.int64, values), codegen
+    at = nodes if isinstance(nodes, Lanes) else types.int64
+    return types.void(array, at, types.int64, values), codegen
 
 
 def _records(builder: Any, parts: list) -> list:
@@ -800,9 +762,30 @@ def _records(builder: Any, parts: list) -> list:
 
 @by_type(accumulate)
 def _accumulate(array, i, first, values):
-    if isinstance(array, types.Array) and isinstance(i, Lanes):
+    if isinstance(array, types.Array) and (isinstance(i, Lanes) or has_lanes(values)):
         return lambda array, i, first, values: _scatter(array, i, first, values)
     return None
+
+
+@intrinsic
+def _is_one(typing_context, nodes):
+    def codegen(context, builder, sig, arguments):
+        first = _shuffle(builder, arguments[0], arguments[0], [0] * nodes.width)
+        same = builder.icmp_signed("==", arguments[0], first)
+        bits = builder.bitcast(same, ir.IntType(nodes.width))
+        return builder.icmp_signed("==", bits, ir.Constant(bits.type, -1))
+
+    return types.boolean(nodes), codegen
+
+
+@by_type(is_one)
+def _choose_is_one(number):
+    return (lambda number: _is_one(number)) if isinstance(number, Lanes) else None
+
+
+@by_type(first_lane)
+def _first_lane(number):
+    return (lambda number: _extract(number, 0)) if isinstance(number, Lanes) else None
 
 
 # --- one lane after another -------------------------------------------------------------------

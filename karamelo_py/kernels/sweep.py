@@ -24,6 +24,7 @@ from karamelo_py.compiler.compile import (
     largest,
     point_function,
     real,
+    shared,
 )
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.lanes import Eights, Fours, group, spread
@@ -34,6 +35,7 @@ from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.visit import Work, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
+from karamelo_py.points.basis.product import sees_same_nodes, with_one_node
 from karamelo_py.points.boundary import reflected
 from karamelo_py.points.frames import Total, Updated, follows
 from karamelo_py.points.grid import inside
@@ -189,6 +191,57 @@ def _(width, like):
     return spread(width, like - like)
 
 
+@shared
+def _gather(tasks, w, stencil, totals):
+    for k in range(support(w.basis, w.kin)):
+        totals = gathered_all(tasks, w, stencil, k, totals)
+    return totals
+
+
+@shared
+def _scatter(quantities, w, stencil, loads):
+    for k in range(support(w.basis, w.kin)):
+        scattered_all(quantities, w, stencil, k, loads)
+
+
+@point_function()
+def gather_nodes(width, tasks, w, stencil, totals):
+    """The totals of the tasks over all nodes of the stencil."""
+
+
+@gather_nodes.on(OneByOne)
+def _(width, tasks, w, stencil, totals):
+    return _gather(tasks, w, stencil, totals)
+
+
+@gather_nodes.on(Fours)
+@gather_nodes.on(Eights)
+def _(width, tasks, w, stencil, totals):
+    # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
+    if sees_same_nodes(stencil):
+        return _gather(tasks, w, with_one_node(stencil), totals)
+    return _gather(tasks, w, stencil, totals)
+
+
+@point_function()
+def scatter_nodes(width, quantities, w, stencil, loads):
+    """Give all nodes of the stencil their parts."""
+
+
+@scatter_nodes.on(OneByOne)
+def _(width, quantities, w, stencil, loads):
+    _scatter(quantities, w, stencil, loads)
+
+
+@scatter_nodes.on(Fours)
+@scatter_nodes.on(Eights)
+def _(width, quantities, w, stencil, loads):
+    if sees_same_nodes(stencil):
+        _scatter(quantities, w, with_one_node(stencil), loads)
+    else:
+        _scatter(quantities, w, stencil, loads)
+
+
 @kernel
 def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     """Visit the points of the t-th occupied tile of a block in the context `s`.
@@ -215,8 +268,7 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
         rate = fastest
         if gathers:
             totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
-            for k in range(support(s.basis, s.kin)):
-                totals = gathered_all(visit.tasks, w, stencil, k, totals)
+            totals = gather_nodes(width, visit.tasks, w, stencil, totals)
             moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
         elif follows(s.frame):
             here = inside(grid, s.kin, load_vector(s.kin, places.x, p))
@@ -230,8 +282,7 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
         if scatters:
             stencil = restencil(visit.weights, w, stencil, p)
             loads = load_all(visit.quantities, w, p, dt)
-            for k in range(support(s.basis, s.kin)):
-                scattered_all(visit.quantities, w, stencil, k, loads)
+            scatter_nodes(width, visit.quantities, w, stencil, loads)
     tiling.report[t, 0] = largest(furthest)
     tiling.report[t, 1] = largest(fastest)
     tiling.report[t, 2] = wrong

@@ -11,7 +11,16 @@ from functools import cache
 from math import prod
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, define, index, point_function, real, shared
+from karamelo_py.compiler.compile import (
+    choose,
+    define,
+    first_lane,
+    index,
+    is_one,
+    point_function,
+    real,
+    shared,
+)
 from karamelo_py.compiler.symbols import Symbol, call, written
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.kinematics import Axisymmetric
@@ -34,6 +43,18 @@ class Stencil(NamedTuple):
     first: int  # number of the first of them
     lines: tuple[Along, ...]  # along each direction
     inv_r: float  # 1 / r of an axisymmetric point
+
+
+@shared
+def sees_same_nodes(stencil):
+    """Whether the points in all lanes see the same nodes."""
+    return is_one(stencil.first)
+
+
+@shared
+def with_one_node(stencil):
+    """The stencil of points that see the same nodes: their numbers have no lanes."""
+    return Stencil(first_lane(stencil.first), stencil.lines, stencil.inv_r)
 
 
 @point_function()
