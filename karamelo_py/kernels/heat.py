@@ -54,7 +54,7 @@ from karamelo_py.kernels.step import clear_totals, conduct, read_reports, step_s
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry, reach
-from karamelo_py.points.frames import drawn_back, thinning
+from karamelo_py.points.frames import pulled_back, thinning
 from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import Line, dimension
 from karamelo_py.points.laws import (
@@ -244,7 +244,7 @@ def _(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    against = drawn_back(w.frame, w.kin, _gradient(w, p), f)
+    against = pulled_back(w.frame, w.kin, _gradient(w, p), f)
     fields = w.points.fields
     return scale(-field(fields, Conductance)[0, p], against), field(fields, Supply)[0, p]
 

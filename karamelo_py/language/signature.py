@@ -316,7 +316,7 @@ def syntax(target: Callable, name: str) -> str:
     """The line that shows how a command or style is called."""
     own = getattr(target, "syntax", None)
     if not isinstance(own, str):
-        own = _joined(told_of(target))
+        own = _joined(documented(target))
     family, _, style = name.partition(" ")
     if not style:
         return f"{name}({own})"
@@ -333,7 +333,7 @@ def syntax(target: Callable, name: str) -> str:
     return f"{command}({', '.join(before)}{own})"
 
 
-def told_of(target: Callable) -> list[Parameter]:
+def documented(target: Callable) -> list[Parameter]:
     """Parameters for help: with the word that chooses a variant of a style."""
     variants = getattr(target, "variants", None)
     if not variants:
@@ -387,7 +387,7 @@ def describe(target: Callable, name: str) -> Help:
         inner = docstrings.sections(target.__init__.__doc__ or "")[1]
         descriptions = docstrings.descriptions(inner.pop("Parameters", "")) | descriptions
         sections = inner | sections
-    described = [replace(p, description=descriptions.get(p.name, "")) for p in told_of(target)]
+    described = [replace(p, description=descriptions.get(p.name, "")) for p in documented(target)]
     return Help(
         name, syntax(target, name), " ".join(summary.split()), text.strip(), described, sections
     )

@@ -121,20 +121,20 @@ def _(frame, kin, total, stress, gradient):
 
 
 @point_function()
-def drawn_back(frame, kin, g, f):
-    """What a flux against the gradient `g` of the frame is proportional to, in the frame.
+def pulled_back(frame, kin, g, f):
+    """The direction of a flux down the gradient `g`, pulled back to the frame.
 
     Per deformed volume: in space that is g, and C^-1 g with respect to reference positions, which
     C^-1 = F^-1 F^-T takes to space and back.
     """
 
 
-@drawn_back.on(Updated)
+@pulled_back.on(Updated)
 def _(frame, kin, g, f):
     return g
 
 
-@drawn_back.on(Total)
+@pulled_back.on(Total)
 def _(frame, kin, g, f):
     flat = planar(kin)
     inside = inverse(flat, leading(f, zero_tensor(flat, g[0])))
