@@ -379,14 +379,18 @@ class Help:
 
 
 def describe(target: Callable, name: str) -> Help:
-    """Help about a command or style, from its signature and its docstring."""
+    """Help about a command or style, from its signature and docstring, and those of its bases."""
     head, sections = docstrings.sections(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
-    descriptions = docstrings.descriptions(sections.pop("Parameters", ""))
-    if inspect.isclass(target):
-        inner = docstrings.sections(target.__init__.__doc__ or "")[1]
-        descriptions = docstrings.descriptions(inner.pop("Parameters", "")) | descriptions
-        sections = inner | sections
+    descriptions: dict[str, str] = {}
+    # What a base class describes holds for the styles made from it.
+    for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
+        for doc in (getattr(vars(owner).get("__init__"), "__doc__", None), owner.__doc__):
+            inner = docstrings.sections(doc or "")[1]
+            descriptions |= docstrings.descriptions(inner.pop("Parameters", ""))
+            if owner is target:
+                sections = inner | sections
+    sections.pop("Parameters", None)
     described = [replace(p, description=descriptions.get(p.name, "")) for p in documented(target)]
     return Help(
         name, syntax(target, name), " ".join(summary.split()), text.strip(), described, sections
