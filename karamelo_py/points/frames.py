@@ -167,16 +167,16 @@ def stretched_share(kin, like: Number):
 
 
 @point_function()
-def thinning(frame, kin, f, like):
-    """Square of h over the size of a deformed cell, which bounds the step in its place."""
+def inverse_stretch_squared(frame, kin, f, like):
+    """(h / size of a deformed cell)^2, one over the least stretch squared: it shortens the step."""
 
 
-@thinning.on(Updated)
+@inverse_stretch_squared.on(Updated)
 def _(frame, kin, f, like):
     return real(1, like)
 
 
-@thinning.on(Total)
+@inverse_stretch_squared.on(Total)
 def _(frame, kin, f, like):
     # 1 / (smallest stretch)^2 is the largest eigenvalue of F^-1 F^-T.
     return largest_row_sum(kin, left_cauchy_green(kin, inverse(kin, f)))
