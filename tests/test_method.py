@@ -79,6 +79,12 @@ def test_what_cannot_be_meant(typed, column, part):
     assert caught.value.place.column == column + (7 if column > 1 else 0)
 
 
+def test_the_same_word_twice():
+    """As scripts have it that keep places for what only some transfers and bases take."""
+    chosen = update("method(ulmpm, TPIC, ugimp, thermo-mechanical, thermo-mechanical)")
+    assert chosen.thermal
+
+
 # --- parts of a plug-in -------------------------------------------------------------------------
 
 

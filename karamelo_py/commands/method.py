@@ -1,11 +1,11 @@
-"""The command method: how points and grid are made and how velocity goes between them."""
+"""Commands about the method: method, scheme, precision, anti_volumetric_locking."""
 
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
 from itertools import groupby
-from typing import Any
+from typing import Any, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
@@ -77,6 +77,49 @@ def method(
     chosen.basis_name = f"{basis} {call.variant}".strip()
     chosen.place = hub.place
     hub.update.thermal = chosen.thermal
+
+
+def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
+    """Choose when in a step the stress is updated.
+
+    Parameters
+    ----------
+    style
+        ``musl`` when there is no such command.
+    arguments
+        What the style asks for; those that come with the program ask for nothing.
+
+    Example
+    -------
+    scheme(usl)
+
+    See Also
+    --------
+    method
+    """
+    target = registry.find("scheme", style)
+    hub.update.scheme = signature.call(target, hub, arguments, f"scheme {style}")
+
+
+def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
+    """Choose the precision of the numbers that points and nodes carry.
+
+    Parameters
+    ----------
+    kind
+        ``double`` (the default) or ``single``, which halves the memory.
+
+    Example
+    -------
+    precision(single)
+
+    Notes
+    -----
+    Comes before the first run.
+    """
+    if hub.update.step > 0:
+        raise ScriptError("the precision cannot change after the first run")
+    hub.settings.precision = kind
 
 
 def anti_volumetric_locking(hub: Hub, active: bool) -> None:

@@ -44,9 +44,9 @@ from karamelo_py.points.boundary import Bounces, reflected
 from karamelo_py.points.frames import (
     DeformationGradient,
     follows,
+    inverse_stretch_squared,
     scaled_increment,
     spatial_increment,
-    thinning,
 )
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import (
@@ -492,7 +492,9 @@ def _strain(w, x, p, dt, gradient, ratio, fastest):
         return choose(j > 0, grown, real(inf, j)), fastest
     # The square root is only taken of the few points that are faster than all before them.
     now = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    squared = wave_speed_squared(law, w.kin, state) * thinning(w.frame, w.kin, now, dt)
+    squared = wave_speed_squared(law, w.kin, state) * inverse_stretch_squared(
+        w.frame, w.kin, now, dt
+    )
     speed = largest_component(w.kin, load_vector(w.kin, w.points.v, p))
     slack = fastest - speed
     if in_all((slack >= 0) & (squared <= slack * slack)):  # so written, NaN is noticed too

@@ -65,7 +65,7 @@ from karamelo_py.kernels.sweep import (
 )
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.points.basis import placed
-from karamelo_py.points.frames import follows, thinning
+from karamelo_py.points.frames import follows, inverse_stretch_squared
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import dimension, largest_component
 from karamelo_py.points.laws import initial_state, wave_speed_squared
@@ -596,7 +596,9 @@ def _fastest(frame, kin, points, laws, control):
         mass = points.mass[p]
         state = load(points.state, p, initial_state(law, kin, mass))
         f = deformation_of(frame, kin, law, state, points, p)
-        speed = sqrt(wave_speed_squared(law, kin, state) * thinning(frame, kin, f, mass))
+        speed = sqrt(
+            wave_speed_squared(law, kin, state) * inverse_stretch_squared(frame, kin, f, mass)
+        )
         rate = max(rate, speed + largest_component(kin, load_vector(kin, points.v, p)))
     clock.rate = max(clock.rate, rate)
 

@@ -10,7 +10,7 @@ from karamelo_py.language import registry
 from karamelo_py.language.faults import told
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
-from karamelo_py.output.output import Output
+from karamelo_py.output.schedule import Output
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.update import Update
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message

@@ -35,7 +35,7 @@ class Update:
         What happens to points that reach the edge of the domain: error, delete or reflect.
     boundary_place
         Where the script says so.
-    told_of_bounces
+    warned_of_bounces
         Whether the user knows that points were reflected.
     """
 
@@ -50,7 +50,7 @@ class Update:
         self.dt_factor = DEFAULT_DT_FACTOR
         self.boundary = "error"
         self.boundary_place: Place | None = None
-        self.told_of_bounces = False
+        self.warned_of_bounces = False
 
     @property
     def words(self) -> str:

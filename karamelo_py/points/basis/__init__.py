@@ -12,7 +12,8 @@ stencil
     whatever `locate` returned.
 
 A basis that is the product of one function a direction gives only `along` and calls
-:func:`karamelo_py.points.basis.product.register`. Every class has these attributes:
+:func:`karamelo_py.points.basis.product.register`, which also gives it what is usual of these
+attributes that every class has:
 
 cells
     how many cells the nodes that points of one cell may see span (1: those of its corners only);

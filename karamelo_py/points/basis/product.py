@@ -151,7 +151,14 @@ def _written(kin: type, width: int) -> dict[Callable, Callable]:
 
 
 def register(basis: type, width: int) -> None:
-    """Give `basis` (a class with `along`, `width` nodes a direction) every point function."""
+    """Give `basis` (a class with `along`, `width` nodes a direction) every point function.
+
+    And the attributes of its kind that it does not have itself.
+    """
+    cells = 1 if width == 2 else 3
+    usual = {"cells": cells, "nodes_per_cell": 1, "least_nodes": width, "steady_moment": True}
+    for name, value in usual.items():
+        setattr(basis, name, getattr(basis, name, value))
     for kin in TAGS:
         for function, implementation in _written(kin, width).items():
             function.on(basis, kin)(implementation)

@@ -22,10 +22,6 @@ class QuadraticSpline(NamedTuple):
     method(ulmpm, APIC, quadratic-spline)
     """
 
-    cells = 3
-    nodes_per_cell = 1
-    least_nodes = 3
-    steady_moment = True
     steep_edge = False
     in_lanes = True
 
