@@ -10,6 +10,7 @@ from typing import Any
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Parameter
+from karamelo_py.scene.guests import check_part
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, meant
 
@@ -74,6 +75,8 @@ def method(
         )
     chosen = hub.update.method = parts["method"]
     hub.update.transfer, chosen.basis = parts["transfer"], parts["basis"]
+    for family, part in parts.items():
+        check_part(hub, f"{family} {call.names[family]}", part)
     chosen.basis_name = f"{basis} {call.variant}".strip()
     chosen.place = hub.place
     hub.update.thermal = chosen.thermal

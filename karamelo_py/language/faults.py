@@ -15,8 +15,10 @@ from numba.core.errors import NumbaError
 from karamelo_py.language import registry
 from karamelo_py.script.errors import Place, Quit, ScriptError
 
+TRACEBACK = "; --debug shows the traceback"
+
 # These are told elsewhere in words of their own.
-_KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
+KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 
 
 @contextmanager
@@ -36,38 +38,60 @@ def told(name: str, where: str, code: Any, place: Place | None) -> Iterator[None
     """
     try:
         yield
-    except _KNOWN:
+    except KNOWN:
         raise
     except Exception as error:
-        family, _, style = name.partition(" ")
-        family, style = (family, style) if style else ("command", family)
-        known = registry.knows(family, style)
-        package = f" (of {registry.origin(family, style)})" if known else ""
         what = (
             _cannot_compile(error, code)
             if isinstance(error, NumbaError)
-            else f"{type(error).__name__}: {error}{_line(error, code)}"
+            else f"{cause_of(error)}{_line(error, code)}"
         )
-        fault = ScriptError(
-            f"{name}{package}: {where}: {what}",
-            place=place,
-            hint=f"tell the author of {style}; --debug shows the traceback",
-        )
-        fault.complete = True
-        raise fault from error
+        raise fault(name, f"{where}: {what}", place, TRACEBACK) from error
+
+
+def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptError:
+    """The error of a script that uses a style with a fault in it: names its package.
+
+    Parameters
+    ----------
+    name
+        What uses the code: ``fix drag``.
+    what
+        What is wrong with it.
+    place
+        Where the script asks for it.
+    more
+        What follows the hint.
+    """
+    family, _, style = name.partition(" ")
+    family, style = (family, style) if style else ("command", family)
+    package = f" (of {registry.origin(family, style)})" if registry.knows(family, style) else ""
+    error = ScriptError(
+        f"{name}{package}: {what}",
+        place=place,
+        hint=f"tell the author of {style}{more}",
+    )
+    error.complete = True
+    return error
+
+
+def cause_of(error: Exception) -> str:
+    """What went wrong, in one line; of Numba, the cause that it gives."""
+    if not isinstance(error, NumbaError):
+        return f"{type(error).__name__}: {error}"
+    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
+    causes = (line.strip() for line in text.splitlines() if not line.startswith("Failed in "))
+    return f"Numba cannot compile it: {next(filter(None, causes), type(error).__name__)}"
 
 
 def _cannot_compile(error: NumbaError, code: Any) -> str:
-    """The cause that Numba gives, in one line, and where it sees it."""
-    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
-    place = re.search(r'File "(.*?)", line (\d+)', text)
+    """The cause, and where Numba sees it."""
+    place = re.search(r'File "(.*?)", line (\d+)', str(error))
     if place:
         file, line = place.groups()
     else:
         file, line = inspect.getsourcefile(code) or "", inspect.getsourcelines(code)[1]
-    causes = (line.strip() for line in text.splitlines() if not line.startswith("Failed in "))
-    cause = next(filter(None, causes), type(error).__name__)
-    return f"Numba cannot compile it: {cause} ({Path(file).name}:{line})"
+    return f"{cause_of(error)} ({Path(file).name}:{line})"
 
 
 def _line(error: Exception, code: Any) -> str:

@@ -1,0 +1,28 @@
+"""scheme plain-usl: a step as a table of rows."""
+
+from typing import NamedTuple
+
+from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE
+from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.step import ACCELERATE, MOVE, SERIES, SUMS
+from karamelo_py.kernels.table import AtPoints, Gather
+
+
+class PlainUSL(NamedTuple):
+    """Update stress last, as in the textbook: nothing is done about nodes with little mass.
+
+    Example
+    -------
+    scheme(plain-usl)
+    """
+
+    courant = (0.65, 0.4)  # the stable step over h/c, and with one point a cell
+    rows = (
+        AtPoints(INITIAL_INTEGRATE, 0),
+        SUMS,  # mass, momentum and force to the nodes
+        *ACCELERATE,  # their update, and the fixes on nodes
+        SERIES,
+        *MOVE,  # velocities back to the points, which move
+        Gather(Strain()),  # stress from the velocity of the nodes
+        AtPoints(FINAL_INTEGRATE, 1),
+    )
