@@ -41,11 +41,7 @@ def told(name: str, where: str, code: Any, place: Place | None) -> Iterator[None
     except KNOWN:
         raise
     except Exception as error:
-        what = (
-            _cannot_compile(error, code)
-            if isinstance(error, NumbaError)
-            else f"{cause_of(error)}{_line(error, code)}"
-        )
+        what = f"{cause_of(error)}{_place(error, code)}"
         raise fault(name, f"{where}: {what}", place, TRACEBACK) from error
 
 
@@ -75,31 +71,43 @@ def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptEr
     return error
 
 
+def is_of_numba(error: Exception) -> bool:
+    """Whether Numba refuses to compile something."""
+    return isinstance(error, NumbaError) or type(error).__module__.startswith("numba.")
+
+
 def cause_of(error: Exception) -> str:
     """What went wrong, in one line; of Numba, the cause that it gives."""
-    if not isinstance(error, NumbaError):
+    if not is_of_numba(error):
         return f"{type(error).__name__}: {error}"
     text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
     causes = (line.strip() for line in text.splitlines() if not line.startswith("Failed in "))
     return f"Numba cannot compile it: {next(filter(None, causes), type(error).__name__)}"
 
 
-def _cannot_compile(error: NumbaError, code: Any) -> str:
-    """The cause, and where Numba sees it."""
-    place = re.search(r'File "(.*?)", line (\d+)', str(error))
-    if place:
-        file, line = place.groups()
-    else:
-        file, line = inspect.getsourcefile(code) or "", inspect.getsourcelines(code)[1]
-    return f"{cause_of(error)} ({Path(file).name}:{line})"
+def places_of(error: Exception) -> list[tuple[str, int]]:
+    """Files and lines that took part in an exception, the innermost first.
+
+    Of Numba those that its text names, and the functions that it was compiling.
+    """
+    frames = list(traceback.walk_tb(error.__traceback__))[::-1]
+    here = [(frame.f_code.co_filename, line) for frame, line in frames]
+    if not is_of_numba(error):
+        return here
+    named = [(f, int(k)) for f, k in re.findall(r'File "(.*?)", line (\d+)', str(error))]
+    compiled = (frame.f_locals.get("func") for frame, _ in frames)
+    codes = [f.__code__ for f in compiled if inspect.isfunction(f)]
+    return [*named, *((code.co_filename, code.co_firstlineno) for code in codes), *here]
 
 
-def _line(error: Exception, code: Any) -> str:
+def _place(error: Exception, code: Any) -> str:
     """`` (spring.py:28)``: the last line of the style's own file that took part."""
-    frames = traceback.extract_tb(error.__traceback__)
     try:
-        file = inspect.getsourcefile(code)
+        own = inspect.getsourcefile(code)
     except TypeError:
-        file = None
-    own = [frame for frame in frames if frame.filename == file] or frames[-1:]
-    return f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""
+        own = None
+    places = places_of(error)
+    same = [place for place in places if own and Path(place[0]).resolve() == Path(own).resolve()]
+    for file, line in [*same, *places][:1]:
+        return f" ({Path(file).name}:{line})"
+    return ""

@@ -141,11 +141,11 @@ class Fields:
         basis = getattr(update.method, "basis", None)
         owners = [*self.hub.fixes.values(), update.method, update.transfer, basis, update.scheme]
         owners += [Conducting] if update.thermal else []
-        return {
-            column: (kind, k)
-            for kind in fields.declared(owners, "point_fields")
-            for k, column in enumerate(fields.columns_of(kind))
-        }
+        found: dict[str, tuple[type, int]] = {}
+        for kind in fields.declared(owners, "point_fields"):
+            for k, column in enumerate(fields.columns_of(kind)):
+                found.setdefault(column, (kind, k))
+        return found
 
     def members(self, group: Any) -> np.ndarray:
         """Ids (0-based) of a particle group."""

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import inspect
-import re
 import sys
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from numba.core.errors import NumbaError
-
 from karamelo_py.compiler.compile import Undefined
 from karamelo_py.language import registry
-from karamelo_py.language.faults import KNOWN, TRACEBACK, cause_of, fault
+from karamelo_py.language.faults import KNOWN, TRACEBACK, cause_of, fault, places_of
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.laws import law_kind
 
@@ -70,7 +66,7 @@ def blamed(hub: Scene) -> Iterator[None]:
     except KNOWN:
         raise
     except Exception as error:
-        for file, line in _places(error):
+        for file, line in places_of(error):
             part = _owner(hub, file)
             if part is not None:
                 what = f"{cause_of(error)} ({Path(file).name}:{line})"
@@ -80,14 +76,6 @@ def blamed(hub: Scene) -> Iterator[None]:
                 if part.kind in error.classes:
                     raise fault(part.name, str(error), part.place) from error
         raise
-
-
-def _places(error: Exception) -> list[tuple[str, int]]:
-    """Files and lines that took part in an exception, the innermost first."""
-    frames = [(frame.filename, frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
-    if isinstance(error, NumbaError):
-        return re.findall(r'File "(.*?)", line (\d+)', str(error)) + frames[::-1]
-    return frames[::-1]
 
 
 def _owner(hub: Scene, file: str) -> Part | None:

@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE
 from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.nodes import UpdateToVelocity
 from karamelo_py.kernels.step import ACCELERATE, MOVE, SERIES, SUMS
-from karamelo_py.kernels.table import AtPoints, Gather
+from karamelo_py.kernels.table import AtPoints, Gather, Nodes
 
 
 class PlainUSL(NamedTuple):
@@ -21,8 +22,9 @@ class PlainUSL(NamedTuple):
         AtPoints(INITIAL_INTEGRATE, 0),
         SUMS,  # mass, momentum and force to the nodes
         *ACCELERATE,  # their update, and the fixes on nodes
+        Nodes(UpdateToVelocity()),  # the velocity that deforms the points is the updated one
         SERIES,
         *MOVE,  # velocities back to the points, which move
-        Gather(Strain()),  # stress from the velocity of the nodes
+        Gather(Strain()),  # their stress, from the same velocity of the nodes
         AtPoints(FINAL_INTEGRATE, 1),
     )
