@@ -155,6 +155,21 @@ class Wordy(NamedTuple):
     columns = ("dose")
 
 
+class Sized(NamedTuple):
+    array: Any
+    shape = scalar
+
+    def start(kin):
+        return 1.0, 2.0
+
+
+class Unshaped(NamedTuple):
+    array: Any
+
+    def shape(kin):
+        return kin.dimensions
+
+
 class Taken(NamedTuple):
     array: Any
     shape = scalar
@@ -185,6 +200,14 @@ class OneWord(Group):
 
 class Clashing(Group):
     point_fields = (Taken,)
+
+
+class Doubled(Group):
+    point_fields = (Sized,)
+
+
+class Lost(Group):
+    node_fields = (Unshaped,)
 
 
 class First(Group):
@@ -302,7 +325,7 @@ def forget(hub):
 '''
 FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
-    "silent stop weigh bare formless oneword clashing first again",
+    "silent stop weigh bare formless oneword clashing first again doubled lost",
     "compute": "gauge",
     "material": "motionless growing raising short uncompiled",
     "strength": "forgetful",
@@ -368,6 +391,8 @@ def test_init(hub):
         ("bare", "point_fields has to be a tuple of classes, as in (Other,)"),
         ("formless", "the field Shapeless has no shape: scalar, vector, tensor or planar"),
         ("oneword", "the field Wordy has columns that are no tuple of words, as in ('dose',)"),
+        ("doubled", "the field Sized: it starts from 2 numbers and has 1 components"),
+        ("lost", "the field Unshaped: AttributeError: 'Line' object has no attribute 'dimensions'"),
         ("clashing", "Taken: the column 'vx' is one of every scene"),
     ],
 )

@@ -1,5 +1,6 @@
 """The example plug-in, a style of each family: installed somewhere else, found, and right."""
 
+import ast
 import os
 import re
 import shutil
@@ -179,7 +180,10 @@ fix(pull, velocity_nodes, nodes, rate*x)
 fix(start, initial_velocity_particles, all, rate*x0)
 set_dt(2e-5)
 set_output(100)
+compute(hard, probe, all, R)
+log_modify(custom, step, hard)
 dump(points, all, particle, 100, points.*.LAMMPS, ep, R, seq)
+dump(picture, all, pyplot, 100, picture.*.png, 200, 200, R)
 run(100)
 """
 
@@ -195,7 +199,39 @@ def test_a_strength_shows_its_own_number(site, tmp_path, compiled):
     # Exact for steady flow, whose strain rate is 2/3 of the stretching: R = H (dep/dt) / rate.
     np.testing.assert_allclose(R, 1e6 * (2 / 3 * 10) / recovery, rtol=2e-3)
     np.testing.assert_allclose(q, 20e3 + R, rtol=1e-6)
+    np.testing.assert_allclose(read_log(tmp_path)[1][-1], R, rtol=1e-8)  # all points are alike
+    assert (tmp_path / "picture.100.png").stat().st_size > 1000
     assert (ep > 0.01).all()
+
+
+def lines_of_code(path):
+    """Lines of a file that are neither empty, comments, nor part of a docstring."""
+    text = path.read_text("utf-8")
+    owners = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    told = [n.body[0] for n in ast.walk(ast.parse(text)) if isinstance(n, owners)]
+    told = [n for n in told if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant)]
+    shown = {k for n in told for k in range(n.lineno, n.end_lineno + 1)}
+    empty = {k for k, line in enumerate(text.splitlines(), 1) if re.fullmatch(r" *(#.*)?", line)}
+    return len(text.splitlines()) - len(shown | empty)
+
+
+def test_the_message_of_the_page(tmp_path):
+    """A slip in drag.py is told as the page says."""
+    page = (PLUGIN.parents[1] / "docs" / "plugins.md").read_text("utf-8")
+    (message,) = re.findall(r"^in\.drag.*error: fix drag.*$", page, re.M)
+    file = install(tmp_path / "site") / "mpm_examples" / "drag.py"
+    file.write_text(file.read_text("utf-8").replace("exp(-self", "exq(-self"), "utf-8")
+    shutil.copy(PLUGIN / "in.drag", tmp_path)
+    done = karamelo_py(tmp_path / "site", tmp_path, "in.drag")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[0] == message
+
+
+def test_the_page_tells_what_each_costs():
+    page = (PLUGIN.parents[1] / "docs" / "plugins.md").read_text("utf-8")
+    told = dict(re.findall(r"^\| .* \| `(\w+\.py)` \| (\d+) \|$", page, re.M))
+    files = (PLUGIN / "src" / "mpm_examples").glob("[!_]*.py")
+    assert told == {file.name: str(lines_of_code(file)) for file in files}
 
 
 # --- a field of a fix ---------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from typing import Any
 
 from numba.core.errors import NumbaError
 
+from karamelo_py.compiler.compile import Undefined
 from karamelo_py.language import registry
 from karamelo_py.script.errors import Place, Quit, ScriptError
 
@@ -78,6 +79,8 @@ def is_of_numba(error: Exception) -> bool:
 
 def cause_of(error: Exception) -> str:
     """What went wrong, in one line; of Numba, the cause that it gives."""
+    if isinstance(error, Undefined):
+        return str(error)
     if not is_of_numba(error):
         return f"{type(error).__name__}: {error}"
     text = re.sub(r"\x1b\[[\d;]*m", "", str(error))

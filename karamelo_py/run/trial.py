@@ -14,8 +14,7 @@ import numpy as np
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_on
 from karamelo_py.kernels.visit import place_at
-from karamelo_py.language import registry
-from karamelo_py.language.faults import fault, told
+from karamelo_py.language.faults import fault
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
 from karamelo_py.points.kinematics import zero_symmetric
@@ -32,7 +31,7 @@ from karamelo_py.points.laws import (
     wave_speed_squared,
 )
 from karamelo_py.points.transfers import updated_velocity
-from karamelo_py.scene.blame import is_foreign, part_of_law
+from karamelo_py.scene.blame import Part, blamed, foreign_parts, is_foreign, part_of_law
 from karamelo_py.scene.hub import Hub
 
 TENSORS = (cauchy_stress, kirchhoff_stress, elastic_strain)
@@ -54,11 +53,10 @@ def try_parts(hub: Hub, setup: Any) -> None:
     if is_foreign(type(basis)):
         _try_basis(hub, setup)
     if is_foreign(type(transfer)):
-        name = f"transfer {registry.name_of('transfer', type(transfer))}"
+        part = next(part for part in foreign_parts(hub) if part.kind is type(transfer))
         v = (_one(setup),) * setup.kin.dimension
-        with _trial(name, type(transfer), hub.update.method.place):
-            given = updated_velocity(transfer, v, v, v)
-            _expect(name, hub.update.method.place, updated_velocity, given, len(v))
+        with _trial(hub, part):
+            _expect(part, updated_velocity, updated_velocity(transfer, v, v, v), len(v))
 
 
 def _one(setup: Any) -> Any:
@@ -66,30 +64,30 @@ def _one(setup: Any) -> Any:
 
 
 @contextmanager
-def _trial(name: str, kind: type, place: Any) -> Iterator[None]:
+def _trial(hub: Hub, part: Part) -> Iterator[None]:
     """Faults are told; numbers that one point happens not to stand are not what this is about."""
-    with told(name, "tried on one point", kind, place), np.errstate(all="ignore"):
+    with blamed(hub, part), np.errstate(all="ignore"):
         try:
             yield
         except (ArithmeticError, ValueError):
             return
 
 
-def _expect(name: str, place: Any, function: Any, given: Any, count: int) -> None:
+def _expect(part: Part, function: Any, given: Any, count: int) -> None:
     got = len(given) if isinstance(given, tuple) else type(given).__name__
     if got != count:
         what = f"{function.__name__} has to return a tuple of {count}, not {got}"
-        raise fault(name, what, place)
+        raise fault(part.name, what, part.place)
 
 
 def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
-    name, kind, place = part_of_law(hub, solid.material)
+    part = part_of_law(hub, solid.material)
     kin, one = setup.kin, _one(setup)
     law = law_in(law_on(solid.material.law, solid.h, solid.T0), type(one))
     size = len(zero_symmetric(kin, one))
     for strain in (0, 1e-3):
         dl = (type(one)(strain),) * kin.tensor_size
-        with _trial(name, kind, place):
+        with _trial(hub, part):
             state = initial_state(law, kin, one)
             after = advance(law, kin, state, dl, one)
             if len(after) != len(state):
@@ -97,9 +95,9 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
                     f"what a point remembers is {len(state)} numbers at first and {len(after)} "
                     "after a step: their number must not change"
                 )
-                raise fault(name, what, place)
+                raise fault(part.name, what, part.place)
             for function in TENSORS:
-                _expect(name, place, function, function(law, kin, after), size)
+                _expect(part, function, function(law, kin, after), size)
             for function in NUMBERS:
                 function(law, kin, after)
             specific_volume(law)
@@ -109,15 +107,14 @@ def _try_basis(hub: Hub, setup: Any) -> None:
     basis, kin, points = setup.basis, setup.kin, setup.blocks[0].points
     if not len(points.id):
         return
-    name = f"basis {registry.name_of('basis', type(basis))}"
-    place = hub.update.method.place
+    part = next(part for part in foreign_parts(hub) if part.kind is type(basis))
     grid = record(setup.grids, points.grid[0])
-    with _trial(name, type(basis), place):
+    with _trial(hub, part):
         where = points.x[0] if points.home is None else points.home
         at = place_at(basis, kin, where, 0)
         line = along(basis, kin, grid, at, 0) if along.defined(type(basis)) else None
         if line is not None and not set(Along._fields) <= set(getattr(line, "_fields", ())):
-            raise fault(name, "along has to return an Along", place)
+            raise fault(part.name, "along has to return an Along", part.place)
         stencil = locate(basis, kin, grid, at)
         for k in range(support(basis, kin)):
             entry(basis, kin, grid, stencil, k)

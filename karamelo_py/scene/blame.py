@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -59,31 +58,41 @@ def part_of_law(hub: Scene, material: Any) -> Part:
 
 
 @contextmanager
-def blamed(hub: Scene) -> Iterator[None]:
-    """Turn an exception in the code of a plug-in into an error of the script that names it."""
+def blamed(hub: Scene, usual: Part | None = None) -> Iterator[None]:
+    """Turn an exception in the code of a plug-in into an error of the script that names it.
+
+    Parameters
+    ----------
+    hub
+        The scene.
+    usual
+        The part at fault where the exception does not show one.
+    """
     try:
         yield
     except KNOWN:
         raise
     except Exception as error:
-        for file, line in places_of(error):
-            part = _owner(hub, file)
-            if part is not None:
-                what = f"{cause_of(error)} ({Path(file).name}:{line})"
-                raise fault(part.name, what, part.place, TRACEBACK) from error
         if isinstance(error, Undefined):
-            for part in foreign_parts(hub):
-                if part.kind in error.classes:
-                    raise fault(part.name, str(error), part.place) from error
-        raise
+            own = [part for part in foreign_parts(hub) if part.kind in error.classes]
+            places = [(part, "") for part in own]
+        else:
+            found = ((_owner(hub, f), f" ({Path(f).name}:{k})") for f, k in places_of(error))
+            places = [(part, place) for part, place in found if part is not None]
+        places += [(usual, "")] if usual else []
+        if not places:
+            raise
+        part, place = places[0]
+        raise fault(part.name, f"{cause_of(error)}{place}", part.place, TRACEBACK) from error
 
 
 def _owner(hub: Scene, file: str) -> Part | None:
     """The part whose file it is, or else one of whose package it is."""
     path = Path(file).resolve()
-    parts = [(part, Path(inspect.getsourcefile(part.kind))) for part in foreign_parts(hub)]
-    for part, own in parts:
-        if own.resolve() == path:
+    parts = [(part, sys.modules.get(part.kind.__module__)) for part in foreign_parts(hub)]
+    for part, module in parts:
+        own = getattr(module, "__file__", None)
+        if own and Path(own).resolve() == path:
             return part
     for part, _ in parts:
         package = sys.modules.get(part.kind.__module__.partition(".")[0])

@@ -16,6 +16,7 @@ from karamelo_py.kernels.hooks import ACTS_ON, STAGES, CompiledHook
 from karamelo_py.language.faults import fault, told
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.fields import ABSENT_AT_POINTS, PARTICLE_NAMES
+from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.modify import Fix
 
@@ -171,6 +172,10 @@ def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
         for kind in kinds:
             for what in _faults_of_field(kind):
                 raise fault(name, f"the field {_shown(kind)} {what}", place)
+            with told(name, f"the field {kind.__name__}", kind, place):
+                what = _wrong_size(kind, hub.domain)
+            if what:
+                raise fault(name, f"the field {kind.__name__}: {what}", place)
     for kind in getattr(owner, "point_fields", ()):
         for column in columns_of(kind):
             shows = _shows(hub, column, kind)
@@ -187,6 +192,18 @@ def _faults_of_field(kind: Any) -> Iterator[str]:
         yield "has no shape: scalar, vector, tensor or planar"
     elif not isinstance(columns_of(kind), tuple):
         yield f"has columns that are no tuple of words, as in ({columns_of(kind)!r},)"
+
+
+def _wrong_size(kind: type, domain: Any) -> str | None:
+    """What is wrong with the number of components, in the dimensions that the scene may have."""
+    for dimension in [domain.dimension] if domain else KINEMATICS:
+        kin = KINEMATICS[dimension]()
+        size, start = kind.shape(kin), getattr(kind, "start", 0.0)
+        if not isinstance(size, int) or size < 1:
+            return f"its shape gives {size!r}, not a number of components"
+        if callable(start) and len(start(kin)) != size:
+            return f"it starts from {len(start(kin))} numbers and has {size} components"
+    return None
 
 
 def _shows(hub: Scene, column: str, kind: type) -> str | None:
