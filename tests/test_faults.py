@@ -29,7 +29,7 @@ from karamelo_py.compiler.fields import scalar
 from karamelo_py.kernels.step import ACCELERATE, SUMS
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.laws import (
-    advance, cauchy_stress, elastic_strain, energy_density, initial_state, jacobian,
+    advance, cauchy_stress, column, elastic_strain, energy_density, initial_state, jacobian,
     kirchhoff_stress, wave_speed_squared,
 )
 from karamelo_py.points.laws.strengths.hardening import flow_stress, hardened, hardening
@@ -266,6 +266,16 @@ def _(law, kin, state):
     return law.E * len(f"{law.E:.3e}")
 
 
+class Hiding(Law): ...
+
+
+class Double(Law): ...
+
+
+column(Hiding, "seq", energy_density)
+column(Double, "dose", energy_density)
+
+
 class Forgetful(NamedTuple):
     """A strength."""
 
@@ -327,7 +337,7 @@ FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
     "silent stop weigh bare formless oneword clashing first again doubled lost",
     "compute": "gauge",
-    "material": "motionless growing raising short uncompiled",
+    "material": "motionless growing raising short uncompiled hiding double",
     "strength": "forgetful",
     "basis": "pathless tuple vague",
     "transfer": "lazy",
@@ -405,6 +415,12 @@ def test_a_fix_that_cannot_be_meant(hub, style, message):
 
 
 def test_a_column_belongs_to_one_field(hub):
+    with pytest.raises(ScriptError, match=r"hiding .*: the column 'seq' is one of every scene"):
+        run(hub, "material(m, hiding, 1)")
+    with pytest.raises(
+        ScriptError, match=r"double .*: the column 'dose' is one of the field Other"
+    ):
+        run(hub, "fix(e, first, all)\nmaterial(m, double, 1)")
     with pytest.raises(ScriptError, match="Second: the column 'dose' is one of the field Other"):
         run(hub, "fix(f, first, all)\nfix(s, again, all)")
     run(hub, "fix(f, first, all)\nfix(g, first, all)")

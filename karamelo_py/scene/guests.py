@@ -17,6 +17,7 @@ from karamelo_py.language.faults import fault, told
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.fields import ABSENT_AT_POINTS, PARTICLE_NAMES
 from karamelo_py.points.kinematics import KINEMATICS
+from karamelo_py.points.laws import columns_of as columns_of_law
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.modify import Fix
 
@@ -181,6 +182,16 @@ def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
             shows = _shows(hub, column, kind)
             if shows:
                 raise fault(name, f"{kind.__name__}: the column '{column}' is {shows}", place)
+
+
+def check_columns(hub: Scene, name: str, law: Any) -> None:
+    """Refuse a law, or a part of one, that shows a number under a name that is in use."""
+    for column in columns_of_law(law):
+        if column in PARTICLE_NAMES and column not in ABSENT_AT_POINTS:
+            raise fault(name, f"the column '{column}' is one of every scene", hub.place)
+        if column in hub.fields.declared_columns():
+            kind = hub.fields.declared_columns()[column][0].__name__
+            raise fault(name, f"the column '{column}' is one of the field {kind}", hub.place)
 
 
 def _faults_of_field(kind: Any) -> Iterator[str]:
