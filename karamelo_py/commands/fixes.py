@@ -6,9 +6,9 @@ from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import MEANINGS
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
+from karamelo_py.scene.guests import check_fix
 from karamelo_py.scene.hub import Catalogue, Hub
-from karamelo_py.scene.modify import Fix
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.other_programs import instead
 
@@ -47,7 +47,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     hub.fixes.add(ID, new, replace=True)
     hub.values.publish_vector(ID, new.published)
     _warn_if_empty(hub, "fix", ID, new)
-    _warn_if_idle(hub, style, new)
+    check_fix(hub, new)
     new.defined()
 
 
@@ -169,21 +169,6 @@ def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
                 "formulas will use the variable",
                 hint=f"choose another ID, such as {ID}_1",
             )
-
-
-def _warn_if_idle(hub: Hub, style: str, item: Fix) -> None:
-    """A fix that overrides nothing does nothing: perhaps a hook is misspelled."""
-    from karamelo_py.kernels.hooks import STAGES
-    from karamelo_py.scene.modify import Fix
-
-    if item.for_method or item.hooks() or type(item).refresh is not Fix.refresh:
-        return
-    own = [name for name in dir(item) if not hasattr(Fix, name) and callable(getattr(item, name))]
-    found = next(((name, hook) for name in own if (hook := nearest(name, STAGES))), None)
-    hub.warn(
-        f"fix {style} has no hook and no refresh: it does nothing",
-        hint=f"its author wrote {found[0]}; the hook is {found[1]}" if found else None,
-    )
 
 
 def _warn_if_empty(hub: Hub, kind: str, ID: str, item: object) -> None:

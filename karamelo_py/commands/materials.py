@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
+from karamelo_py.scene.guests import check_columns
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.material import Material, Part
 from karamelo_py.script.parser import parse_text
@@ -137,5 +138,6 @@ def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Seque
     target = registry.find(kind, style)
     catalogue.refuse(ID)
     made = signature.call(target, hub, list(arguments), f"{kind} {style}")
-    entry = Material if kind == "material" else Part
-    catalogue.add(ID, entry(kind, style, made))
+    entry = (Material if kind == "material" else Part)(kind, style, made)
+    check_columns(hub, f"{kind} {style}", entry.law)
+    catalogue.add(ID, entry)

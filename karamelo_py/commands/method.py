@@ -10,6 +10,7 @@ from typing import Any, Literal
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Parameter
+from karamelo_py.scene.guests import check_part
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, meant
 
@@ -74,6 +75,8 @@ def method(
         )
     chosen = hub.update.method = parts["method"]
     hub.update.transfer, chosen.basis = parts["transfer"], parts["basis"]
+    for family, part in parts.items():
+        check_part(hub, f"{family} {call.names[family]}", part)
     chosen.basis_name = f"{basis} {call.variant}".strip()
     chosen.place = hub.place
     hub.update.thermal = chosen.thermal
@@ -98,7 +101,9 @@ def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
     method
     """
     target = registry.find("scheme", style)
-    hub.update.scheme = signature.call(target, hub, arguments, f"scheme {style}")
+    chosen = signature.call(target, hub, arguments, f"scheme {style}")
+    check_part(hub, f"scheme {style}", chosen)
+    hub.update.scheme, hub.update.scheme_place = chosen, hub.place
 
 
 def precision(hub: Hub, kind: Literal["double", "single"]) -> None:

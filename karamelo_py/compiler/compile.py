@@ -87,6 +87,15 @@ def shared(function: Callable) -> Callable:
     return function
 
 
+class Undefined(TypeError):
+    """A point function is not defined for classes that need it."""
+
+    def __init__(self, function: str, classes: tuple):
+        names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
+        super().__init__(f"{function} is not defined for ({names})")
+        self.classes = classes
+
+
 def point_function(*, tags: int = 1, branches: bool = False) -> Callable[[Callable], Callable]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
@@ -108,14 +117,10 @@ def point_function(*, tags: int = 1, branches: bool = False) -> Callable[[Callab
         def find(classes: tuple) -> Callable | None:
             return table.get(classes) or (fallback[0] if fallback else None)
 
-        def missing(classes: tuple) -> str:
-            names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
-            return f"{stub.__name__} is not defined for ({names})"
-
         def select(classes: tuple) -> Callable:
             chosen = find(classes)
             if chosen is None:
-                raise TypeError(missing(classes))
+                raise Undefined(stub.__name__, classes)
             memo[classes if tags > 1 else classes[0]] = chosen
             return chosen
 

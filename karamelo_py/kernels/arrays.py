@@ -75,11 +75,16 @@ class Points(NamedTuple):
     fields: tuple  # declared fields, (components, n)
 
 
-def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """Every array of the points, with its name; the points come last in its shape."""
+def own_arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
+    """Every array that all points have, with its name; the points come last in its shape."""
     for name, array in points._asdict().items():
         if name != "fields" and array is not None:
             yield name, array
+
+
+def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
+    """The same, and the declared fields."""
+    yield from own_arrays_of(points)
     for one in points.fields:
         yield name_of(type(one)), one.array
 

@@ -174,7 +174,10 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
 def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:
     """Call a command or make a style with values; a fault of its author is told as such."""
     if not inspect.isclass(target):
-        return target(hub, *values, **named)
+        if target.__module__.startswith(registry.PREFIX):
+            return target(hub, *values, **named)
+        with told(name, "it", target, getattr(hub, "place", None)):
+            return target(hub, *values, **named)
     with told(name, "__init__", target, getattr(hub, "place", None)):
         if not is_record(target):
             return target(hub, *values, **named)

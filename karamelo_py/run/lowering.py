@@ -21,8 +21,8 @@ from karamelo_py.kernels.arrays import (
     Nodes,
     Points,
     Setup,
-    arrays_of,
     new_clock,
+    own_arrays_of,
 )
 from karamelo_py.kernels.g2p import NodalMean
 from karamelo_py.kernels.heat import Conducting
@@ -306,7 +306,7 @@ def chosen(block: Block, keep: np.ndarray) -> Block:
     """The block with the points where `keep` (n,) is true; they are to be sorted anew."""
     points = block.points
     # Contiguous: another layout would be compiled for.
-    kept = {name: np.compress(keep, a, axis=-1) for name, a in arrays_of(points)}
-    own = tuple(type(one)(kept[fields.name_of(type(one))]) for one in points.fields)
+    kept = {name: np.compress(keep, a, axis=-1) for name, a in own_arrays_of(points)}
+    declared = tuple(type(one)(np.compress(keep, one.array, axis=-1)) for one in points.fields)
     rest = {name: kept.get(name) for name in points._fields if name != "fields"}
-    return block._replace(points=Points(**rest, fields=own))
+    return block._replace(points=Points(**rest, fields=declared))

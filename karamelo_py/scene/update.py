@@ -27,6 +27,8 @@ class Update:
         Whether changes of volume are averaged against volumetric locking.
     scheme
         The scheme's tag.
+    scheme_place
+        Where the script says so.
     fixed_dt
         The constant step of set_dt, or None: the step follows the fastest point.
     dt_factor
@@ -44,6 +46,7 @@ class Update:
         self.method: Any = None
         self.transfer: NamedTuple | None = None
         self.scheme: NamedTuple = MUSL()
+        self.scheme_place: Place | None = None
         self.thermal = False
         self.anti_locking = False
         self.fixed_dt: float | None = None

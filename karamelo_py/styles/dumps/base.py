@@ -26,6 +26,8 @@ class Dump:
         What to write, as the style understands it.
     """
 
+    style = ""
+
     def __init__(
         self,
         hub: Hub,
