@@ -178,6 +178,9 @@ def step_size(s):
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
+ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
+
+
 @kernel
 def choose_dt(control):
     """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end.
@@ -193,10 +196,11 @@ def choose_dt(control):
     dt = clock.fixed_dt if clock.fixed_dt > 0 else clock.dt_factor * limit
     clock.over_limit = clock.over_limit + 1 if dt > limit else 0
     remaining = clock.end_time - control.values[TIME]
-    # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end.
-    if 0 < remaining <= dt * (1 + 1e-9):
+    # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end, and
+    # none more than there are.
+    if 0 < remaining <= dt * (1 + ROUNDING):
         dt = remaining
-    elif 0 < remaining < 2 * dt * (1 - 1e-9):
+    elif 0 < remaining < 2 * dt * (1 - ROUNDING):
         dt = 0.5 * remaining
     control.values[DT] = dt
 
