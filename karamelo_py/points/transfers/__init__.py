@@ -39,9 +39,12 @@ def updated_velocity(transfer, v, v_pic, dv):
     """The point's velocity after the step."""
 
 
-@updated_velocity.otherwise
-def _(transfer, v, v_pic, dv):
-    return v_pic
+def take_nodal_velocity(transfer: type) -> None:
+    """Let the points of `transfer` take the velocity of the nodes after the step, as PIC's do."""
+
+    @updated_velocity.on(transfer)
+    def _(transfer, v, v_pic, dv):
+        return v_pic
 
 
 @point_function()

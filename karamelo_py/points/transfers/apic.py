@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import Moment, affine
+from karamelo_py.points.transfers import Moment, affine, take_nodal_velocity
 
 
 class APIC(NamedTuple):
@@ -26,3 +26,6 @@ class APIC(NamedTuple):
 
 
 affine.register(APIC)
+
+
+take_nodal_velocity(APIC)

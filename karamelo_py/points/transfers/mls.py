@@ -12,6 +12,7 @@ from karamelo_py.points.transfers import (
     gradient_weight,
     kept_gradient,
     straining,
+    take_nodal_velocity,
     taylor,
 )
 
@@ -61,3 +62,6 @@ def _(transfer, kin, moment, gradient):
 
 
 taylor.register(MLS)
+
+
+take_nodal_velocity(MLS)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from karamelo_py.points.transfers import take_nodal_velocity
+
 
 class PIC(NamedTuple):
     """v_p = v_pic, the updated nodal velocity at the point.
@@ -17,3 +19,6 @@ class PIC(NamedTuple):
     """
 
     inverts_spread = False
+
+
+take_nodal_velocity(PIC)

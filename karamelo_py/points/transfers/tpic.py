@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import Moment, taylor
+from karamelo_py.points.transfers import Moment, take_nodal_velocity, taylor
 
 
 class TPIC(NamedTuple):
@@ -24,3 +24,6 @@ class TPIC(NamedTuple):
 
 
 taylor.register(TPIC)
+
+
+take_nodal_velocity(TPIC)
