@@ -16,7 +16,7 @@ point_fields
 inverts_spread
     whether it divides by D = sum_I N_I (X_I - x)(X_I - x)^T, which some bases let vanish.
 
-What is not defined for a class is that of PIC: nothing is kept, v alone is mapped.
+What else is not defined for a class is that of PIC: nothing is kept, v alone is mapped.
 """
 
 from typing import Any, NamedTuple
