@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from textwrap import dedent
 
@@ -64,13 +65,15 @@ def run_script(tmp_path, monkeypatch, capsys) -> Callable[..., Result]:
     return run
 
 
-@pytest.fixture(scope="session")
-def _interpreter() -> Iterator[subprocess.Popen]:
+@contextmanager
+def interpreting(*folders: Path) -> Iterator[subprocess.Popen]:
+    """A process that interprets scripts, and finds packages in further folders."""
+    path = os.pathsep.join([*map(str, folders), os.environ["PYTHONPATH"]])
     process = subprocess.Popen(
         [sys.executable, str(TESTS / "uncompiled.py")],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path},
         text=True,
         encoding="utf-8",
     )
@@ -79,6 +82,12 @@ def _interpreter() -> Iterator[subprocess.Popen]:
     yield process
     process.stdin.close()
     process.wait(timeout=30)
+
+
+@pytest.fixture(scope="session")
+def _interpreter() -> Iterator[subprocess.Popen]:
+    with interpreting() as process:
+        yield process
 
 
 def _ask(process: subprocess.Popen, request: dict) -> dict:

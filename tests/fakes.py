@@ -68,7 +68,7 @@ class FakeHub:
     """What output sees of a hub."""
 
     def __init__(self, folder, dimension=2, count=40):
-        from karamelo_py.output.output import Output
+        from karamelo_py.output.schedule import Output
 
         used = np.arange(3) < dimension
         self.folder = Path(folder)

@@ -62,6 +62,23 @@ def test_the_house_has_all_rooms():
         assert list((ROOT / "karamelo_py").rglob(named)) or (ROOT / named).exists(), named
 
 
+def test_the_house_counts_its_arrows():
+    """Folders right below the package, and which of them import from which others."""
+    page = (ROOT / "docs" / "house.md").read_text("utf-8")
+    order = re.findall(r"^\| `(\w+)/` \|", page, re.M)
+    found = set()
+    for path in (ROOT / "karamelo_py").rglob("*/*.py"):
+        folder = path.relative_to(ROOT / "karamelo_py").parts[0]
+        text = path.read_text("utf-8")
+        found |= {(folder, to) for to in re.findall(r"^ *from karamelo_py\.(\w+)", text, re.M)}
+    arrows = [(a, b) for a, b in found if a != b]
+    now = dict(re.findall(r"^\| ([^|]*) \| \d+ \| (\d+) \|$", page, re.M))
+    assert int(now["folders"]) == len(order) == len({end for arrow in arrows for end in arrow})
+    # One import more or less is no other picture.
+    assert int(now["arrows between them"]) == pytest.approx(len(arrows), abs=3)
+    assert [(a, b) for a, b in arrows if order.index(a) > order.index(b)] == []
+
+
 def test_readme_tells_the_whole_script():
     """The tour of README, put together, is inputs/in.two_disks without its comments."""
     tour = "".join(blocks(ROOT / "README.md", "karamelo"))

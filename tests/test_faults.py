@@ -1,12 +1,16 @@
-"""Styles that are wrong: the user is told which, where in the script, and where in the style."""
+"""Styles that are wrong: one message says which, of what package, where in the script, and why."""
 
+import os
+import re
+import subprocess
 import sys
-from importlib.metadata import EntryPoint
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from conftest import interpreting
 from numba import config
+from plugged import offer
 
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
@@ -15,72 +19,449 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 
-STYLES = """
-from karamelo_py.kernels.hooks import point_hook
-from karamelo_py.scene.group import ParticleGroup
-from karamelo_py.scene.modify import Compute, Fix
+pytestmark = pytest.mark.xdist_group("faults")
 
+# A package of styles; their names in scripts are those of the classes, in small letters.
+STYLES = '''
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.fields import scalar
+from karamelo_py.kernels.step import ACCELERATE, SUMS
+from karamelo_py.points.basis.product import Along, along, register
+from karamelo_py.points.laws import (
+    advance, cauchy_stress, column, elastic_strain, energy_density, initial_state, jacobian,
+    kirchhoff_stress, wave_speed_squared,
+)
+from karamelo_py.points.laws.strengths.hardening import flow_stress, hardened, hardening
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.modify import Compute, Fix, heat_hook, node_hook, point_hook
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.dumps.base import Dump
+
+
+# --- hooks
 class Spring(Fix):
     def __init__(self, hub, group: ParticleGroup, k: float = 1.0):
         super().__init__(hub, group)
         1 / k
 
     def initial_integrate(self, points):
-        return missing
+        return missing  # noqa
 
-def light(mass, v, x_old, x, value, before, dt):
-    return v + "1", x, 0.0
 
-class Light(Fix):
+class Group(Fix):
+    def __init__(self, hub, group: ParticleGroup):
+        super().__init__(hub, group)
+        self.formulas = (Expression(1.0),)
+
+
+def uncompilable(mass, v, x_old, x, value, before, dt):
+    return v * len(f"{value:.3e}"), x, 0.0
+
+
+class Light(Group):
+    post_grid_to_point = point_hook(uncompilable)
+
+
+def at_point(mass, v, x_old, x, value, before, dt):
+    return v, x, 1.0
+
+
+def at_node(mass, v, v_star, force, value, before, dt, share):
+    return v, v_star, force, 1.0
+
+
+class Misplaced(Group):
+    post_particles_to_grid = point_hook(at_point)
+
+
+class Swapped(Group):
+    final_integrate = node_hook(at_node)
+
+
+class Cold(Group):
+    supply_heat = point_hook(at_point)
+
+
+class Hot(Group):
+    initial_integrate = heat_hook(at_point)
+
+
+class Many(Group):
+    post_particles_to_grid = node_hook(at_point)
+
+
+class Few(Group):
+    initial_integrate = point_hook(lambda mass, v, x_old, x, value, before, dt: (v, x))
+
+
+class Undirected(Fix):
+    post_particles_to_grid = node_hook(at_node)
+
     def __init__(self, hub, group: ParticleGroup):
         super().__init__(hub, group)
 
-    def hooks(self):
-        return {"post_grid_to_point": point_hook(light)}
+
+class Viewless(Group):
+    def initial_integrate(self): ...
+
 
 class Idle(Fix):
+    published = ()
+
     def initial_integrat(self, points): ...
+
+
+class Misspelt(Idle):
+    def initial_integrate(self, points): ...
+
+    def post_gird_to_point(self, points): ...
+
+    def _post_process(self): ...
+
+    def position_of(self): ...
+
+
+class Silent(Group):
+    published = ("x",)
+    initial_integrate = point_hook(at_point)
+
+
+class Stop(Group):
+    def initial_integrate(self, points):
+        points.velocity[:] = 0
+
+
+class Weigh(Group):
+    def initial_integrate(self, points):
+        points.mass[:] = 0
+
 
 class Gauge(Compute):
     published = ("x",)
 
     def refresh(self):
         self.publish("s", 1)
-"""
+
+
+# --- fields
+class Shapeless(NamedTuple):
+    array: Any
+
+
+class Wordy(NamedTuple):
+    array: Any
+    shape = scalar
+    columns = ("dose")
+
+
+class Sized(NamedTuple):
+    array: Any
+    shape = scalar
+
+    def start(kin):
+        return 1.0, 2.0
+
+
+class Unshaped(NamedTuple):
+    array: Any
+
+    def shape(kin):
+        return kin.dimensions
+
+
+class Taken(NamedTuple):
+    array: Any
+    shape = scalar
+    columns = ("vx",)
+
+
+class Other(NamedTuple):
+    array: Any
+    shape = scalar
+    columns = ("dose",)
+
+
+class Second(Other):
+    pass
+
+
+class Bare(Group):
+    point_fields = Other
+
+
+class Formless(Group):
+    point_fields = (Shapeless,)
+
+
+class OneWord(Group):
+    point_fields = (Wordy,)
+
+
+class Clashing(Group):
+    point_fields = (Taken,)
+
+
+class Doubled(Group):
+    point_fields = (Sized,)
+
+
+class Lost(Group):
+    node_fields = (Unshaped,)
+
+
+class First(Group):
+    published = ()
+    point_fields = (Other,)
+
+
+class Again(Group):
+    point_fields = (Second,)
+
+
+# --- laws
+class Law(NamedTuple):
+    """E and nothing else."""
+
+    E: float
+    specific_volume = 1.0
+
+
+class Motionless(Law): ...
+
+
+class Growing(Law): ...
+
+
+class Raising(Law): ...
+
+
+class Short(Law): ...
+
+
+class Uncompiled(Law): ...
+
+
+for kind in (Motionless, Growing, Raising, Short, Uncompiled):
+    initial_state.on(kind)(lambda law, kin, like: (like,))
+    cauchy_stress.on(kind)(lambda law, kin, state: (state[0],) * 3)
+    kirchhoff_stress.on(kind)(lambda law, kin, state: (state[0],) * 3)
+    elastic_strain.on(kind)(lambda law, kin, state: (state[0],) * 3)
+    jacobian.on(kind)(lambda law, kin, state: state[0])
+    energy_density.on(kind)(lambda law, kin, state: state[0])
+    wave_speed_squared.on(kind)(lambda law, kin, state: law.E)
+for kind in (Short, Uncompiled):
+    advance.on(kind)(lambda law, kin, state, dl, dt: state)
+advance.on(Growing)(lambda law, kin, state, dl, dt: (*state, dt))
+cauchy_stress.on(Short)(lambda law, kin, state: (state[0], state[0]))
+
+
+@advance.on(Raising)
+def _(law, kin, state, dl, dt):
+    return unknown  # noqa
+
+
+@wave_speed_squared.on(Uncompiled)
+def _(law, kin, state):
+    return law.E * len(f"{law.E:.3e}")
+
+
+class Hiding(Law): ...
+
+
+class Double(Law): ...
+
+
+column(Hiding, "seq", energy_density)
+column(Double, "dose", energy_density)
+
+
+class Forgetful(NamedTuple):
+    """A strength."""
+
+    G: float
+
+
+hardening(Forgetful, R=0.0)
+flow_stress.on(Forgetful)(lambda strength, memory, increment, heat, dt: (strength.G, strength.G))
+hardened.on(Forgetful)(lambda strength, memory, increment, dt: (memory[0],))
+
+
+# --- parts of a step
+class Basis(NamedTuple):
+    cells = nodes_per_cell = 1
+    least_nodes = 2
+    steady_moment = steep_edge = True
+
+
+class Pathless(Basis): ...
+
+
+class Tuple(Basis): ...
+
+
+class Vague(NamedTuple): ...
+
+
+class Lazy(NamedTuple):
+    inverts_spread = False
+
+
+class Rowless(NamedTuple): ...
+
+
+class Wrong(NamedTuple):
+    rows = (SUMS, "twice")
+
+
+class Grounded(NamedTuple):
+    rows = ACCELERATE
+
+
+register(Pathless, 2)
+register(Tuple, 2)
+along.on(Tuple)(lambda basis, kin, grid, place, direction: (0, 0.5, (0.5, 0.5), (-1.0, 1.0), ()))
+
+
+# --- others
+class Torn(Dump):
+    def write(self):
+        raise KeyError("lost")
+
+
+def forget(hub):
+    """Do nothing well."""
+    return {}["it"]
+'''
+FAMILIES = {
+    "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
+    "silent stop weigh bare formless oneword clashing first again doubled lost",
+    "compute": "gauge",
+    "material": "motionless growing raising short uncompiled hiding double",
+    "strength": "forgetful",
+    "basis": "pathless tuple vague",
+    "transfer": "lazy",
+    "scheme": "rowless wrong grounded",
+    "dump": "torn",
+    "command": "forget",
+}
+NAMES = {"oneword": "OneWord", "forget": "forget"}
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """A folder with the package above, mpm-broken."""
+    folder = tmp_path_factory.mktemp("faults")
+    (folder / "mpm_broken.py").write_text(STYLES)
+    styles = {
+        f"karamelo_py.{family}": {
+            name: f"mpm_broken:{NAMES.get(name, name.title())}" for name in names.split()
+        }
+        for family, names in FAMILIES.items()
+    }
+    return offer(folder, "mpm-broken", "0.1", styles)
+
+
+@pytest.fixture(scope="module")
+def _interpreter(site):
+    with interpreting(site) as process:
+        yield process
 
 
 @pytest.fixture
-def hub(tmp_path, monkeypatch):
-    """A hub that knows the styles above and has a script with a fix and a compute of them."""
-    (tmp_path / "styles_under_test.py").write_text(STYLES)
-    monkeypatch.syspath_prepend(tmp_path)
-    names = (("fix", "Spring"), ("fix", "Light"), ("fix", "Idle"), ("compute", "Gauge"))
-    for family, name in names:
-        entry = EntryPoint(name.lower(), f"styles_under_test:{name}", f"karamelo_py.{family}")
-        monkeypatch.setitem(registry._families()[family], name.lower(), [entry])
+def hub(site, monkeypatch):
+    """A hub that knows the styles above."""
+    monkeypatch.syspath_prepend(str(site))
+    registry.forget()
     yield Hub()
-    for key in [key for key in registry._loaded if key[1] in ("spring", "light", "idle", "gauge")]:
-        del registry._loaded[key]
-    sys.modules.pop("styles_under_test", None)
+    monkeypatch.undo()
+    registry.forget()
 
 
 def run(hub, text):
     Interpreter(hub).run_text(text, "in.wrong")
 
 
-def test_hook(hub):
-    run(hub, "fix(s, spring, all)")
-    with pytest.raises(ScriptError) as caught:
-        hub.fixes["s"].hooks()["initial_integrate"](None)
-    text = caught.value.render()
-    assert text.startswith("in.wrong:1:1: error: fix spring (of ")
-    assert "initial_integrate: NameError: name 'missing' is not defined" in text
-    assert "(styles_under_test.py:12)" in text
-
-
 def test_init(hub):
-    with pytest.raises(ScriptError, match=r"fix spring .*__init__: ZeroDivisionError.*_test.py:9"):
+    with pytest.raises(ScriptError, match=r"fix spring .*__init__: ZeroDivisionError.*broken.py:"):
         run(hub, "fix(s, spring, all, 0)")
+
+
+@pytest.mark.parametrize(
+    ("style", "message"),
+    [
+        ("misplaced", "post_particles_to_grid is a moment of nodes, and its hook was made for po"),
+        ("swapped", "final_integrate is a moment of points, and its hook was made for nodes"),
+        ("cold", "supply_heat is a moment of heated points, and its hook was made for points"),
+        ("hot", "initial_integrate is a moment of points, and its hook was made for heated"),
+        ("many", "post_particles_to_grid: at_point has to take the 8 arguments of a hook on nodes"),
+        ("few", "initial_integrate: <lambda> has to return 3 numbers, not (1.0, 1.0)"),
+        ("undirected", "it has no formulas, so post_particles_to_grid would act in no direction"),
+        ("viewless", "initial_integrate has to take one argument, the view of the group"),
+        ("bare", "point_fields has to be a tuple of classes, as in (Other,)"),
+        ("formless", "the field Shapeless has no shape: scalar, vector, tensor or planar"),
+        ("oneword", "the field Wordy has columns that are no tuple of words, as in ('dose',)"),
+        ("doubled", "the field Sized: it starts from 2 numbers and has 1 components"),
+        ("lost", "the field Unshaped: AttributeError: 'Line' object has no attribute 'dimensions'"),
+        ("clashing", "Taken: the column 'vx' is one of every scene"),
+    ],
+)
+def test_a_fix_that_cannot_be_meant(hub, style, message):
+    with pytest.raises(ScriptError) as caught:
+        run(hub, f"\nfix(s, {style}, all)")
+    text = caught.value.render()
+    assert text.startswith(f"in.wrong:2:1: error: fix {style} (of mpm-broken 0.1): {message}")
+    assert f"tell the author of {style}" in text
+
+
+def test_a_column_belongs_to_one_field(hub):
+    with pytest.raises(ScriptError, match=r"hiding .*: the column 'seq' is one of every scene"):
+        run(hub, "material(m, hiding, 1)")
+    with pytest.raises(
+        ScriptError, match=r"double .*: the column 'dose' is one of the field Other"
+    ):
+        run(hub, "fix(e, first, all)\nmaterial(m, double, 1)")
+    with pytest.raises(ScriptError, match="Second: the column 'dose' is one of the field Other"):
+        run(hub, "fix(f, first, all)\nfix(s, again, all)")
+    run(hub, "fix(f, first, all)\nfix(g, first, all)")
+    assert "dose" in hub.fields.particle_names()
+
+
+@pytest.mark.parametrize(
+    ("style", "told"),
+    [
+        ("idle)", "idle has no hook and no refresh: it does nothing"),
+        ("idle)", "initial_integrat, which is no hook"),
+        ("idle)", "meant initial_integrate, or begins"),
+        ("misspelt)", "post_gird_to_point, which is no hook and is never called"),
+        ("misspelt)", "meant post_grid_to_point, or begins the name with _"),
+        ("silent, all)", "says in `published` that it publishes, and none of its hooks does: s_x"),
+    ],
+)
+def test_what_would_be_silent(hub, capsys, style, told):
+    run(hub, f"fix(s, {style}")
+    text = capsys.readouterr().err
+    assert told in text
+    assert "_post_process" not in text
+    assert "position_of" not in text
+
+
+@pytest.mark.parametrize(
+    ("line", "part", "message"),
+    [
+        ("method(ulmpm, PIC, vague)", "basis vague", "Vague has no attribute cells, nodes_per"),
+        ("method(ulmpm, lazy, linear)", "transfer lazy", "updated_velocity is not defined for"),
+        ("scheme(rowless)", "scheme rowless", "Rowless has no attribute rows"),
+        ("scheme(wrong)", "scheme wrong", "'twice' in its rows is not a row of a scheme"),
+        ("scheme(grounded)", "scheme grounded", "none of its rows is a Scatter"),
+        ("forget()", "forget", "it: KeyError: 'it' (mpm_broken.py:"),
+    ],
+)
+def test_parts_that_are_not_whole(hub, line, part, message):
+    with pytest.raises(ScriptError) as caught:
+        run(hub, line)
+    text = caught.value.render()
+    assert text.startswith(f"in.wrong:1:1: error: {part} (of mpm-broken 0.1): {message}")
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -90,9 +471,9 @@ def test_a_hook_that_cannot_be_compiled(hub):
     with pytest.raises(ScriptError) as caught:
         lower_hooks(hub, list(hub.fixes.values()))
     text = caught.value.render()
-    assert text.startswith("in.wrong:2:1: error: fix light (of ")
-    assert "post_grid_to_point: Numba cannot compile it: No implementation of function" in text
-    assert "(styles_under_test.py:15)" in text
+    assert text.startswith("in.wrong:2:1: error: fix light (of mpm-broken 0.1): post_grid_to_point")
+    assert "Numba cannot compile it: " in text
+    assert re.search(r"\(mpm_broken.py:\d+\)", text)
 
 
 def test_refresh(hub):
@@ -101,9 +482,105 @@ def test_refresh(hub):
         hub.refresh_values()
 
 
-def test_a_fix_without_hooks(hub, capsys):
-    run(hub, "fix(i, idle)")
-    assert "wrote initial_integrat; the hook is initial_integrate" in capsys.readouterr().err
+# --- at a run -----------------------------------------------------------------------------------
+
+# Line 4 is the part that is tried.
+SCENE = """\
+{method}
+dimension(1, 0, 4, 0.5)
+region(bar, block, 1, 3)
+{material}
+solid(bar, region, bar, 2, m, 0.5)
+fix(start, initial_velocity_particles, all, 1)
+{fix}
+dump(d, all, particle, 1, d.*.LAMMPS, vx)
+{dump}
+set_dt(1e-3)
+run(2)
+"""
+
+
+def scene(**lines):
+    usual = {
+        "method": "method(ulmpm, FLIP, linear, 1)",
+        "material": "material(m, linear, 3, 100, 0.3)",
+        "fix": "",
+        "dump": "",
+    }
+    return SCENE.format(**(usual | lines))
+
+
+@pytest.mark.parametrize(
+    ("lines", "line", "part", "message"),
+    [
+        ({"fix": "fix(s, spring, all)"}, 7, "fix spring", "initial_integrate: NameError: name 'mi"),
+        ({"fix": "fix(s, weigh, all)"}, 7, "fix weigh", "initial_integrate: ValueError: assign"),
+        ({"dump": "dump(t, all, torn, 1, t)"}, 9, "dump torn", "write: KeyError: 'lost' (mpm_bro"),
+        ({"material": "material(m, motionless, 1)"}, 4, "material motionless", "advance is not "),
+        ({"material": "material(m, raising, 1)"}, 4, "material raising", "name 'unknown' is not"),
+        (
+            {"material": "material(m, growing, 1)"}, 4, "material growing",
+            "what a point remembers is 1 numbers at first and 2 after a step",
+        ),
+        (
+            {"material": "material(m, short, 1)"}, 4, "material short",
+            "cauchy_stress has to return a tuple of 3, not 2",
+        ),
+        (
+            {
+                "material": "eos(e, linear, 3, 100)\nstrength(s, forgetful, 50)\n"
+                "material(m, eos-strength, e, s)"
+            }, 5, "strength forgetful", "what a point remembers is",
+        ),
+        (
+            {"method": "method(ulmpm, FLIP, pathless, 1)"}, 1, "basis pathless",
+            "along is not defined for (Pathless)",
+        ),
+        (
+            {"method": "method(ulmpm, FLIP, tuple, 1)"}, 1, "basis tuple",
+            "along has to return an Along",
+        ),
+    ],
+)  # fmt: skip
+def test_a_run_names_the_part(run_interpreted, lines, line, part, message):
+    text = run_interpreted(scene(**lines), status=1).err
+    assert f"in.script:{line}:1: error: {part} (of mpm-broken 0.1): " in text
+    assert message in text
+    assert "internal error" not in text
+
+
+def test_what_a_hook_changes_in_place_is_written(run_interpreted):
+    folder = run_interpreted(scene(fix="fix(s, stop, all)")).folder
+    for step in (1, 2):
+        vx = np.loadtxt(folder / f"d.{step}.LAMMPS", skiprows=11)[:, -1]
+        assert (vx == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("lines", "part"),
+    [
+        ({"fix": "fix(s, light, all)"}, "in.wrong:7:1: error: fix light"),
+        ({"material": "material(m, uncompiled, 1)"}, "in.wrong:4:1: error: material uncompiled"),
+    ],
+)
+def test_the_command_line_tells_of_what_numba_cannot_compile(site, tmp_path, lines, part):
+    (tmp_path / "in.wrong").write_text(scene(**lines))
+    done = subprocess.run(
+        [sys.executable, "-m", "karamelo_py.app.cli", "in.wrong"],
+        cwd=tmp_path,
+        env=os.environ
+        | {
+            "PYTHONPATH": os.pathsep.join([str(site), os.environ["PYTHONPATH"]]),
+            "NUMBA_DISABLE_JIT": "0",
+        },
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 1
+    assert f"{part} (of mpm-broken 0.1): " in done.stderr
+    assert re.search(r"Numba cannot compile it: .*\(mpm_broken.py:\d+\)", done.stderr)
+    assert "Traceback" not in done.stderr
 
 
 class View(PointsView):
@@ -125,8 +602,11 @@ def test_views_refuse_what_does_not_fit():
     view = View()
     view.velocity = 1.0
     view.velocity += np.ones((3, 2))
+    view.velocity[0] += 1
     view.write_back()
-    assert (view._v == 2).all()
+    assert (view._v == [[3, 3], [2, 2], [2, 2]]).all()
+    with pytest.raises(ValueError, match="read-only"):
+        view.mass[:] = 0
     with pytest.raises(AttributeError, match="did you mean velocity"):
         view.velocty = 1.0
     with pytest.raises(AttributeError, match="did you mean velocity"):

@@ -13,7 +13,7 @@ import pytest
 from states import same_bits
 
 from comparisons.results import read_dump
-from karamelo_py.points.frames import Total, drawn_back
+from karamelo_py.points.frames import Total, pulled_back
 from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 
@@ -219,10 +219,10 @@ def test_flux_in_the_total_frame():
     for kin, d in ((PlaneStrain(), 2), (Space(), 3)):
         F = np.eye(d) + 0.3 * rng.normal(size=(d, d))
         g = rng.normal(size=d)
-        found = drawn_back(Total(), kin, tuple(g), tuple(F.ravel()))
+        found = pulled_back(Total(), kin, tuple(g), tuple(F.ravel()))
         assert found == pytest.approx(np.linalg.inv(F.T @ F) @ g)
     F = (2.0, 0.0, 0.0, 0.5, 1.7)  # the last is the stretch around the axis
-    assert drawn_back(Total(), Axisymmetric(), (1.0, 1.0), F) == pytest.approx((0.25, 4.0))
+    assert pulled_back(Total(), Axisymmetric(), (1.0, 1.0), F) == pytest.approx((0.25, 4.0))
 
 
 def test_face_of_a_point():

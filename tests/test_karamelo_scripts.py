@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from karamelo_py.language import registry
-from karamelo_py.script.elsewhere import INSTEAD, KARAMELO_COMMANDS, instead
+from karamelo_py.script.other_programs import INSTEAD, KARAMELO_COMMANDS, instead
 
 PAGE = Path(__file__).parents[1] / "docs" / "from-karamelo.md"
 

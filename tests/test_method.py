@@ -1,13 +1,9 @@
 """The command method, and parts of a step with parameters of their own, which a plug-in brings."""
 
-import os
-import subprocess
 import sys
-from pathlib import Path
 
-import numpy as np
 import pytest
-from scenes import block
+from plugged import install, offer
 
 from karamelo_py.app.cli import main
 from karamelo_py.language import registry
@@ -16,8 +12,6 @@ from karamelo_py.points.basis.cpgimp import CPGIMPCorners, CPGIMPStretch
 from karamelo_py.points.transfers.tflip import TFLIP
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
-
-PLUGIN = Path(__file__).parent / "plugin_steps"
 
 
 def update(text):
@@ -28,12 +22,16 @@ def update(text):
 
 
 @pytest.fixture
-def plugin(monkeypatch):
-    """The parts of the plug-in, by the names of their classes."""
-    monkeypatch.syspath_prepend(str(PLUGIN))
+def plugin(monkeypatch, tmp_path):
+    """The example package, and one that offers what is a built-in style already."""
+    monkeypatch.syspath_prepend(str(install(tmp_path)))
+    taken = {"karamelo_py.basis": {"cubic-spline": "mpm_examples.smooth:Smooth"}}
+    offer(tmp_path, "mpm-taken", "0.1", taken)
     registry.forget()
-    yield __import__("mpm_steps")
+    yield
     monkeypatch.undo()
+    for name in [name for name in sys.modules if name.startswith("mpm_examples")]:
+        del sys.modules[name]
     registry.forget()
 
 
@@ -79,19 +77,26 @@ def test_what_cannot_be_meant(typed, column, part):
     assert caught.value.place.column == column + (7 if column > 1 else 0)
 
 
+def test_the_same_word_twice():
+    """As scripts have it that keep places for what only some transfers and bases take."""
+    chosen = update("method(ulmpm, TPIC, ugimp, thermo-mechanical, thermo-mechanical)")
+    assert chosen.thermal
+
+
 # --- parts of a plug-in -------------------------------------------------------------------------
 
 
 def test_parameters_of_a_plug_in(plugin):
-    chosen = update("scheme(paced, 2.5)\nmethod(gapped, growing, smooth, 3, 2, 0.25, right, 7)")
-    assert chosen.transfer == plugin.Growing(3.0, 2)
-    assert chosen.method.basis == plugin.Smooth(0.25)
-    assert (chosen.method.gap, chosen.method.side) == (7.0, "right")
-    assert chosen.scheme == plugin.Paced(2.5)
+    chosen = update("scheme(plain-usl)\nmethod(coarse, growing, smooth, 3, 2, 0.25, 7)")
+    assert chosen.transfer == (3.0, 2)
+    assert chosen.method.basis == (0.25,)
+    assert chosen.method.factor == 7.0
+    assert type(chosen.scheme).__name__ == "PlainUSL"
     assert not chosen.thermal
-    assert "growing (factor 3, times 2) smooth (share 0.25) paced (pace 2.5)" in chosen.words
-    # Those with a default may be left out at the end.
-    assert update("method(ulmpm, growing, smooth, 3)").transfer == plugin.Growing(3.0, 1)
+    assert "growing (factor 3, times 2) smooth (share 0.25) plain-usl" in chosen.words
+    # Words may stand anywhere behind the basis, those with a default be left out at the end.
+    assert update("method(coarse, PIC, linear, thermo-mechanical, 2)").thermal
+    assert update("method(ulmpm, growing, smooth, 3)").transfer == (3.0, 1)
 
 
 @pytest.mark.parametrize(
@@ -101,11 +106,10 @@ def test_parameters_of_a_plug_in(plugin):
         ("method(ulmpm, growing, linear, 2, 0)", "'times' must be a whole number of at least 1"),
         ("method(ulmpm, PIC, smooth, 2)", "'share' must be a number from 0 to 1, not 2"),
         ("method(ulmpm, XPIC, smooth, 2, 1, 1)", "XPIC with smooth takes order, share and no"),
-        ("method(gapped, FLIP, linear, 1)", "method(gapped, FLIP, linear, 1, gap) with gap"),
-        ("method(gapped, PIC, linear, 1, middle)", "one of left, right"),
-        ("method(gapped, PIC, linear, 1, thermo-mechanical)", "is not an option"),
-        ("scheme(paced)", "scheme(paced, pace)"),
-        ("scheme(paced, 0)", "a number above 0, not 0"),
+        ("method(coarse, FLIP, linear, 1)", "method(coarse, FLIP, linear, 1, factor) with factor"),
+        ("method(coarse, PIC, linear, 2, middle)", "or one of mechanical, thermo-mechanical"),
+        ("method(coarse, PIC, linear, 0.5)", "a number of at least 1, not 0.5"),
+        ("scheme(plain-usl, 1)", "one argument too many"),
         ("scheme(musl, 1)", "one argument too many"),
     ],
 )
@@ -120,8 +124,10 @@ def test_help_shows_the_parameters(plugin, capsys):
         "transfer FLIP": ("method(kind, FLIP, basis, alpha[, gradient-enhanced])", "from 0 (PIC)"),
         "basis cpgimp": ("method(kind, transfer, cpgimp[, det|diagonal|stretch|corners])",),
         "transfer growing": ("growing, basis, factor[, times]", "from 0 to 4", "1 when left out"),
-        "scheme paced": ("scheme(paced, pace)", "a number above 0"),
-        "method gapped": ("method(gapped, transfer, basis, gap[, left|right])",),
+        "scheme plain-usl": ("scheme(plain-usl)",),
+        "method coarse": (
+            "method(coarse, transfer, basis, factor[, mechanical|thermo-mechanical])",
+        ),
     }.items():
         assert main(["help", *words.split()]) == 0
         out = capsys.readouterr().out
@@ -132,33 +138,5 @@ def test_a_name_that_is_taken_disturbs_only_scripts_that_ask_for_it(plugin):
     assert update("method(ulmpm, PIC, linear)").words == "ulmpm PIC linear musl"
     chosen = update("method(ulmpm, PIC, linear)")
     assert registry.name_of("basis", type(chosen.method.basis)) == "linear"
-    with pytest.raises(ScriptError, match=r"offered by two packages: karamelo-py .* and mpm-steps"):
+    with pytest.raises(ScriptError, match=r"offered by two packages: karamelo-py .* and mpm-taken"):
         update("method(ulmpm, PIC, cubic-spline)")
-
-
-def test_a_plug_in_runs(tmp_path):
-    """A body that nothing acts on: a step multiplies its velocity by factor^times, exactly."""
-    (tmp_path / "in.script").write_text(
-        block(
-            2,
-            "fix(v, initial_velocity_particles, all, 1e-3, -2e-3)",
-            "compute(v, average_velocity, all)",
-            "log_modify(custom, step, v_x, v_y)",
-            "set_dt(1e-6)",
-            "run(5)",
-        ).replace("FLIP, linear, 1", "growing, smooth, 1.5, 2, 0.25")
-    )
-    path = os.pathsep.join([str(PLUGIN), os.environ["PYTHONPATH"]])
-    done = subprocess.run(
-        [sys.executable, "-m", "karamelo_py.app.cli", "in.script"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": path, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    step, x, y = np.loadtxt(tmp_path / "log.mpm", skiprows=1).T
-    growth = 1.5 ** (2 * step)
-    np.testing.assert_allclose(x, 1e-3 * growth, rtol=1e-9)  # ten digits
-    np.testing.assert_allclose(y, -2e-3 * growth, rtol=1e-9)  # ten digits

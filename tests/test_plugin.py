@@ -1,17 +1,21 @@
-"""The example plug-in: installed by pip somewhere else, found by its entry points, right."""
+"""The example plug-in, a style of each family: installed somewhere else, found, and right."""
 
+import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError, version
 from math import exp
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import interpreting
+from plugged import PLUGIN, install
+from scenes import block
 
-PLUGIN = Path(__file__).parent / "plugin"
+pytestmark = pytest.mark.xdist_group("plugin")
 
 # One period of the first mode of a bar with fixed ends.
 VIBRATION = """
@@ -59,22 +63,20 @@ def require_build_tools():
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """A folder of packages with the plug-in, as pip installs it."""
-    require_build_tools()
-    folder = tmp_path_factory.mktemp("plugin")
-    source = shutil.copytree(PLUGIN, folder / "source")  # building leaves files behind
-    options = ["--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check"]
-    command = [sys.executable, "-m", "pip", "install", "-q", *options]
-    command += ["--target", str(folder / "site"), str(source)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    return folder / "site"
+    """A folder of packages with the plug-in."""
+    return install(tmp_path_factory.mktemp("plugin") / "site")
+
+
+@pytest.fixture(scope="module")
+def _interpreter(site):
+    with interpreting(site) as process:
+        yield process
 
 
 def karamelo_py(site, folder, *arguments, compiled=False):
     """Run the command line in a process of its own that sees the plug-in."""
     path = os.pathsep.join(filter(None, [str(site), os.environ.get("PYTHONPATH")]))
-    environment = os.environ | {"PYTHONPATH": path, "KARAMELO_PY_CACHE": str(site.parent / "cache")}
+    environment = os.environ | {"PYTHONPATH": path}
     environment["NUMBA_DISABLE_JIT"] = "0" if compiled else "1"
     command = [sys.executable, "-m", "karamelo_py.app.cli", *map(str, arguments)]
     return subprocess.run(
@@ -87,45 +89,45 @@ def read_log(folder):
     return rows.T
 
 
-def test_styles_names_the_package(site, tmp_path):
-    done = karamelo_py(site, tmp_path, "styles")
+def test_pip_installs_it_and_styles_and_help_tell_of_it(tmp_path):
+    require_build_tools()
+    source = shutil.copytree(PLUGIN, tmp_path / "source")  # building leaves files behind
+    options = ["--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check"]
+    command = [sys.executable, "-m", "pip", "install", "-q", *options]
+    command += ["--target", str(tmp_path / "site"), str(source)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    lines = [line for line in done.stdout.splitlines() if "mpm-drag 0.1.0" in line]
+    done = karamelo_py(tmp_path / "site", tmp_path, "styles")
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in done.stdout.splitlines() if "mpm-examples 0.1.0" in line]
     listed = {line.split()[0]: line for line in lines}
-    assert set(listed) == {"drag", "damp_nodes", "momentum", "elastic-fluid", "recovering"}
+    page = (PLUGIN / "README.md").read_text("utf-8")
+    assert len(listed) == 14
+    assert all(name in page for name in listed)
     assert "Slow points down" in listed["drag"]
-
-
-def test_help_explains_it(site, tmp_path):
-    done = karamelo_py(site, tmp_path, "help", "drag")
+    done = karamelo_py(tmp_path / "site", tmp_path, "help", "drag")
     assert done.returncode == 0, done.stderr
     assert "fix(ID, drag, group, rate)" in done.stdout
-    assert "from mpm-drag 0.1.0" in done.stdout
+    assert "from mpm-examples 0.1.0" in done.stdout
     assert "a number of at least 0" in done.stdout
 
 
 @pytest.mark.parametrize("scheme", ["musl", "usl", "usf"])
-def test_free_flight_under_drag_decays_exponentially(site, tmp_path, scheme):
+def test_free_flight_under_drag_decays_exponentially(run_interpreted, scheme):
     # Exact: p = m v0 exp(-rate t).
     script = (PLUGIN / "in.drag").read_text()
-    (tmp_path / "in.drag").write_text(script.replace("dimension(", f"scheme({scheme})\ndimension("))
-    done = karamelo_py(site, tmp_path, "in.drag")
-    assert done.returncode == 0, done.stderr
-    step, time, p, lost = read_log(tmp_path)
+    done = run_interpreted(script.replace("dimension(", f"scheme({scheme})\ndimension("))
+    step, time, p, lost = read_log(done.folder)
     assert step[-1] == 100
     mass, v0, rate, dt = 3.0, 2.0, 0.5, 0.01
     np.testing.assert_allclose(p, mass * v0 * np.exp(-rate * time), rtol=1e-9)
     np.testing.assert_allclose(lost[1:], p[1:] * (exp(rate * dt) - 1), rtol=1e-7)
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_both_kinds_of_hook_act_in_one_run(site, tmp_path, compiled):
+def test_both_kinds_of_hook_act_in_one_run(run_interpreted):
     # Exact: each step multiplies the velocity by exp(-rate dt) and by 1 - c dt.
-    script = (PLUGIN / "in.drag").read_text().replace("run(", DAMP + "run(")
-    (tmp_path / "in.both").write_text(script)
-    done = karamelo_py(site, tmp_path, "in.both", compiled=compiled)
-    assert done.returncode == 0, done.stderr
-    step, time, p, force = read_log(tmp_path)
+    done = run_interpreted((PLUGIN / "in.drag").read_text().replace("run(", DAMP + "run("))
+    step, time, p, force = read_log(done.folder)
     np.testing.assert_allclose(p, 6 * np.exp(-0.5 * time) * (1 - 0.25 * 0.01) ** step, rtol=1e-9)
     np.testing.assert_allclose(force[1:], -0.25 * p[1:] / (1 - 0.0025), rtol=1e-7)
 
@@ -138,26 +140,19 @@ def test_both_kinds_of_hook_act_in_one_run(site, tmp_path, compiled):
         ("fix(air, dragg, all, 1)", "did you mean 'drag'?"),
     ],
 )
-def test_mistakes_in_its_arguments_are_marked(site, tmp_path, line, message):
+def test_mistakes_in_its_arguments_are_marked(run_interpreted, line, message):
     script = (PLUGIN / "in.drag").read_text().replace("fix(air, drag, all, rate)", line)
-    (tmp_path / "in.wrong").write_text(script)
-    done = karamelo_py(site, tmp_path, "in.wrong")
-    assert done.returncode == 1
-    assert message in done.stderr
-    assert "in.wrong:11:" in done.stderr
-    assert "Traceback" not in done.stderr
+    done = run_interpreted(script, status=1)
+    assert message in done.err
+    assert "in.script:11:" in done.err
 
 
-def test_the_material_is_a_linear_one_at_small_strain(site, tmp_path):
+def test_the_material_is_a_linear_one_at_small_strain(run_interpreted):
     # In one dimension both laws are sigma = E du/dx; the exact period is 2 L / c = 4.
     logs = []
     for number, law in enumerate(("elastic-fluid, rho, E", "linear, rho, E, 0")):
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        (folder / "in.bar").write_text(VIBRATION.replace("{law}", law))
-        done = karamelo_py(site, folder, "in.bar")
-        assert done.returncode == 0, done.stderr
-        logs.append(read_log(folder))
+        done = run_interpreted(VIBRATION.replace("{law}", law), folder=str(number))
+        logs.append(read_log(done.folder))
     (time, kinetic, stored), (_, reference, stored_reference) = logs
     start = kinetic[0]
     np.testing.assert_allclose(kinetic, reference, atol=0.002 * start)
@@ -165,7 +160,8 @@ def test_the_material_is_a_linear_one_at_small_strain(site, tmp_path):
     np.testing.assert_allclose(kinetic, start * np.cos(np.pi * time / 2) ** 2, atol=0.05 * start)
 
 
-# A bar that is pulled at a constant rate, in uniaxial strain.
+# A bar that is pulled at a constant rate, in uniaxial strain. The two fixes that hold it back do
+# nothing to that, as the velocity of all nodes is given, but both are at work.
 PULL = """
 rate = 10
 method(ulmpm, FLIP, linear, 1)
@@ -180,8 +176,13 @@ group(nodes, nodes, region, everywhere, all)
 fix(pull, velocity_nodes, nodes, rate*x)
 fix(start, initial_velocity_particles, all, rate*x0)
 set_dt(2e-5)
-set_output(100)
+fix(air, drag, all, 0.5)
+fix(settle, damp_nodes, all, 0.25 + 0*time)
+compute(p, momentum, all)
+compute(hard, probe, all, R)
+log_modify(custom, step, hard, p_x, air_x, settle_x)
 dump(points, all, particle, 100, points.*.LAMMPS, ep, R, seq)
+dump(picture, all, pyplot, 100, picture.*.png, 200, 200, R)
 run(100)
 """
 
@@ -197,4 +198,176 @@ def test_a_strength_shows_its_own_number(site, tmp_path, compiled):
     # Exact for steady flow, whose strain rate is 2/3 of the stretching: R = H (dep/dt) / rate.
     np.testing.assert_allclose(R, 1e6 * (2 / 3 * 10) / recovery, rtol=2e-3)
     np.testing.assert_allclose(q, 20e3 + R, rtol=1e-6)
+    _, hard, p, lost, force = read_log(tmp_path)
+    np.testing.assert_allclose(hard[-1], R, rtol=1e-8)  # all points are alike
+    # The nodes have the momentum that the Python hook left in this step.
+    np.testing.assert_allclose(force[1:], -0.25 * (p[:-1] - lost[1:]), rtol=1e-7)
+    assert (tmp_path / "picture.100.png").stat().st_size > 1000
     assert (ep > 0.01).all()
+
+
+def lines_of_code(path):
+    """Lines of a file that are neither empty, comments, nor part of a docstring."""
+    text = path.read_text("utf-8")
+    owners = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    told = [n.body[0] for n in ast.walk(ast.parse(text)) if isinstance(n, owners)]
+    told = [n for n in told if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant)]
+    shown = {k for n in told for k in range(n.lineno, n.end_lineno + 1)}
+    empty = {k for k, line in enumerate(text.splitlines(), 1) if re.fullmatch(r" *(#.*)?", line)}
+    return len(text.splitlines()) - len(shown | empty)
+
+
+def test_the_message_of_the_page(tmp_path):
+    """A slip in drag.py is told as the page says."""
+    page = (PLUGIN.parents[1] / "docs" / "plugins.md").read_text("utf-8")
+    (message,) = re.findall(r"^in\.drag.*error: fix drag.*$", page, re.M)
+    file = install(tmp_path / "site") / "mpm_examples" / "drag.py"
+    file.write_text(file.read_text("utf-8").replace("exp(-self", "exq(-self"), "utf-8")
+    shutil.copy(PLUGIN / "in.drag", tmp_path)
+    done = karamelo_py(tmp_path / "site", tmp_path, "in.drag")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[0] == message
+
+
+def test_the_page_tells_what_each_costs():
+    page = (PLUGIN.parents[1] / "docs" / "plugins.md").read_text("utf-8")
+    told = dict(re.findall(r"^\| .* \| `(\w+\.py)` \| (\d+) \|$", page, re.M))
+    files = (PLUGIN / "src" / "mpm_examples").glob("[!_]*.py")
+    assert told == {file.name: str(lines_of_code(file)) for file in files}
+
+
+# --- a field of a fix ---------------------------------------------------------------------------
+
+# Points that fly freely through cells and tiles; the second half of them leaves the domain.
+IRRADIATED = """
+method(ulmpm, FLIP, linear, 1)
+dimension(1, 0, 12, 0.5)
+boundary(delete)
+region(bar, block, 1, 3)
+material(m, linear, 3, 100, 0.3)
+solid(bar, region, bar, 2, m, 0.5)
+fix(start, initial_velocity_particles, all, 100)
+fix(sun, irradiate, all, 2, 5)
+compute(d, probe, all, dose, point=1)
+log_modify(custom, step, d)
+set_dt(1e-3)
+set_output(10)
+plot(dose, 10, step, d)
+save_plot(curve.png)
+dump(points, all, particle, 50, points.*.LAMMPS, x, x0, dose)
+dump(picture, all, pyplot, 100, picture.*.png, 200, 200, dose)
+"""
+
+
+def dose_of(x0, steps):
+    """The sum of the geometric series of rates at the places at the beginnings of the steps."""
+    q = exp(-100 * 1e-3 / 5)
+    return 2e-3 * np.exp(-x0 / 5) * (1 - q**steps) / (1 - q)
+
+
+@pytest.mark.parametrize("cut", ["run(100)", "run(41)\nrun(59)"])
+def test_a_field_of_a_fix_and_its_column(run_interpreted, cut):
+    done = run_interpreted(IRRADIATED + cut)
+    for step, left in ((50, 8), (100, 4)):
+        rows = np.loadtxt(done.folder / f"points.{step}.LAMMPS", skiprows=11, ndmin=2)
+        ids, _, x, _, _, x0, dose = rows.T
+        assert len(rows) == left
+        assert (ids == np.arange(1, left + 1)).all()
+        np.testing.assert_allclose(x, x0 + 0.1 * step, rtol=1e-9)
+        np.testing.assert_allclose(dose, dose_of(x0, step), rtol=1e-8)  # nine digits
+    log = np.loadtxt(done.folder / "log.mpm", skiprows=1, comments="#")
+    np.testing.assert_allclose(log[:, 1], dose_of(x0[0], log[:, 0]), rtol=1e-8)
+    assert (done.folder / "curve.png").stat().st_size > 1000
+    assert (done.folder / "picture.100.png").stat().st_size > 1000
+
+
+def test_check_counts_the_field_and_the_log_says_how_to_read_it(run_interpreted, site, tmp_path):
+    script = tmp_path / "in.dose"
+    script.write_text(IRRADIATED + "run(10)")
+    done = karamelo_py(site, tmp_path, "check", "in.dose")
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"^  dose +1 +8$", done.stdout, re.M)
+    assert "dump: dose will be 0" not in done.stderr
+    done = run_interpreted(IRRADIATED.replace("step, d)", "step, dose)"), status=1)
+    assert "compute(ID, probe, all, dose) measures it" in done.err
+    done = run_interpreted(IRRADIATED.replace("x0, dose)", "x0, doses)"), status=1)
+    assert "did you mean 'dose'?" in done.err
+
+
+# --- the other families -------------------------------------------------------------------------
+
+
+def test_a_body_of_a_transfer_and_a_basis_grows(run_interpreted):
+    """A body that nothing acts on: a step multiplies its velocity by factor^times, exactly."""
+    script = block(
+        2,
+        "fix(v, initial_velocity_particles, all, 1e-3, -2e-3)",
+        "compute(v, average_velocity, all)",
+        "log_modify(custom, step, v_x, v_y)",
+        "set_dt(1e-6)",
+        "run(5)",
+    )
+    done = run_interpreted(script.replace("FLIP, linear, 1", "growing, smooth, 1.5, 2, 0.25"))
+    step, x, y = read_log(done.folder)
+    growth = 1.5 ** (2 * step)
+    np.testing.assert_allclose(x, 1e-3 * growth, rtol=1e-9)  # ten digits
+    np.testing.assert_allclose(y, -2e-3 * growth, rtol=1e-9)  # ten digits
+
+
+MOVING = (
+    "fix(v, initial_velocity_particles, all, 0.5*x0*y0, -x0)",
+    "set_dt(1e-3)",
+    "dump(d, all, particle, 5, d.*.LAMMPS, x, y, vx, vy, s11, s12)",
+    "run(5)",
+)
+
+
+def test_a_scheme_and_a_method_are_the_built_in_ones_where_they_must_be(run_interpreted):
+    def dumped(script, folder):
+        rows = np.loadtxt(run_interpreted(script, folder=folder).folder / "d.5.LAMMPS", skiprows=11)
+        return np.array(sorted(map(tuple, rows[:, 2:])))  # in whichever order they were put
+
+    # usl looks after light nodes with bases of steep edges only, of which splines are none.
+    usl = block(2, *MOVING, transfer="FLIP quadratic", scheme="usl")
+    plain = usl.replace("scheme(usl)", "scheme(plain-usl)")
+    assert (dumped(usl, "usl") == dumped(plain, "plain")).all()
+    # A grid that is coarser than the domain's is the grid of a coarser domain.
+    fine = block(2, *MOVING).replace("0, 1.2, 0.1)", "0, 1.2, 0.05)")
+    fine = fine.replace("box, 2, rubber, 0.1", "box, 1, rubber, 0.05")
+    coarse = fine.replace("ulmpm, FLIP, linear, 1", "coarse, FLIP, linear, 1, 2")
+    assert (dumped(block(2, *MOVING), "domain") == dumped(coarse, "coarse")).all()
+
+
+def test_a_region_a_command_and_a_dump(run_interpreted):
+    done = run_interpreted("""
+        method(ulmpm, FLIP, linear, 1)
+        dimension(2, 0, 1, 0, 1, 0.02)
+        region(egg, ellipse, 0.5, 0.5, 0.3, 0.2)
+        material(m, linear, 3, 100, 0.3)
+        solid(egg, region, egg, 2, m, 0.02)
+        m = mass_of(egg)
+        log_modify(custom, step, m)
+        dump(d, all, csv, 1, d.*.csv, x, y, mass)
+        run(0)
+    """)
+    _, mass = np.loadtxt(done.folder / "log.mpm", skiprows=1)
+    rows = np.genfromtxt(done.folder / "d.0.csv", delimiter=",", names=True)
+    # pi a b rho; the staircase of points of side 0.01 follows the edge to a percent of the area.
+    np.testing.assert_allclose(mass, np.pi * 0.3 * 0.2 * 3, rtol=0.01)
+    np.testing.assert_allclose(rows["mass"].sum(), mass, rtol=1e-9)
+    inside = ((rows["x"] - 0.5) / 0.3) ** 2 + ((rows["y"] - 0.5) / 0.2) ** 2
+    assert (inside <= 1).all()
+
+
+def test_an_eos_under_compression(run_interpreted):
+    """Squeezed at a constant rate in one direction, J = 1 - rate t by the steps' product."""
+    script = PULL.replace("rate = 10", "rate = -10").replace("bulk, linear", "bulk, logarithmic")
+    script = script.replace("ep, R, seq", "s11, s22, volume").replace("{recovery}", "1")
+    script = script.replace("20e3, 1e6", "20e30, 1e6")  # elastic
+    done = run_interpreted(script)
+    s11, s22, volume = np.loadtxt(done.folder / "points.100.LAMMPS", skiprows=11)[:, -3:].T
+    J = volume / 0.25
+    assert (J < 0.99).all()
+    # The trace of the stress in uniaxial strain: s11 + 2 s22 = -3 p = 3 K ln J, with nine digits
+    # of J, and so seven of ln J = -0.02.
+    np.testing.assert_allclose(s11 + 2 * s22, 3 * 5e7 * np.log(J), rtol=1e-7)

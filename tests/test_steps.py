@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from scenes import block
 
+from karamelo_py.kernels.arrays import TIME, TIMESTEP, Control, new_clock
+from karamelo_py.kernels.step import choose_dt, finish
+
 # E 100, nu 0.3, rho 2: lambda + 2 G = E (1 - nu) / ((1 + nu)(1 - 2 nu))
 SPEED = sqrt(100 * 0.7 / (1.3 * 0.4) / 2)
 H = 0.1
@@ -38,6 +41,18 @@ def test_set_dt(run_interpreted):
     log = run_interpreted(block(1, "set_dt(0.003)", LOG, "run(4)")).log
     assert log.Time == pytest.approx([0, 0.003, 0.006, 0.009, 0.012], rel=1e-9)
     assert (log.Step == range(5)).all()
+
+
+def test_as_many_steps_as_fit():
+    """17500 additions of 2e-4 are not quite 3.5; there is no step more for that."""
+    control = Control(np.zeros(3), new_clock())
+    clock = control.clock[0]
+    clock.fixed_dt, clock.end_time = 2e-4, 3.5
+    choose_dt(control)
+    while control.values[TIME] < 3.5:
+        finish(control)
+    assert control.values[TIMESTEP] == 17500
+    assert control.values[TIME] == 3.5
 
 
 @pytest.mark.parametrize("time", ["0.0471", "1e-7", "PI/50"])

@@ -117,7 +117,8 @@ def _parser(command: str) -> CommandLine:
     """The command line; what only `command` needs is there only for it."""
     parser = CommandLine(
         prog="karamelo-py",
-        usage="karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--quiet] [--debug]\n"
+        usage="karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [-log FILE] [-out FOLDER]\n"
+        "                          [--quiet] [--debug]\n"
         "       karamelo-py COMMAND ...",
         description=f"karamelo-py {__version__}: the material point method",
         epilog="karamelo-py COMMAND -h explains a command. karamelo-py SCRIPT is short for\n"

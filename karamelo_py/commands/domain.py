@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from karamelo_py.language import registry, signature
-from karamelo_py.language.forms import Forms, number, place_of
+from karamelo_py.language.by_dimension import Forms, number, place_of
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import Domain, require_domain

@@ -1,4 +1,4 @@
-"""Commands of the language itself: print, value, evaluate, include, quit."""
+"""Commands of the language itself: print, value (or evaluate), include, quit."""
 
 from __future__ import annotations
 
@@ -50,6 +50,8 @@ def print_(hub: Hub, first: Argument, *more: Argument) -> None:
 def value(hub: Hub, expression: Expression) -> float:
     """Give the present value of a formula, as a number that no longer changes.
 
+    ``value`` and ``evaluate`` are two names of it.
+
     Parameters
     ----------
     expression
@@ -70,25 +72,6 @@ def value(hub: Hub, expression: Expression) -> float:
             return math.nan  # Known only once the runs before it are made.
         _refresh(hub, expression.formula)
     return expression.evaluate(hub.values)
-
-
-def evaluate(hub: Hub, expression: Expression) -> float:
-    """Give the present value of a formula: another name of value.
-
-    Parameters
-    ----------
-    expression
-        A formula of time and of values of fixes and computes.
-
-    Example
-    -------
-    E0 = evaluate(Ek + Es)
-
-    See Also
-    --------
-    value
-    """
-    return value(hub, expression)
 
 
 def include(hub: Hub, file: str) -> None:

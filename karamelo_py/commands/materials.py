@@ -1,4 +1,4 @@
-"""Commands about the parts of composed materials: eos, strength, damage, temperature."""
+"""Commands about materials and the parts of composed ones: eos, strength, damage, temperature."""
 
 from __future__ import annotations
 
@@ -7,8 +7,37 @@ from collections.abc import Sequence
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
+from karamelo_py.scene.guests import check_columns
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.material import Material, Part
+from karamelo_py.script.parser import parse_text
+
+
+def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument) -> None:
+    """Define a material.
+
+    Parameters
+    ----------
+    ID
+        Name of the material.
+    style
+        The law.
+    arguments
+        What the style asks for; see its page.
+
+    Example
+    -------
+    material(mat1, linear, 1000, 1000, 0.3)
+
+    See Also
+    --------
+    solid
+    """
+    if style in hub.parts["eos"] and arguments and not registry.knows("material", style):
+        # The form of 2020, material(ID, eosID, strengthID), has no style.
+        arguments = (Argument(parse_text(style)[0], hub.interpreter), *arguments)
+        style = "eos-strength"
+    define(hub, hub.materials, ID, style, arguments)
 
 
 def eos(hub: Hub, ID: str, style: StyleOf("eos"), *arguments: Argument) -> None:
@@ -109,5 +138,6 @@ def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Seque
     target = registry.find(kind, style)
     catalogue.refuse(ID)
     made = signature.call(target, hub, list(arguments), f"{kind} {style}")
-    entry = Material if kind == "material" else Part
-    catalogue.add(ID, entry(kind, style, made))
+    entry = (Material if kind == "material" else Part)(kind, style, made)
+    check_columns(hub, f"{kind} {style}", entry.law)
+    catalogue.add(ID, entry)

@@ -1,15 +1,16 @@
-"""The command method: how points and grid are made and how velocity goes between them."""
+"""Commands about the method: method, scheme, precision, anti_volumetric_locking."""
 
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
 from itertools import groupby
-from typing import Any
+from typing import Any, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Parameter
+from karamelo_py.scene.guests import check_part
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, meant
 
@@ -74,9 +75,56 @@ def method(
         )
     chosen = hub.update.method = parts["method"]
     hub.update.transfer, chosen.basis = parts["transfer"], parts["basis"]
+    for family, part in parts.items():
+        check_part(hub, f"{family} {call.names[family]}", part)
     chosen.basis_name = f"{basis} {call.variant}".strip()
     chosen.place = hub.place
     hub.update.thermal = chosen.thermal
+
+
+def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
+    """Choose when in a step the stress is updated.
+
+    Parameters
+    ----------
+    style
+        ``musl`` when there is no such command.
+    arguments
+        What the style asks for; those that come with the program ask for nothing.
+
+    Example
+    -------
+    scheme(usl)
+
+    See Also
+    --------
+    method
+    """
+    target = registry.find("scheme", style)
+    chosen = signature.call(target, hub, arguments, f"scheme {style}")
+    check_part(hub, f"scheme {style}", chosen)
+    hub.update.scheme, hub.update.scheme_place = chosen, hub.place
+
+
+def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
+    """Choose the precision of the numbers that points and nodes carry.
+
+    Parameters
+    ----------
+    kind
+        ``double`` (the default) or ``single``, which halves the memory.
+
+    Example
+    -------
+    precision(single)
+
+    Notes
+    -----
+    Comes before the first run.
+    """
+    if hub.update.step > 0:
+        raise ScriptError("the precision cannot change after the first run")
+    hub.settings.precision = kind
 
 
 def anti_volumetric_locking(hub: Hub, active: bool) -> None:

@@ -54,6 +54,7 @@ def dump(
     target = registry.find("dump", style)
     _check_order(hub, arguments)
     new = signature.call(target, hub, list(arguments), f"dump {style}")
+    new.style = style
     writer = hub.output.files.get(new.file)
     if writer is not None and ID not in hub.dumps:
         raise ScriptError(

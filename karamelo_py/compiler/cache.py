@@ -30,8 +30,9 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from karamelo_py.compiler import melting
+from karamelo_py.compiler import inlining
 from karamelo_py.compiler.fingerprint import (
+    WHOLE,
     Choice,
     Unknown,
     contents,
@@ -58,7 +59,7 @@ def folder() -> Path:
 # --- telling of what is wrong -------------------------------------------------------------------
 
 _tell: Callable[[str], None] | None = None
-_told = False
+_warned = False
 
 
 def _trouble(error: OSError) -> None:
@@ -67,10 +68,10 @@ def _trouble(error: OSError) -> None:
 
 def _say(text: str) -> None:
     """Tell of a fault of the folder, the first time."""
-    global _told
-    if _told:
+    global _warned
+    if _warned:
         return
-    _told = True
+    _warned = True
     if _tell is not None:
         _tell(text)
     else:
@@ -80,13 +81,13 @@ def _say(text: str) -> None:
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None]) -> Iterator[None]:
     """Within this, `tell` is given what is wrong with the folder, once."""
-    global _tell, _told
-    before = _tell, _told
-    _tell, _told = tell, False
+    global _tell, _warned
+    before = _tell, _warned
+    _tell, _warned = tell, False
     try:
         yield
     finally:
-        _tell, _told = before
+        _tell, _warned = before
 
 
 # --- kernels ------------------------------------------------------------------------------------
@@ -217,7 +218,8 @@ def _setting() -> str:
     """What all kernels depend on."""
     versions = (platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__)
     how = (config.OPT, config.BOUNDSCHECK, config.LOOP_VECTORIZE, config.SLP_VECTORIZE)
-    return repr((versions, [str(h) for h in how], Path(melting.__file__).read_bytes()))
+    whole = [Path(file).read_bytes() for file in (inlining.__file__, WHOLE)]
+    return repr((versions, [str(h) for h in how], whole))
 
 
 _SETTING = _setting()

@@ -87,13 +87,26 @@ def shared(function: Callable) -> Callable:
     return function
 
 
-def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
+class Undefined(TypeError):
+    """A point function is not defined for classes that need it."""
+
+    def __init__(self, function: str, classes: tuple):
+        names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
+        super().__init__(f"{function} is not defined for ({names})")
+        self.classes = classes
+
+
+def point_function(*, tags: int = 1, branches: bool = False) -> Callable[[Callable], Callable]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     The decorated function gives name, parameters and docstring. Implementations are added with
     ``name.on(Class, ...)`` and serve both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and
     inside kernels, where the types are known at compile time and no branch is left. A plug-in adds
     its own in the same way. ``name.otherwise`` marks what classes without their own get.
+
+    With `branches`, implementations may branch over the numbers of a point: they are called for one
+    lane after another (:mod:`karamelo_py.compiler.lanes`), except those of classes that say
+    ``in_lanes = True``.
     """
 
     def declare(stub: Callable) -> Callable:
@@ -104,14 +117,10 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
         def find(classes: tuple) -> Callable | None:
             return table.get(classes) or (fallback[0] if fallback else None)
 
-        def missing(classes: tuple) -> str:
-            names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
-            return f"{stub.__name__} is not defined for ({names})"
-
         def select(classes: tuple) -> Callable:
             chosen = find(classes)
             if chosen is None:
-                raise TypeError(missing(classes))
+                raise Undefined(stub.__name__, classes)
             memo[classes if tags > 1 else classes[0]] = chosen
             return chosen
 
@@ -132,7 +141,13 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
         dispatch.__doc__ = stub.__doc__
 
         def choose(*arguments: Any) -> Callable | None:
-            return find(tuple(tag_class(a) for a in arguments[:tags]))
+            classes = tuple(tag_class(a) for a in arguments[:tags])
+            found = find(classes)
+            if branches and found and not getattr(classes[0], "in_lanes", False):
+                from karamelo_py.compiler.lanes import one_by_one
+
+                return one_by_one(dispatch, arguments) or found
+            return found
 
         by_type(dispatch)(choose)
 
@@ -177,8 +192,15 @@ def real(value: float, like: Any) -> Any:
     return type(like)(value)
 
 
+def lanes_of(numba_type: Any) -> int:
+    """How many lanes a Numba type has (:mod:`karamelo_py.compiler.lanes`); 0 for numbers."""
+    return getattr(numba_type, "width", 0)
+
+
 @by_type(real)
 def _real(value, like):
+    if lanes_of(value) or lanes_of(like):
+        return None
     if like is numba.types.float32:
         return lambda value, like: numba.float32(value)
     return lambda value, like: numba.float64(value)
@@ -194,6 +216,8 @@ _ROUND_OFF = {"float32": 2.0**-23}
 
 @by_type(round_off)
 def _round_off(like):
+    if lanes_of(like):
+        return None
     if like is numba.types.float32:
         return lambda like: numba.float32(2.0**-23)
     return lambda like: numba.float64(2.0**-52)
@@ -214,6 +238,8 @@ def _fused(typing_context, a, b, c):
 
 @by_type(fma)
 def _fma(a, b, c):
+    if lanes_of(a) or lanes_of(b) or lanes_of(c):
+        return None
     if a == b == c and isinstance(a, numba.types.Float):
         return lambda a, b, c: _fused(a, b, c)
     return lambda a, b, c: a * b + c
@@ -226,7 +252,83 @@ def choose(condition: bool, a: float, b: float) -> float:
 
 @by_type(choose)
 def _choose(condition, a, b):
+    if lanes_of(condition):
+        return None
     return lambda condition, a, b: a if condition else b
+
+
+def in_all(condition: bool) -> bool:
+    """Whether a condition holds in all lanes; it itself where there are none."""
+    return condition
+
+
+@by_type(in_all)
+def _in_all(condition):
+    return None if lanes_of(condition) else lambda condition: condition
+
+
+def of_present(p: int, value: float) -> float:
+    """`value`, and 0 in the lanes of a group of points that have no point."""
+    return value
+
+
+@by_type(of_present)
+def _of_present(p, value):
+    return None if lanes_of(p) else lambda p, value: value
+
+
+def accumulate(array: Any, i: int, first: int, values: tuple) -> None:
+    """array[i, first + k] += values[k], lane after lane."""
+    for k, value in enumerate(values):
+        array[i, first + k] += value
+
+
+@by_type(accumulate)
+def _accumulate(array, i, first, values):
+    if lanes_of(i) or any(lanes_of(value) for value in values):
+        return None
+    lines = [f"array[i, first + {k}] += values[{k}]" for k in range(len(values))]
+    return define("array, i, first, values", *lines)
+
+
+def largest(a: float) -> float:
+    """The largest of the lanes; a number itself."""
+    return a
+
+
+@by_type(largest)
+def _largest(a):
+    return None if lanes_of(a) else lambda a: a
+
+
+def first_failing(condition: bool) -> int:
+    """The first lane in which a condition does not hold; 0 where there are none."""
+    return 0
+
+
+@by_type(first_failing)
+def _first_failing(condition):
+    return None if lanes_of(condition) else lambda condition: 0
+
+
+def is_one(number: int) -> bool:
+    """Whether all lanes have the same number."""
+    return True
+
+
+@by_type(is_one)
+def _is_one(number):
+    return None if lanes_of(number) else lambda number: True
+
+
+def first_lane(number: int) -> int:
+    """The number of the first lane; a number itself."""
+    return number
+
+
+@by_type(first_lane)
+def _first_lane(number):
+    return None if lanes_of(number) else lambda number: number
 
 
 def index(i: int) -> int:
@@ -239,6 +341,8 @@ def index(i: int) -> int:
 
 @by_type(index)
 def _index(i):
+    if lanes_of(i):
+        return None
     return lambda i: numba.uint64(i)
 
 

@@ -89,7 +89,9 @@ def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     """The field of `count` nodes, (count, components), zero: untouched pages cost no memory."""
-    return kind(np.zeros((count, kind.shape(kin)), real))
+    width = kind.shape(kin)
+    # Records of three or more take the place of four or eight, the width of registers.
+    return kind(np.zeros((count, width if width < 3 else -(-width // 4) * 4), real))
 
 
 def field(fields: tuple, kind: type) -> Any:

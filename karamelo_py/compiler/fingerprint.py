@@ -16,6 +16,7 @@ import pickle
 import sys
 import types as python
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -26,6 +27,8 @@ from numba.core.registry import cpu_target
 
 # Known by name: their versions are part of every key.
 _OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
+# What Numba's own functions do with lanes cannot be followed from them: all of it is in every key.
+WHOLE = str(Path(__file__).with_name("lanes.py"))
 SPELLED = "<spelled>"  # the file of functions that are written at compile time
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), range, slice)
 
@@ -145,7 +148,7 @@ class _Watch(event.Listener):
             return
         code = function.__code__
         # What was spelled out at compile time was spelled by a function that is followed itself.
-        known = _opaque(function) or code.co_filename == SPELLED
+        known = _opaque(function) or code.co_filename in (SPELLED, WHOLE)
         _contents[compiled.library] = Contents(choices, frozenset(() if known else (code,)))
 
 
@@ -390,6 +393,6 @@ def _class(one: type) -> tuple[str, list]:
     fields = getattr(one, "_fields", ())
     parts: list = [*one.__bases__, fields]
     for key, value in vars(one).items():
-        if not key.startswith("__") and key not in fields:
+        if not key.startswith(("__", "_abc_")) and key not in fields:
             parts += [key, value]
     return f"class {name}", parts

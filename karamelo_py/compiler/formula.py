@@ -353,20 +353,20 @@ _BY_NUMBER = {number: _NUMPY.get(name) or getattr(np, name) for name, number in 
 
 
 def _evaluate_numpy(program, globals_, points, count, out, stack):
-    held: list = []
+    values: list = []
     with np.errstate(all="ignore"):
         for op, operand in program.code:
             op = int(op) % UNIFORM
             if op == CONSTANT:
-                held.append(np.full(count, program.constants[operand]))
+                values.append(np.full(count, program.constants[operand]))
             elif op == GLOBAL:
-                held.append(np.full(count, globals_[operand]))
+                values.append(np.full(count, globals_[operand]))
             elif op == POINT:
-                held.append(np.array(points[operand, :count]))
+                values.append(np.array(points[operand, :count]))
             elif op != SPREAD:
                 takes = 1 if op < _FIRST_BINARY else 2 if op < SELECT else 3
-                held[-takes:] = [np.asarray(_BY_NUMBER[op](*held[-takes:]), dtype=float)]
-    out[:count] = held[0]
+                values[-takes:] = [np.asarray(_BY_NUMBER[op](*values[-takes:]), dtype=float)]
+    out[:count] = values[0]
 
 
 evaluate = _evaluate_numpy if config.DISABLE_JIT else _evaluate_compiled

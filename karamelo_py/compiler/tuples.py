@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from numba import types
 
-from karamelo_py.compiler.compile import by_type, define, fma
+from karamelo_py.compiler.compile import by_type, define, fma, lanes_of
 
 
 def spell(parameters: str, term: str, length: int) -> Callable:
@@ -88,6 +88,8 @@ def row(array, i, first, like):
 
 @by_type(row)
 def _row(array, i, first, like):
+    if lanes_of(i):
+        return None
     items = "".join(f"array[i, first + {k}], " for k in range(len(like)))
     return define("array, i, first, like", f"return ({items})")
 

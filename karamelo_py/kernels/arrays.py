@@ -23,13 +23,14 @@ class Nodes(NamedTuple):
     Components are named by the functions below: ``nodes.sums[n, of_force(kin) + k]``.
     """
 
-    sums: np.ndarray  # (N, 1 + 2 d): mass, momentum, force, as the points give them
-    update: np.ndarray  # (N, 2 d): v* after the momentum update, and v* - v
-    velocity: np.ndarray  # (N, d): the velocity whose gradient deforms the points
+    sums: np.ndarray  # mass, momentum, force, as the points give them
+    update: np.ndarray  # v* after the momentum update, and v* - v
+    velocity: np.ndarray  # the velocity whose gradient deforms the points
     fields: tuple  # declared fields, (N, components)
 
 
-MASS = 0  # component of Nodes.sums
+# Components of the records; in space a vector takes the place of four, the width of a register.
+MASS = 0  # of Nodes.sums
 
 
 @shared
@@ -41,13 +42,19 @@ def of_momentum(kin):
 @shared
 def of_force(kin):
     """First component of the force in `Nodes.sums`."""
-    return 1 + dimension(kin)
+    return 2 if dimension(kin) == 1 else 4
 
 
 @shared
 def of_change(kin):
     """First component of v* - v in `Nodes.update`; that of v* is 0."""
-    return dimension(kin)
+    return 4 if dimension(kin) == 3 else dimension(kin)
+
+
+# Widths of the records of Nodes by dimension.
+SUMS_WIDTH = {1: 4, 2: 8, 3: 8}
+UPDATE_WIDTH = {1: 2, 2: 4, 3: 8}
+VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 
 
 class Points(NamedTuple):
@@ -68,11 +75,16 @@ class Points(NamedTuple):
     fields: tuple  # declared fields, (components, n)
 
 
-def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """Every array of the points, with its name; the points come last in its shape."""
+def own_arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
+    """Every array that all points have, with its name; the points come last in its shape."""
     for name, array in points._asdict().items():
         if name != "fields" and array is not None:
             yield name, array
+
+
+def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
+    """The same, and the declared fields."""
+    yield from own_arrays_of(points)
     for one in points.fields:
         yield name_of(type(one)), one.array
 

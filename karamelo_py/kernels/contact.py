@@ -41,7 +41,9 @@ class SeparateFields(NamedTuple):
     copies: np.ndarray  # (k, 2) slots: from a field to the other solids that share it
     touched: np.ndarray  # (N, F) int32: the last step (from 1) in which a node touched that of
     #                      another field, which comes later; minus that where the two stuck
-    held: np.ndarray  # (N, d) 1 + slot of the reaction, where a fix prescribes the velocity, else 0
+    prescribed: (
+        np.ndarray
+    )  # (N, d) 1 + slot of the reaction, where a fix prescribes the velocity, else 0
     meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a place
     partners: np.ndarray  # (F,) int64 scratch: with how many others each of them is in contact
     change: np.ndarray  # (F, d) scratch: of the velocity of each of them
@@ -64,22 +66,22 @@ def _shares(contact, d, nodes, n, m):
 
     The sum of m grad N points out of a body. Where a body has little mass or ends in an edge it
     says little about the direction: the larger sum decides (after Lemiale, Nairn & Hurmane 2010),
-    equal ones are averaged. A body that is held knows its surface best.
+    equal ones are averaged. A body with a prescribed velocity knows its surface best.
     """
     normal = field(nodes.fields, Normal)
     of_n = 0.0
     of_m = 0.0
-    held_n = False
-    held_m = False
+    prescribed_n = False
+    prescribed_m = False
     for k in range(d):
         of_n += normal[n, k] * normal[n, k]
         of_m += normal[m, k] * normal[m, k]
-        held_n = held_n or contact.held[n, k] != 0
-        held_m = held_m or contact.held[m, k] != 0
+        prescribed_n = prescribed_n or contact.prescribed[n, k] != 0
+        prescribed_m = prescribed_m or contact.prescribed[m, k] != 0
     if not of_n + of_m > 0:
         return 0.0, 0.0
-    if held_n != held_m and (of_n if held_n else of_m) > 0:
-        return (1.0, 0.0) if held_n else (0.0, 1.0)
+    if prescribed_n != prescribed_m and (of_n if prescribed_n else of_m) > 0:
+        return (1.0, 0.0) if prescribed_n else (0.0, 1.0)
     share = of_n / (of_n + of_m)
     return share**4, (1 - share) ** 4
 
@@ -94,8 +96,8 @@ def _pair(contact, d, nodes, n, m):
 @kernel
 def _yielding(contact, pair, k):
     """Change of the relative velocity with an impulse along direction k."""
-    of_n = 0.0 if contact.held[pair.n, k] else pair.per_a
-    of_m = 0.0 if contact.held[pair.m, k] else pair.per_b
+    of_n = 0.0 if contact.prescribed[pair.n, k] else pair.per_a
+    of_m = 0.0 if contact.prescribed[pair.m, k] else pair.per_b
     return of_n + of_m
 
 
@@ -126,14 +128,14 @@ def _approach(d, nodes, pair):
 
 @kernel
 def _take(contact, values, a, i, n, k, impulse, per_mass):
-    """A node takes a component of an impulse; one that is held hands it on to what holds it."""
-    held = contact.held[n, k]
-    if not held:
+    """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
+    slot = contact.prescribed[n, k]
+    if not slot:
         contact.change[i, k] += impulse * per_mass
     force = impulse / values[DT]
     values[contact.slot[a] + k] += force
-    if held:
-        values[held - 1 + k] -= force
+    if slot:
+        values[slot - 1 + k] -= force
 
 
 @kernel
@@ -256,7 +258,7 @@ def _touch_pair(contact, d, nodes, values, i, j, place, share):
     size = sqrt(size)
     compliance = _compliance(contact, d, nodes, pair, size)
     if not compliance > 0:
-        return  # both are held
+        return  # the fixes move both
     push = share * (approach / size) / compliance
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
@@ -334,9 +336,9 @@ def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
         impulse = push * _outward(nodes, pair, k)
         if sticks:
             impulse = share * (v[pair.n, k] - v[pair.m, k]) / yielding
-        if not contact.held[pair.n, k]:
+        if not contact.prescribed[pair.n, k]:
             contact.change[i, k] -= impulse * pair.per_a
-        if not contact.held[pair.m, k]:
+        if not contact.prescribed[pair.m, k]:
             contact.change[j, k] += impulse * pair.per_b
 
 

@@ -11,7 +11,16 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from karamelo_py.compiler.compile import by_type, fma, point_function, real, shared
+from karamelo_py.compiler.compile import (
+    by_type,
+    choose,
+    define,
+    fma,
+    in_all,
+    point_function,
+    real,
+    shared,
+)
 from karamelo_py.compiler.fields import (
     field,
     increase,
@@ -21,6 +30,7 @@ from karamelo_py.compiler.fields import (
     store_from,
 )
 from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
+from karamelo_py.kernels.arrays import of_change
 from karamelo_py.kernels.visit import (
     deformation_of,
     for_tags,
@@ -34,9 +44,9 @@ from karamelo_py.points.boundary import Bounces, reflected
 from karamelo_py.points.frames import (
     DeformationGradient,
     follows,
+    inverse_stretch_squared,
     scaled_increment,
     spatial_increment,
-    thinning,
 )
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import (
@@ -65,6 +75,7 @@ from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 class Move(NamedTuple):
     """Gather v* and its change; settle velocity and new position."""
 
+    in_lanes = True
     strains = False
     says = "g2p, move"
     reads = ("x", "v")
@@ -74,6 +85,7 @@ class Move(NamedTuple):
 class Strain(NamedTuple):
     """Gather the gradient of the nodal velocity; settle the state of the law."""
 
+    in_lanes = True
     strains = True
     says = "stress"
     reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
@@ -83,6 +95,7 @@ class Strain(NamedTuple):
 class SecondStrain(NamedTuple):
     """The same for the second of two strain increments of a step."""
 
+    in_lanes = True
     strains = True
     says = "second half of the stress"
     reads = Strain.reads
@@ -92,6 +105,7 @@ class SecondStrain(NamedTuple):
 class StrainInMove(NamedTuple):
     """`Strain` in one visit with `Move`, behind it: what v* gave already is not gathered again."""
 
+    in_lanes = True
     strains = True
     says = "stress"
     reads = Strain.reads
@@ -101,6 +115,7 @@ class StrainInMove(NamedTuple):
 class TrialStrain(NamedTuple):
     """Gather the gradient; settle only by what factor it would change the volume (F-bar)."""
 
+    in_lanes = True
     strains = False
     says = "trial volume"
     reads = Strain.reads
@@ -110,6 +125,7 @@ class TrialStrain(NamedTuple):
 class SeriesTerm(NamedTuple):
     """Gather the present term of the series of XPIC."""
 
+    in_lanes = True
     strains = False
     says = "term of the series to the points"
     reads = ("x",)
@@ -270,8 +286,7 @@ def gathered(task, w, stencil, k, total):
 def _(task, w, stencil, k, total):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
-    v = row(w.nodes.update, i, 0, total[0])
-    dv = row(w.nodes.update, i, len(v), v)
+    v, dv = update_at(w.kin, w.nodes, i, total[0])
     return (
         add_scaled(total[0], weight, v),
         add_scaled(total[1], weight, dv),
@@ -279,11 +294,41 @@ def _(task, w, stencil, k, total):
     )
 
 
+def zero_vector(kin, like):
+    """The components of a vector, all 0."""
+    return (real(0, like),) * kin.dimension
+
+
+@by_type(zero_vector)
+def _zero_vector(kin, like):
+    items = "zero, " * kin.instance_class.dimension
+    return define("kin, like", "zero = real(0, like)", f"return ({items})", real=real)
+
+
+def update_at(kin, nodes, i, like):
+    """v* and v* - v of a node."""
+    return row(nodes.update, i, 0, like), row(nodes.update, i, of_change(kin), like)
+
+
+@by_type(update_at)
+def _update_at(kin, nodes, i, like):
+    d = kin.instance_class.dimension
+    if d != 2:  # one record in the plane, two in space
+        return update_at
+    return define(
+        "kin, nodes, i, like",
+        "both = row(nodes.update, i, 0, like + like)",
+        "return (both[0], both[1]), (both[2], both[3])",
+        row=row,
+    )
+
+
 @shared
 def _gradient(w, stencil, k, total):
     i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
-    return add_outer(w.kin, total, vector_at(w.kin, w.nodes.velocity, i), g)
+    v = row(w.nodes.velocity, i, 0, zero_vector(w.kin, g[0]))
+    return add_outer(w.kin, total, v, g)
 
 
 def add_gradient(w, stencil, k, total):
@@ -419,9 +464,7 @@ def _move(w, stencil, p, dt, total):
             new = carry(w.basis, w.kin, new, before, corner, scale(dt, u))
         store(w.places.y, p, new)
         moved += further_reach(w.basis, w.kin, w.grid, before, new)
-    if not inside(w.grid, w.kin, y):
-        return real(inf, dt)
-    return moved
+    return choose(inside(w.grid, w.kin, y), moved, real(inf, moved))
 
 
 @shared
@@ -438,22 +481,26 @@ def _strain(w, x, p, dt, gradient, ratio, fastest):
     state = advance(law, w.kin, old, increment, dt)
     store(w.points.state, p, state)
     store_deformation(field(w.points.fields, DeformationGradient), w.kin, p, increment, f)
-    grown = real(0, dt)
+    j = jacobian(law, w.kin, state)
+    grown = real(0, j)
     if follows(w.frame) and carried(w.basis, w.kin) == 0:
         before = place_at(w.basis, w.kin, x, p)
         after = deformed(w.basis, w.kin, before, increment)
         store_from(w.places.y, p, dimension(w.kin), after)
-        grown = further_reach(w.basis, w.kin, w.grid, before, after)
-    if not jacobian(law, w.kin, state) > 0:
-        return real(inf, dt), fastest
+        grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
+    if not in_all(j > 0):
+        return choose(j > 0, grown, real(inf, j)), fastest
     # The square root is only taken of the few points that are faster than all before them.
     now = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    squared = wave_speed_squared(law, w.kin, state) * thinning(w.frame, w.kin, now, dt)
+    squared = wave_speed_squared(law, w.kin, state) * inverse_stretch_squared(
+        w.frame, w.kin, now, dt
+    )
     speed = largest_component(w.kin, load_vector(w.kin, w.points.v, p))
     slack = fastest - speed
-    if slack < 0 or not squared <= slack * slack:  # so written, NaN is noticed too
-        return grown, sqrt(squared) + speed
-    return grown, fastest
+    if in_all((slack >= 0) & (squared <= slack * slack)):  # so written, NaN is noticed too
+        return grown, fastest
+    rate = sqrt(squared) + speed
+    return grown, choose(fastest > rate, fastest, rate)
 
 
 def store_deformation(array, kin, p, increment, f):

@@ -54,7 +54,7 @@ from karamelo_py.kernels.step import clear_totals, conduct, read_reports, step_s
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry, reach
-from karamelo_py.points.frames import drawn_back, thinning
+from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
 from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import Line, dimension
 from karamelo_py.points.laws import (
@@ -244,7 +244,7 @@ def _(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    against = drawn_back(w.frame, w.kin, _gradient(w, p), f)
+    against = pulled_back(w.frame, w.kin, _gradient(w, p), f)
     fields = w.points.fields
     return scale(-field(fields, Conductance)[0, p], against), field(fields, Supply)[0, p]
 
@@ -307,7 +307,7 @@ def _(task, w, stencil, p, dt, total, totals, fastest):
     store(w.points.state, p, with_temperature(law, w.kin, state, T))
     # By what factor conduction has become faster than in the undeformed body.
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    faster = jacobian(law, w.kin, state) * thinning(w.frame, w.kin, f, dt)
+    faster = jacobian(law, w.kin, state) * inverse_stretch_squared(w.frame, w.kin, f, dt)
     return real(0, dt) * T, max(fastest, faster)
 
 

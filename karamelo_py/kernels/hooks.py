@@ -80,29 +80,47 @@ class CompiledHook(NamedTuple):
     """A scalar function that the compiled loop applies to each component of each member."""
 
     function: Callable
-    on_nodes: bool
+    where: str  # nodes (of heat, too), points, or heated points
     publishes: bool  # its totals become ID_x, ID_y, ID_z
     uses_before: bool  # needs the formulas one step earlier as well
     uses_share: bool  # needs one over the number of members with mass
+
+    @property
+    def on_nodes(self) -> bool:
+        """Whether it acts on nodes."""
+        return self.where == "nodes"
+
+    @property
+    def signature(self) -> types.Type:
+        """What its function takes and returns."""
+        return NODE_FUNCTION if self.on_nodes else POINT_FUNCTION
+
+
+# What a compiled hook acts on at each moment.
+ACTS_ON = {
+    **dict.fromkeys([*NODE_STAGES, "post_heat_to_grid", "post_update_grid_heat"], "nodes"),
+    **dict.fromkeys(POINT_STAGES, "points"),
+    "supply_heat": "heated points",
+}
 
 
 def node_hook(
     function: Callable, *, publishes: bool = True, uses_before: bool = False, shares: bool = False
 ) -> CompiledHook:
     """A compiled hook on nodes: `function` as described at the head of this file."""
-    return CompiledHook(function, True, publishes, uses_before, shares)
+    return CompiledHook(function, "nodes", publishes, uses_before, shares)
 
 
 def point_hook(
     function: Callable, *, publishes: bool = False, uses_before: bool = False
 ) -> CompiledHook:
     """A compiled hook on points: `function` as described at the head of this file."""
-    return CompiledHook(function, False, publishes, uses_before, False)
+    return CompiledHook(function, "points", publishes, uses_before, False)
 
 
 def heat_hook(function: Callable, *, publishes: bool = False) -> CompiledHook:
     """A compiled hook for ``supply_heat``: `function` as described at the head of this file."""
-    return CompiledHook(function, False, publishes, False, False)
+    return CompiledHook(function, "heated points", publishes, False, False)
 
 
 @kernel

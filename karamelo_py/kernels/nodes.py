@@ -102,7 +102,7 @@ def per_mass(nodes, n, like):
 
 @at_node.on(ClearSums)
 def _(task, kin, nodes, n, dt):
-    for k in range(1 + 2 * dimension(kin)):
+    for k in range(nodes.sums.shape[1]):
         nodes.sums[n, k] = 0
     clear_optional(field(nodes.fields, Normal), n)
 

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import fma, point_function, shared
+from numba import types
+
+from karamelo_py.compiler.compile import (
+    accumulate,
+    by_type,
+    of_present,
+    point_function,
+    real,
+    shared,
+)
 from karamelo_py.compiler.fields import field, load, load_vector, vector
 from karamelo_py.compiler.tuples import (
     add_optional,
-    add_scaled,
-    add_to_optional,
-    put_at,
-    row,
+    leading,
     scale,
+    subtract,
 )
-from karamelo_py.kernels.arrays import MASS, of_force, of_momentum
-from karamelo_py.kernels.g2p import NodalMean, VolumeRatio
+from karamelo_py.kernels.arrays import MASS, of_force
+from karamelo_py.kernels.g2p import NodalMean, VolumeRatio, zero_vector
 from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, Updated, add_force, force_stress
-from karamelo_py.points.kinematics import vector_at
 from karamelo_py.points.laws import jacobian, kirchhoff_stress, specific_volume
 from karamelo_py.points.transfers import Moment, add_momentum, gradient_weight, zero_moment
 from karamelo_py.points.transfers.xpic import Series, TermOfSeries
@@ -28,6 +34,7 @@ from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 class MassMomentum(NamedTuple):
     """Scatter mass and momentum."""
 
+    in_lanes = True
     says = "p2g mass and momentum"
     reads = ("x moved", "mass", "v", "moment")
 
@@ -35,6 +42,7 @@ class MassMomentum(NamedTuple):
 class InternalForce(NamedTuple):
     """Scatter the internal force, and that of fixes on points."""
 
+    in_lanes = True
     says = "internal force"
     reads = ("mass", "state", "material", "deformation gradient", "force")
 
@@ -42,6 +50,7 @@ class InternalForce(NamedTuple):
 class MomentumAgain(NamedTuple):
     """Scatter momentum to the velocity array."""
 
+    in_lanes = True
     says = "momentum to grid"
     reads = ("mass", "v", "moment")
 
@@ -49,6 +58,7 @@ class MomentumAgain(NamedTuple):
 class Volumes(NamedTuple):
     """Scatter volume, after and before the trial increment (F-bar)."""
 
+    in_lanes = True
     says = "volumes to grid"
     reads = ("mass", "state", "material", "volume ratio")
 
@@ -56,6 +66,7 @@ class Volumes(NamedTuple):
 class SeriesBack(NamedTuple):
     """Scatter the term of the series of XPIC, times mass."""
 
+    in_lanes = True
     says = "term of the series to the grid"
     reads = ("mass", "term of series")
 
@@ -94,21 +105,32 @@ def _moment(w, p, like):
     return load(field(w.points.fields, Moment), p, zero_moment(w.transfer, w.kin, like))
 
 
+@shared
+def _mass(w, p):
+    return of_present(p, w.points.mass[p])
+
+
 @load_of.on(MassMomentum)
 def _(quantity, w, p, like):
-    return w.points.mass[p], load_vector(w.kin, w.points.v, p), _moment(w, p, like)
+    return _mass(w, p), load_vector(w.kin, w.points.v, p), _moment(w, p, like)
+
+
+@shared
+def momentum_part(w, stencil, k, weight, mass, v, moment):
+    """The momentum that a point gives to the k-th node."""
+    none = subtract(v, v)
+    return add_momentum(
+        w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, mass, v, moment, none
+    )
 
 
 @scattered.on(MassMomentum)
 def _(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, v, moment = load
-    first = of_momentum(w.kin)
-    old = row(w.nodes.sums, i, first, v)
-    w.nodes.sums[i, MASS] += weight * mass
-    new = add_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, mass, v, moment, old)
-    put_at(w.nodes.sums, i, first, new)
-    add_to_optional(field(w.nodes.fields, Normal), i, mass, gradient)
+    part = momentum_part(w, stencil, k, weight, mass, v, moment)
+    accumulate(w.nodes.sums, i, MASS, (weight * mass,) + part)
+    accumulate_optional(field(w.nodes.fields, Normal), i, scale(mass, leading(gradient, v)))
 
 
 @load_of.on(InternalForce)
@@ -116,21 +138,21 @@ def _(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    volume = w.points.mass[p] * specific_volume(law)
+    volume = _mass(w, p) * specific_volume(law)
     # Minus volume times stress, with the sign of the internal force.
     stress = scale(-volume, force_stress(w.frame, w.kin, kirchhoff_stress(law, w.kin, state), f))
-    return stress, load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
+    force = load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
+    return stress, scale(of_present(p, real(1, volume)), force)
 
 
 @scattered.on(InternalForce)
 def _(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
-    first = of_force(w.kin)
     stress, outer = load
-    old = row(w.nodes.sums, i, first, vector_at(w.kin, w.nodes.sums, i))
-    old = add_optional(old, weight, outer)
-    put_at(w.nodes.sums, i, first, add_force(w.frame, w.kin, old, stress, g))
+    none = zero_vector(w.kin, weight)
+    part = add_force(w.frame, w.kin, add_optional(none, weight, outer), stress, g)
+    accumulate(w.nodes.sums, i, of_force(w.kin), part)
 
 
 @point_function()
@@ -151,47 +173,55 @@ def _(frame, basis, grid, moment):
 @load_of.on(MomentumAgain)
 def _(quantity, w, p, like):
     moment = mapped_again_in(w.frame, w.basis, w.grid, _moment(w, p, like))
-    return w.points.mass[p], load_vector(w.kin, w.points.v, p), moment
+    return _mass(w, p), load_vector(w.kin, w.points.v, p), moment
 
 
 @scattered.on(MomentumAgain)
 def _(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, v, moment = load
-    old = vector_at(w.kin, w.nodes.velocity, i)
-    new = add_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, mass, v, moment, old)
-    put_at(w.nodes.velocity, i, 0, new)
+    accumulate(w.nodes.velocity, i, 0, momentum_part(w, stencil, k, weight, mass, v, moment))
 
 
 @load_of.on(Volumes)
 def _(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
-    volume = w.points.mass[p] * specific_volume(law) * jacobian(law, w.kin, state)
+    volume = _mass(w, p) * specific_volume(law) * jacobian(law, w.kin, state)
     return volume * field(w.points.fields, VolumeRatio)[0, p], volume
 
 
 @scattered.on(Volumes)
 def _(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    volumes = field(w.nodes.fields, NodalMean)
-    volumes[i, 0] = fma(weight, load[0], volumes[i, 0])
-    volumes[i, 1] = fma(weight, load[1], volumes[i, 1])
+    part = (weight * load[0], weight * load[1])
+    accumulate(field(w.nodes.fields, NodalMean), i, 0, part)
 
 
 @load_of.on(SeriesBack)
 def _(quantity, w, p, like):
     u = load(field(w.points.fields, TermOfSeries), p, load_vector(w.kin, w.points.v, p))
-    return w.points.mass[p], u
+    return _mass(w, p), u
 
 
 @scattered.on(SeriesBack)
 def _(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, u = load
-    series = field(w.nodes.fields, Series)
-    old = row(series, i, len(u), u)
-    put_at(series, i, len(u), add_scaled(old, weight * mass, u))
+    accumulate(field(w.nodes.fields, Series), i, len(u), scale(weight * mass, u))
+
+
+def accumulate_optional(array, i, values):
+    """Add to a node, where there is an array for it."""
+    if array is not None:
+        accumulate(array, i, 0, values)
+
+
+@by_type(accumulate_optional)
+def _accumulate_optional(array, i, values):
+    if isinstance(array, types.NoneType):
+        return lambda array, i, values: None
+    return lambda array, i, values: accumulate(array, i, 0, values)
 
 
 load_all = for_tags(load_of, "w, p, like")

@@ -43,15 +43,19 @@ class Cells(NamedTuple):
 
 
 @kernel
+def _number(id, begin1, end1, begin2, end2, bodies):
+    """The number in `bodies` of the point with an id, or -1 where it lies in neither range."""
+    if begin1 <= id < end1:
+        return id - begin1
+    return id - begin2 + bodies.first2 if begin2 <= id < end2 else -1
+
+
+@kernel
 def collect(kin, x, points, laws, begin1, end1, begin2, end2, bodies):
     """Take from a block the points whose ids lie in one of the two ranges."""
-    ids = points.id
-    for p in range(ids.size):
-        if begin1 <= ids[p] < end1:
-            i = ids[p] - begin1
-        elif begin2 <= ids[p] < end2:
-            i = ids[p] - begin2 + bodies.first2
-        else:
+    for p in range(points.id.size):
+        i = _number(points.id[p], begin1, end1, begin2, end2, bodies)
+        if i < 0:
             continue
         law = record(laws, points.material[p])
         mass = points.mass[p]
@@ -68,13 +72,9 @@ def collect(kin, x, points, laws, begin1, end1, begin2, end2, bodies):
 @kernel
 def distribute(kin, points, begin1, end1, begin2, end2, bodies):
     """Add the forces to the points of a block."""
-    ids = points.id
-    for p in range(ids.size):
-        if begin1 <= ids[p] < end1:
-            i = ids[p] - begin1
-        elif begin2 <= ids[p] < end2:
-            i = ids[p] - begin2 + bodies.first2
-        else:
+    for p in range(points.id.size):
+        i = _number(points.id[p], begin1, end1, begin2, end2, bodies)
+        if i < 0:
             continue
         for k in range(dimension(kin)):
             field(points.fields, Force)[k, p] += bodies.force[i, k]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from karamelo_py.compiler.compile import kernel
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.visit import place_at
-from karamelo_py.points.basis import extent
+from karamelo_py.points.basis import extent, first_node
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
 
@@ -38,6 +38,42 @@ def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
         t = tile[p]
         order[start[t]] = p
         start[t] += 1
+
+
+@kernel
+def order_in_tiles(kin, grids, basis, size, x, of, begins, ends, width, count, cell, order):
+    """Sort the points of each tile by the first node that they see, stably.
+
+    Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
+    first. `count` (cells of a tile,) and `cell` (2, n) are scratch; `order` (n,) is by tile.
+    """
+    d = dimension(kin)
+    for t in range(len(begins)):
+        begin, end = begins[t], ends[t]
+        bins = size**d
+        count[:] = 0
+        for q in range(begin, end):
+            p = order[q]
+            grid = record(grids, of[p])
+            number = 0
+            for k in range(d):
+                a = in_cells(grid, k, x[k, p]) + first_node(basis, grid.h)
+                number = number * size + max(int(a), 0) % size
+            cell[0, q] = number
+            cell[1, q] = p
+            count[number] += 1
+        # Twice: whole groups, then the others; `count` becomes where the next point of a cell goes.
+        place = begin
+        for rest in (False, True):
+            for c in range(bins):
+                here = count[c]
+                if here >= 0 and (here % width != 0) == rest:
+                    count[c] = -1 - place
+                    place += here
+        for q in range(begin, end):
+            c = cell[0, q]
+            order[-1 - count[c]] = cell[1, q]
+            count[c] -= 1
 
 
 @kernel

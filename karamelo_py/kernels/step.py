@@ -65,7 +65,7 @@ from karamelo_py.kernels.sweep import (
 )
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.points.basis import placed
-from karamelo_py.points.frames import follows, thinning
+from karamelo_py.points.frames import follows, inverse_stretch_squared
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import dimension, largest_component
 from karamelo_py.points.laws import initial_state, wave_speed_squared
@@ -178,6 +178,9 @@ def step_size(s):
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
+ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
+
+
 @kernel
 def choose_dt(control):
     """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end.
@@ -193,10 +196,11 @@ def choose_dt(control):
     dt = clock.fixed_dt if clock.fixed_dt > 0 else clock.dt_factor * limit
     clock.over_limit = clock.over_limit + 1 if dt > limit else 0
     remaining = clock.end_time - control.values[TIME]
-    # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end.
-    if 0 < remaining <= dt * (1 + 1e-9):
+    # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end, and
+    # none more than there are.
+    if 0 < remaining <= dt * (1 + ROUNDING):
         dt = remaining
-    elif 0 < remaining < 2 * dt * (1 - 1e-9):
+    elif 0 < remaining < 2 * dt * (1 - ROUNDING):
         dt = 0.5 * remaining
     control.values[DT] = dt
 
@@ -596,7 +600,9 @@ def _fastest(frame, kin, points, laws, control):
         mass = points.mass[p]
         state = load(points.state, p, initial_state(law, kin, mass))
         f = deformation_of(frame, kin, law, state, points, p)
-        speed = sqrt(wave_speed_squared(law, kin, state) * thinning(frame, kin, f, mass))
+        speed = sqrt(
+            wave_speed_squared(law, kin, state) * inverse_stretch_squared(frame, kin, f, mass)
+        )
         rate = max(rate, speed + largest_component(kin, load_vector(kin, points.v, p)))
     clock.rate = max(clock.rate, rate)
 

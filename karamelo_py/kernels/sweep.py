@@ -13,8 +13,21 @@ from typing import Any, NamedTuple
 from numba import prange, types
 from numba.extending import overload
 
-from karamelo_py.compiler.compile import by_type, define, index, kernel, point_function, real
+from karamelo_py.compiler.compile import (
+    by_type,
+    choose,
+    define,
+    first_failing,
+    in_all,
+    index,
+    kernel,
+    largest,
+    point_function,
+    real,
+    shared,
+)
 from karamelo_py.compiler.fields import load_vector
+from karamelo_py.compiler.lanes import Eights, Fours, group, spread
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
@@ -22,6 +35,8 @@ from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.visit import Work, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
+from karamelo_py.points.basis.product import sees_same_nodes, with_one_node
+from karamelo_py.points.boundary import reflected
 from karamelo_py.points.frames import Total, Updated, follows
 from karamelo_py.points.grid import inside
 
@@ -93,6 +108,140 @@ def _(frame, points, now, then):
     return Places(points.home, points.x[now], points.x[then])
 
 
+# --- one point or several ---------------------------------------------------------------------
+
+
+class OneByOne(NamedTuple):
+    """The points are visited one by one."""
+
+    width = 1
+
+
+def in_lanes(visit, s, block):
+    """Whether points are visited in lanes, and how many at once: `OneByOne`, `Fours` or `Eights`.
+
+    Interpreted, and where a part of the visit does not know lanes, they are visited one by one.
+    """
+    return OneByOne()
+
+
+@by_type(in_lanes)
+def _in_lanes(visit, s, block):
+    tasks, quantities = visit[0], visit[1]
+    basis, grids = s[s.fields.index("basis")], s[s.fields.index("grids")]
+    parts = [*tasks, *quantities, basis]
+    knows = all(getattr(part.instance_class, "in_lanes", False) for part in parts)
+    if not knows or reflected.defined(grids.instance_class):
+        return lambda visit, s, block: OneByOne()
+    real_type = block[0][block[0].fields.index("mass")].dtype
+    if real_type == types.float32:
+        return lambda visit, s, block: Eights()
+    return lambda visit, s, block: Fours()
+
+
+@point_function()
+def width_of(width):
+    """How many points are visited at once; constant at compile time."""
+
+
+@width_of.on(OneByOne)
+def _(width):
+    return 1
+
+
+@width_of.on(Fours)
+def _(width):
+    return 4
+
+
+@width_of.on(Eights)
+def _(width):
+    return 8
+
+
+@point_function()
+def points_from(width, q, end):
+    """The points to visit, from number `q` on, before `end`."""
+
+
+@points_from.on(OneByOne)
+def _(width, q, end):
+    return index(q)
+
+
+@points_from.on(Fours)
+@points_from.on(Eights)
+def _(width, q, end):
+    return group(width, q, min(width_of(width), end - q))
+
+
+@point_function()
+def zero_of(width, like):
+    """0 as a number of a visit."""
+
+
+@zero_of.on(OneByOne)
+def _(width, like):
+    return like - like
+
+
+@zero_of.on(Fours)
+@zero_of.on(Eights)
+def _(width, like):
+    return spread(width, like - like)
+
+
+@shared
+def _gather(tasks, w, stencil, totals):
+    for k in range(support(w.basis, w.kin)):
+        totals = gathered_all(tasks, w, stencil, k, totals)
+    return totals
+
+
+@shared
+def _scatter(quantities, w, stencil, loads):
+    for k in range(support(w.basis, w.kin)):
+        scattered_all(quantities, w, stencil, k, loads)
+
+
+@point_function()
+def gather_nodes(width, tasks, w, stencil, totals):
+    """The totals of the tasks over all nodes of the stencil."""
+
+
+@gather_nodes.on(OneByOne)
+def _(width, tasks, w, stencil, totals):
+    return _gather(tasks, w, stencil, totals)
+
+
+@gather_nodes.on(Fours)
+@gather_nodes.on(Eights)
+def _(width, tasks, w, stencil, totals):
+    # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
+    if sees_same_nodes(stencil):
+        return _gather(tasks, w, with_one_node(stencil), totals)
+    return _gather(tasks, w, stencil, totals)
+
+
+@point_function()
+def scatter_nodes(width, quantities, w, stencil, loads):
+    """Give all nodes of the stencil their parts."""
+
+
+@scatter_nodes.on(OneByOne)
+def _(width, quantities, w, stencil, loads):
+    _scatter(quantities, w, stencil, loads)
+
+
+@scatter_nodes.on(Fours)
+@scatter_nodes.on(Eights)
+def _(width, quantities, w, stencil, loads):
+    if sees_same_nodes(stencil):
+        _scatter(quantities, w, with_one_node(stencil), loads)
+    else:
+        _scatter(quantities, w, stencil, loads)
+
+
 @kernel
 def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     """Visit the points of the t-th occupied tile of a block in the context `s`.
@@ -107,33 +256,35 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     w = Work(
         s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, s.nodes, points, block.laws, places
     )
-    furthest = dt - dt
-    fastest = dt - dt
+    width = in_lanes(visit, s, block)
+    furthest = zero_of(width, dt)
+    fastest = furthest
     wrong = 0
-    for q in range(tiling.range[t, 0], tiling.range[t, 1]):
-        p = index(q)
+    end = tiling.range[t, 1]
+    for q in range(tiling.range[t, 0], end, width_of(width)):
+        p = points_from(width, q, end)
         stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
-        moved = real(0, dt)
+        moved = zero_of(width, dt)
         rate = fastest
         if gathers:
             totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
-            for k in range(support(s.basis, s.kin)):
-                totals = gathered_all(visit.tasks, w, stencil, k, totals)
+            totals = gather_nodes(width, visit.tasks, w, stencil, totals)
             moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
-        elif follows(s.frame) and not inside(grid, s.kin, load_vector(s.kin, places.x, p)):
-            moved = real(inf, dt)
-        if not (moved <= 1 and rate < 1e300):  # so written, NaN counts as wrong too
-            wrong = q + 1
+        elif follows(s.frame):
+            here = inside(grid, s.kin, load_vector(s.kin, places.x, p))
+            moved = choose(here, moved, real(inf, moved))
+        good = (moved <= 1) & (rate < 1e300)  # so written, NaN counts as wrong too
+        if not in_all(good):
+            wrong = q + 1 + first_failing(good)
             continue
         furthest = max(furthest, moved)
         fastest = rate
         if scatters:
             stencil = restencil(visit.weights, w, stencil, p)
             loads = load_all(visit.quantities, w, p, dt)
-            for k in range(support(s.basis, s.kin)):
-                scattered_all(visit.quantities, w, stencil, k, loads)
-    tiling.report[t, 0] = furthest
-    tiling.report[t, 1] = fastest
+            scatter_nodes(width, visit.quantities, w, stencil, loads)
+    tiling.report[t, 0] = largest(furthest)
+    tiling.report[t, 1] = largest(fastest)
     tiling.report[t, 2] = wrong
 
 
@@ -213,17 +364,20 @@ def sweep_points(mode, visit, s, block, then, gathers, scatters, dt):
     """Sweep over the points of one block of the setup `s`."""
 
 
+@kernel
+def _visit_all(mode, visit, s, block, then, gathers, scatters, dt):
+    colour = block.tiling.colour
+    for c in range(colour.size - 1):
+        _visit_tiles(mode, colour[c], colour[c + 1], visit, s, block, then, gathers, scatters, dt)
+
+
 @sweep_points.on(Serial)
 @sweep_points.on(Threaded)
 def _(mode, visit, s, block, then, gathers, scatters, dt):
-    colour = block.tiling.colour
     context = Context(
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.control.clock[0].now
     )
-    for c in range(colour.size - 1):
-        _visit_tiles(
-            mode, colour[c], colour[c + 1], visit, context, block, then, gathers, scatters, dt
-        )
+    _visit_all(mode, visit, context, block, then, gathers, scatters, dt)
 
 
 @point_function()
@@ -231,7 +385,12 @@ def sweep_nodes(mode, task, kin, nodes, spans, dt):
     """Do `task` at every node in use."""
 
 
+@kernel
+def _visit_all_spans(mode, task, kin, nodes, spans, dt):
+    _visit_spans(mode, 0, spans[0, 0], task, kin, nodes, spans, dt)
+
+
 @sweep_nodes.on(Serial)
 @sweep_nodes.on(Threaded)
 def _(mode, task, kin, nodes, spans, dt):
-    _visit_spans(mode, 0, spans[0, 0], task, kin, nodes, spans, dt)
+    _visit_all_spans(mode, task, kin, nodes, spans, dt)

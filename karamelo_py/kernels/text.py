@@ -25,7 +25,6 @@ from karamelo_py.compiler.compile import fma, index, kernel, shared
 ROWS = 1024  # written at a time
 # The longest: -1.23456789e-308 and -4611686018427387903, a blank, and what is overwritten.
 NUMBER_BYTES = 32
-SEPARATORS = b" \n"
 
 DIGITS = 9
 DOUBT = 1e-12

@@ -133,14 +133,14 @@ def in_turn(function: Callable) -> Callable:
     """
 
     def loop(tags, w, stencil, p, dt, totals, fastest):
-        moved = real(0, dt)
+        moved = real(0, fastest)
         for k, tag in enumerate(tags):
             further, fastest = function(tag, w, stencil, p, dt, totals[k], totals, fastest)
             moved += further
         return moved, fastest
 
     def written_out(tags, w, stencil, p, dt, totals, fastest):
-        lines = ["moved = real(0, dt)"]
+        lines = ["moved = real(0, fastest)"]
         for k in range(len(tags)):
             lines.append(
                 f"further{k}, fastest{k + 1} = function("

@@ -12,11 +12,14 @@ from typing import Any
 
 from numba.core.errors import NumbaError
 
+from karamelo_py.compiler.compile import Undefined
 from karamelo_py.language import registry
 from karamelo_py.script.errors import Place, Quit, ScriptError
 
+TRACEBACK = "; --debug shows the traceback"
+
 # These are told elsewhere in words of their own.
-_KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
+KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 
 
 @contextmanager
@@ -36,46 +39,78 @@ def told(name: str, where: str, code: Any, place: Place | None) -> Iterator[None
     """
     try:
         yield
-    except _KNOWN:
+    except KNOWN:
         raise
     except Exception as error:
-        family, _, style = name.partition(" ")
-        family, style = (family, style) if style else ("command", family)
-        known = registry.knows(family, style)
-        package = f" (of {registry.origin(family, style)})" if known else ""
-        what = (
-            _cannot_compile(error, code)
-            if isinstance(error, NumbaError)
-            else f"{type(error).__name__}: {error}{_line(error, code)}"
-        )
-        fault = ScriptError(
-            f"{name}{package}: {where}: {what}",
-            place=place,
-            hint=f"tell the author of {style}; --debug shows the traceback",
-        )
-        fault.complete = True
-        raise fault from error
+        what = f"{cause_of(error)}{_place(error, code)}"
+        raise fault(name, f"{where}: {what}", place, TRACEBACK) from error
 
 
-def _cannot_compile(error: NumbaError, code: Any) -> str:
-    """The cause that Numba gives, in one line, and where it sees it."""
+def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptError:
+    """The error of a script that uses a style with a fault in it: names its package.
+
+    Parameters
+    ----------
+    name
+        What uses the code: ``fix drag``.
+    what
+        What is wrong with it.
+    place
+        Where the script asks for it.
+    more
+        What follows the hint.
+    """
+    family, _, style = name.partition(" ")
+    family, style = (family, style) if style else ("command", family)
+    package = f" (of {registry.origin(family, style)})" if registry.knows(family, style) else ""
+    error = ScriptError(
+        f"{name}{package}: {what}",
+        place=place,
+        hint=f"tell the author of {style}{more}",
+    )
+    error.complete = True
+    return error
+
+
+def is_of_numba(error: Exception) -> bool:
+    """Whether Numba refuses to compile something."""
+    return isinstance(error, NumbaError) or type(error).__module__.startswith("numba.")
+
+
+def cause_of(error: Exception) -> str:
+    """What went wrong, in one line; of Numba, the cause that it gives."""
+    if isinstance(error, Undefined):
+        return str(error)
+    if not is_of_numba(error):
+        return f"{type(error).__name__}: {error}"
     text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
-    place = re.search(r'File "(.*?)", line (\d+)', text)
-    if place:
-        file, line = place.groups()
-    else:
-        file, line = inspect.getsourcefile(code) or "", inspect.getsourcelines(code)[1]
     causes = (line.strip() for line in text.splitlines() if not line.startswith("Failed in "))
-    cause = next(filter(None, causes), type(error).__name__)
-    return f"Numba cannot compile it: {cause} ({Path(file).name}:{line})"
+    return f"Numba cannot compile it: {next(filter(None, causes), type(error).__name__)}"
 
 
-def _line(error: Exception, code: Any) -> str:
+def places_of(error: Exception) -> list[tuple[str, int]]:
+    """Files and lines that took part in an exception, the innermost first.
+
+    Of Numba those that its text names, and the functions that it was compiling.
+    """
+    frames = list(traceback.walk_tb(error.__traceback__))[::-1]
+    here = [(frame.f_code.co_filename, line) for frame, line in frames]
+    if not is_of_numba(error):
+        return here
+    named = [(f, int(k)) for f, k in re.findall(r'File "(.*?)", line (\d+)', str(error))]
+    compiled = (frame.f_locals.get("func") for frame, _ in frames)
+    codes = [f.__code__ for f in compiled if inspect.isfunction(f)]
+    return [*named, *((code.co_filename, code.co_firstlineno) for code in codes), *here]
+
+
+def _place(error: Exception, code: Any) -> str:
     """`` (spring.py:28)``: the last line of the style's own file that took part."""
-    frames = traceback.extract_tb(error.__traceback__)
     try:
-        file = inspect.getsourcefile(code)
+        own = inspect.getsourcefile(code)
     except TypeError:
-        file = None
-    own = [frame for frame in frames if frame.filename == file] or frames[-1:]
-    return f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""
+        own = None
+    places = places_of(error)
+    same = [place for place in places if own and Path(place[0]).resolve() == Path(own).resolve()]
+    for file, line in [*same, *places][:1]:
+        return f" ({Path(file).name}:{line})"
+    return ""

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from karamelo_py.language import registry, signature
-from karamelo_py.language.collecting import further_errors
+from karamelo_py.language.further_mistakes import further_errors
 from karamelo_py.script import expressions
-from karamelo_py.script.elsewhere import KARAMELO_COMMANDS, instead
 from karamelo_py.script.errors import Place, Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
+from karamelo_py.script.other_programs import KARAMELO_COMMANDS, instead
 from karamelo_py.script.parser import parse, parse_expression, parse_text
 from karamelo_py.script.syntax import (
     Assignment,

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py import __version__
-from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.other_programs import instead
 
 PREFIX = "karamelo_py."
 BUILT_IN = Path(__file__).parents[1] / "styles.toml"

@@ -174,7 +174,10 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
 def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:
     """Call a command or make a style with values; a fault of its author is told as such."""
     if not inspect.isclass(target):
-        return target(hub, *values, **named)
+        if target.__module__.startswith(registry.PREFIX):
+            return target(hub, *values, **named)
+        with told(name, "it", target, getattr(hub, "place", None)):
+            return target(hub, *values, **named)
     with told(name, "__init__", target, getattr(hub, "place", None)):
         if not is_record(target):
             return target(hub, *values, **named)
@@ -316,7 +319,7 @@ def syntax(target: Callable, name: str) -> str:
     """The line that shows how a command or style is called."""
     own = getattr(target, "syntax", None)
     if not isinstance(own, str):
-        own = _joined(told_of(target))
+        own = _joined(documented(target))
     family, _, style = name.partition(" ")
     if not style:
         return f"{name}({own})"
@@ -333,7 +336,7 @@ def syntax(target: Callable, name: str) -> str:
     return f"{command}({', '.join(before)}{own})"
 
 
-def told_of(target: Callable) -> list[Parameter]:
+def documented(target: Callable) -> list[Parameter]:
     """Parameters for help: with the word that chooses a variant of a style."""
     variants = getattr(target, "variants", None)
     if not variants:
@@ -379,15 +382,19 @@ class Help:
 
 
 def describe(target: Callable, name: str) -> Help:
-    """Help about a command or style, from its signature and its docstring."""
+    """Help about a command or style, from its signature and docstring, and those of its bases."""
     head, sections = docstrings.sections(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
-    descriptions = docstrings.descriptions(sections.pop("Parameters", ""))
-    if inspect.isclass(target):
-        inner = docstrings.sections(target.__init__.__doc__ or "")[1]
-        descriptions = docstrings.descriptions(inner.pop("Parameters", "")) | descriptions
-        sections = inner | sections
-    described = [replace(p, description=descriptions.get(p.name, "")) for p in told_of(target)]
+    descriptions: dict[str, str] = {}
+    # What a base class describes holds for the styles made from it.
+    for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
+        for doc in (getattr(vars(owner).get("__init__"), "__doc__", None), owner.__doc__):
+            inner = docstrings.sections(doc or "")[1]
+            descriptions |= docstrings.descriptions(inner.pop("Parameters", ""))
+            if owner is target:
+                sections = inner | sections
+    sections.pop("Parameters", None)
+    described = [replace(p, description=descriptions.get(p.name, "")) for p in documented(target)]
     return Help(
         name, syntax(target, name), " ".join(summary.split()), text.strip(), described, sections
     )

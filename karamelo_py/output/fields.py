@@ -19,6 +19,7 @@ from karamelo_py.kernels.export import (
     export_state,
     export_velocity_moment,
 )
+from karamelo_py.kernels.heat import Conducting
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density
 from karamelo_py.points.transfers import Moment
@@ -134,14 +135,17 @@ class Fields:
         export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
         return moment
 
-    @property
-    def declared(self) -> dict[str, tuple[type, int]]:
+    def declared_columns(self) -> dict[str, tuple[type, int]]:
         """Column -> the declared field of the points that shows it, and the component."""
-        return {
-            column: (kind, k)
-            for kind in self._simulation.point_fields
-            for k, column in enumerate(fields.columns_of(kind))
-        }
+        update = self.hub.update
+        basis = getattr(update.method, "basis", None)
+        owners = [*self.hub.fixes.values(), update.method, update.transfer, basis, update.scheme]
+        owners += [Conducting] if update.thermal else []
+        found: dict[str, tuple[type, int]] = {}
+        for kind in fields.declared(owners, "point_fields"):
+            for k, column in enumerate(fields.columns_of(kind)):
+                found.setdefault(column, (kind, k))
+        return found
 
     def members(self, group: Any) -> np.ndarray:
         """Ids (0-based) of a particle group."""
@@ -167,24 +171,21 @@ class Fields:
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
-        return list(dict.fromkeys([*PARTICLE_NAMES, *sorted(self._of_laws())]))
+        own = [*sorted(self.columns_of_laws()), *self.declared_columns()]
+        return list(dict.fromkeys([*PARTICLE_NAMES, *own]))
 
     def node_names(self) -> list[str]:
         """Names that `node` knows."""
         return list(NODE_NAMES)
 
-    def _of_laws(self) -> set[str]:
+    def columns_of_laws(self) -> set[str]:
         """Names of what the laws of the materials declare."""
         laws = [material.law for material in self.hub.materials.values()]
         return {name for law in laws for name in columns_of(law)}
 
     def absent_at_points(self) -> list[str]:
         """Names that `particle` knows, but that are 0 because no material has them."""
-        present = self._of_laws()
-        if self.hub.update.thermal:
-            present.add("gamma")
-        kinds = fields.declared(self.hub.fixes.values(), "point_fields")
-        present.update(column for kind in kinds for column in fields.columns_of(kind))
+        present = self.columns_of_laws() | set(self.declared_columns())
         return [name for name in ABSENT_AT_POINTS if name not in present]
 
     def absent_at_nodes(self) -> list[str]:
@@ -219,16 +220,17 @@ class Fields:
             return self.reference_volume * self._exported[:, JACOBIAN]
         if name == "ienergy":
             return self._exported[:, ENERGY].copy()
-        if name in self._of_laws():
+        if name in self.columns_of_laws():
             return self._cached(name, lambda s: _shown(s, name)).copy()
         if name == "seq":
             return _von_mises(self._exported[:, :STRAIN])
         if name[:1] in "se" and name[1:] in COMPONENTS:
             first = 0 if name[0] == "s" else STRAIN
             return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
-        if name in self.declared:
-            kind, k = self.declared[name]
-            return _column(simulation.declared(kind), k)
+        if name in (shown := self.declared_columns()):
+            kind, k = shown[name]
+            if (array := simulation.declared(kind)) is not None:
+                return _column(array, k)
         return np.zeros(simulation.count)
 
     def node(self, name: str) -> np.ndarray:

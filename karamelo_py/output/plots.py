@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.figures import blank_figure, tidy
 from karamelo_py.output.files import FORMATS, savefig
+from karamelo_py.output.plot_style import blank_figure, tidy
 from karamelo_py.output.quantity import Quantity
 from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import Place

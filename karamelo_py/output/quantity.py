@@ -7,7 +7,6 @@ from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.output.fields import PARTICLE_NAMES
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import POINT_SEEDS
 
@@ -73,8 +72,11 @@ class Quantity:
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
                 close = nearest(text, KEYWORDS)
                 error.hint = f"did you mean '{close}'?" if close else error.hint
-                if text in PARTICLE_NAMES:
-                    error.hint = f"{text} differs from point to point: dump(...) writes it"
+                if text in hub.fields.particle_names():
+                    error.hint = (
+                        f"{text} differs from point to point: dump(...) writes it, and "
+                        f"compute(ID, probe, all, {text}) measures it"
+                    )
             raise
 
     @staticmethod

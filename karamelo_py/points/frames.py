@@ -121,20 +121,20 @@ def _(frame, kin, total, stress, gradient):
 
 
 @point_function()
-def drawn_back(frame, kin, g, f):
-    """What a flux against the gradient `g` of the frame is proportional to, in the frame.
+def pulled_back(frame, kin, g, f):
+    """The direction of a flux down the gradient `g`, pulled back to the frame.
 
     Per deformed volume: in space that is g, and C^-1 g with respect to reference positions, which
     C^-1 = F^-1 F^-T takes to space and back.
     """
 
 
-@drawn_back.on(Updated)
+@pulled_back.on(Updated)
 def _(frame, kin, g, f):
     return g
 
 
-@drawn_back.on(Total)
+@pulled_back.on(Total)
 def _(frame, kin, g, f):
     flat = planar(kin)
     inside = inverse(flat, leading(f, zero_tensor(flat, g[0])))
@@ -167,16 +167,16 @@ def stretched_share(kin, like: Number):
 
 
 @point_function()
-def thinning(frame, kin, f, like):
-    """Square of h over the size of a deformed cell, which bounds the step in its place."""
+def inverse_stretch_squared(frame, kin, f, like):
+    """(h / size of a deformed cell)^2, one over the least stretch squared: it shortens the step."""
 
 
-@thinning.on(Updated)
+@inverse_stretch_squared.on(Updated)
 def _(frame, kin, f, like):
     return real(1, like)
 
 
-@thinning.on(Total)
+@inverse_stretch_squared.on(Total)
 def _(frame, kin, f, like):
     # 1 / (smallest stretch)^2 is the largest eigenvalue of F^-1 F^-T.
     return largest_row_sum(kin, left_cauchy_green(kin, inverse(kin, f)))

@@ -53,10 +53,10 @@ def cells_along(grid, direction):
 @shared
 def inside(grid, kin, x):
     """Whether the position `x` lies on the grid."""
-    within = True
+    within = x[0] == x[0]
     for k in range(dimension(kin)):
         a = in_cells(grid, k, x[k])
         end = pick(k, grid.lx, grid.ly, grid.lz)
         # So written, NaN lies outside.
-        within = within and a >= -grid.slack and a <= end + grid.slack
+        within = (a >= -grid.slack) & (a <= end + grid.slack) & within
     return within

@@ -9,12 +9,7 @@ import numpy as np
 from karamelo_py.compiler.compile import address_of
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, MAX_DEPTH, STACK, evaluate_in_table
 from karamelo_py.kernels.arrays import HOOK, PROGRAM, Hooks, NoHooks
-from karamelo_py.kernels.hooks import (
-    NODE_FUNCTION,
-    POINT_FUNCTION,
-    STAGES,
-    CompiledHook,
-)
+from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.language.faults import told
 from karamelo_py.scene.hub import Hub
 
@@ -67,11 +62,8 @@ class _Builder:
             # Components lie one after another, from x on; a total without direction stands alone.
             first = "x" if "x" in fix.published else fix.published[0]
             slot = self.hub.values.slot(f"{fix.id}_{first}")
-        signature = NODE_FUNCTION if hook.on_nodes else POINT_FUNCTION
-        if len(fix.formulas) > 3:
-            raise ValueError(f"fix '{fix.id}' has more formulas than there are directions, three")
         with told(f"fix {fix.style}", moment, hook.function, fix.place):
-            address = address_of(hook.function, signature)
+            address = address_of(hook.function, hook.signature)
         uses = int(hook.uses_before), int(hook.uses_share)
         self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
         programs = [self._program(formula) for formula in fix.formulas]

@@ -13,13 +13,16 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import (
+    SUMS_WIDTH,
+    UPDATE_WIDTH,
+    VELOCITY_WIDTH,
     Block,
     Control,
     Nodes,
     Points,
     Setup,
-    arrays_of,
     new_clock,
+    own_arrays_of,
 )
 from karamelo_py.kernels.g2p import NodalMean
 from karamelo_py.kernels.heat import Conducting
@@ -213,9 +216,9 @@ def lower_nodes(kinds: tuple[type, ...], kin: NamedTuple, count: int, real: type
     """Fields of `count` nodes, zero: the system gives memory to pages only when touched."""
     d = kin.dimension
     return Nodes(
-        sums=np.zeros((count, 1 + 2 * d), real),
-        update=np.zeros((count, 2 * d), real),
-        velocity=np.zeros((count, d), real),
+        sums=np.zeros((count, SUMS_WIDTH[d]), real),
+        update=np.zeros((count, UPDATE_WIDTH[d]), real),
+        velocity=np.zeros((count, VELOCITY_WIDTH[d]), real),
         fields=tuple(fields.at_nodes(kind, kin, count, real) for kind in kinds),
     )
 
@@ -303,7 +306,7 @@ def chosen(block: Block, keep: np.ndarray) -> Block:
     """The block with the points where `keep` (n,) is true; they are to be sorted anew."""
     points = block.points
     # Contiguous: another layout would be compiled for.
-    kept = {name: np.compress(keep, a, axis=-1) for name, a in arrays_of(points)}
-    own = tuple(type(one)(kept[fields.name_of(type(one))]) for one in points.fields)
+    kept = {name: np.compress(keep, a, axis=-1) for name, a in own_arrays_of(points)}
+    declared = tuple(type(one)(np.compress(keep, one.array, axis=-1)) for one in points.fields)
     rest = {name: kept.get(name) for name in points._fields if name != "fields"}
-    return block._replace(points=Points(**rest, fields=own))
+    return block._replace(points=Points(**rest, fields=declared))

@@ -19,6 +19,7 @@ from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene import boundary
+from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
@@ -73,7 +74,7 @@ class Runner:
         if hub.checking:
             report(hub, self.end_time)
             raise Quit
-        with self._telling_of_compilation():
+        with self._telling_of_compilation(), blamed(hub):
             self._run(hub.simulation)
 
     def _check_condition(self) -> None:

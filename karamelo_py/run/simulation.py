@@ -53,6 +53,7 @@ from karamelo_py.run.lowering import (
     stable_courant,
     thread_count,
 )
+from karamelo_py.run.trial import try_parts
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import ScriptError
@@ -144,6 +145,7 @@ class Simulation:
         self.key = scene_key(hub)
         state = previous.state() if previous else None
         self.setup, self.tiles = lower(hub, state)
+        try_parts(hub, self.setup)
         self.count = sum(len(s.x0) for s in hub.solids.values())
         self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
         if state is not None:

@@ -96,8 +96,8 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: list) -> bool:
 
 def tell_of_bounces(hub: Scene, simulation: Any) -> None:
     """Warn when the first points were reflected."""
-    if hub.update.boundary == "reflect" and not hub.update.told_of_bounces and simulation.bounces:
-        hub.update.told_of_bounces = True
+    if hub.update.boundary == "reflect" and not hub.update.warned_of_bounces and simulation.bounces:
+        hub.update.warned_of_bounces = True
         hub.warn(
             f"by step {simulation.step}, time {simulation.time:.6g}, points were reflected at the "
             "edge of the domain; more are only counted",

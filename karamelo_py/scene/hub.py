@@ -10,7 +10,8 @@ from karamelo_py.language import registry
 from karamelo_py.language.faults import told
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
-from karamelo_py.output.output import Output
+from karamelo_py.output.schedule import Output
+from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.update import Update
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
@@ -154,7 +155,8 @@ class Hub:
         """The arrays of the scene as it is now, made when first asked for."""
         engine = registry.find("engine", self.settings.engine)
         if self._simulation is None or not self._simulation.fits(self):
-            self._simulation = engine(self, self._simulation)
+            with blamed(self):
+                self._simulation = engine(self, self._simulation)
         return self._simulation
 
     @property

@@ -133,7 +133,13 @@ class Fix:
 
 
 class Compute:
-    """Base of all computes: measures its `group` of points when the log is written."""
+    """Base of all computes: measures its `group` of points when the log is written.
+
+    Parameters
+    ----------
+    group
+        Group of points, or ``all``.
+    """
 
     id: str = ""
     style: str = ""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from karamelo_py.language.forms import finite
+from karamelo_py.language.by_dimension import finite
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.points.laws import can, law_kind, specific_volume

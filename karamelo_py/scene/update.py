@@ -27,6 +27,8 @@ class Update:
         Whether changes of volume are averaged against volumetric locking.
     scheme
         The scheme's tag.
+    scheme_place
+        Where the script says so.
     fixed_dt
         The constant step of set_dt, or None: the step follows the fastest point.
     dt_factor
@@ -35,7 +37,7 @@ class Update:
         What happens to points that reach the edge of the domain: error, delete or reflect.
     boundary_place
         Where the script says so.
-    told_of_bounces
+    warned_of_bounces
         Whether the user knows that points were reflected.
     """
 
@@ -44,13 +46,14 @@ class Update:
         self.method: Any = None
         self.transfer: NamedTuple | None = None
         self.scheme: NamedTuple = MUSL()
+        self.scheme_place: Place | None = None
         self.thermal = False
         self.anti_locking = False
         self.fixed_dt: float | None = None
         self.dt_factor = DEFAULT_DT_FACTOR
         self.boundary = "error"
         self.boundary_place: Place | None = None
-        self.told_of_bounces = False
+        self.warned_of_bounces = False
 
     @property
     def words(self) -> str:

@@ -117,7 +117,7 @@ class NodesView(_View):
         self._grids = s.grids
         self._stage = stage
         self._on_velocity = stage == POST_VELOCITIES_TO_GRID or before_update
-        self._d = s.nodes.velocity.shape[1]
+        self._d = s.kin.dimension
         self._kin = s.kin
         self.dt = float(s.control.values[DT])
         self.time = float(s.control.values[TIME])
@@ -165,7 +165,7 @@ class NodesView(_View):
         """(n, d) velocity: v before the momentum update, or the one that deforms the points."""
         nodes = self._nodes
         if self._on_velocity:
-            return nodes.velocity[self.index]
+            return nodes.velocity[self._part(nodes.velocity, 0)]
         if self._stage == POST_PARTICLES_TO_GRID:
             momentum = nodes.sums[self._part(nodes.sums, of_momentum(self._kin))]
             return momentum / nodes.sums[self.index, MASS][:, None]
@@ -176,7 +176,7 @@ class NodesView(_View):
     def _(self, value: np.ndarray) -> None:
         nodes = self._nodes
         if self._on_velocity:
-            nodes.velocity[self.index] = value
+            nodes.velocity[self._part(nodes.velocity, 0)] = value
         elif self._stage in (POST_UPDATE_GRID_STATE, POST_UPDATE_GRID_HEAT):
             star = nodes.update[self._part(nodes.update, 0)]
             nodes.update[self._part(nodes.update, of_change(self._kin))] = star - value
@@ -188,14 +188,14 @@ class NodesView(_View):
     def velocity_update(self) -> np.ndarray:
         """(n, d) v*, the velocity after the momentum update (``post_update_grid_state``)."""
         if self._on_velocity:
-            return self._nodes.velocity[self.index]
+            return self._nodes.velocity[self._part(self._nodes.velocity, 0)]
         return self._nodes.update[self._part(self._nodes.update, 0)]
 
     @velocity_update.writer
     def _(self, value: np.ndarray) -> None:
         nodes = self._nodes
         if self._on_velocity:
-            nodes.velocity[self.index] = value
+            nodes.velocity[self._part(nodes.velocity, 0)] = value
             return
         star = self._part(nodes.update, 0)
         change = self._part(nodes.update, of_change(self._kin))

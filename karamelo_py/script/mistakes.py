@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from typing import Any, NamedTuple
 
-from karamelo_py.script.elsewhere import instead
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.other_programs import instead
 from karamelo_py.script.syntax import Source
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import Family, column, usable
 from karamelo_py.app.studies.variables import number
-from karamelo_py.output.figures import blank_figure, tidy
 from karamelo_py.output.files import savefig
+from karamelo_py.output.plot_style import blank_figure, tidy
 
 
 def values_of(family: Family) -> dict[str, list[str]]:

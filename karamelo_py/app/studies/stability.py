@@ -25,8 +25,8 @@ from karamelo_py.app.studies.options import (
 )
 from karamelo_py.app.studies.study import Study
 from karamelo_py.app.studies.variables import logged, number
-from karamelo_py.output.figures import blank_figure
 from karamelo_py.output.files import savefig
+from karamelo_py.output.plot_style import blank_figure
 from karamelo_py.script.errors import ScriptError, nearest
 
 DESCRIPTION = """\

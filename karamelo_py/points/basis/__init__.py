@@ -12,7 +12,8 @@ stencil
     whatever `locate` returned.
 
 A basis that is the product of one function a direction gives only `along` and calls
-:func:`karamelo_py.points.basis.product.register`. Every class has these attributes:
+:func:`karamelo_py.points.basis.product.register`, which also gives it what is usual of these
+attributes that every class has:
 
 cells
     how many cells the nodes that points of one cell may see span (1: those of its corners only);
@@ -34,7 +35,7 @@ shape
     :class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
-from karamelo_py.compiler.compile import by_type, define, point_function, tag_class
+from karamelo_py.compiler.compile import by_type, define, point_function, real, tag_class
 
 
 @point_function(tags=2)
@@ -74,6 +75,16 @@ def mapped_again(basis, grid, moment):
 @mapped_again.otherwise
 def _(basis, grid, moment):
     return moment
+
+
+@point_function()
+def first_node(basis, like):
+    """What is added to a position in cells, so that its whole part tells which nodes are seen."""
+
+
+@first_node.otherwise
+def _(basis, like):
+    return real(0, like)
 
 
 # --- the shape of a point's domain ------------------------------------------------------------

@@ -25,7 +25,6 @@ class BernsteinQuadratic(NamedTuple):
 
     cells = 1
     nodes_per_cell = 2
-    least_nodes = 3
     steady_moment = False  # D of the affine transfers vanishes at the corners of cells
     steep_edge = True
 

@@ -21,10 +21,6 @@ class CubicSpline(NamedTuple):
     method(ulmpm, FLIP, cubic-spline, 0.99)
     """
 
-    cells = 3
-    nodes_per_cell = 1
-    least_nodes = 4
-    steady_moment = True
     steep_edge = False
 
 

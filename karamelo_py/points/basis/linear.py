@@ -22,11 +22,9 @@ class Linear(NamedTuple):
     method(ulmpm, FLIP, linear, 1)
     """
 
-    cells = 1
-    nodes_per_cell = 1
-    least_nodes = 2
     steady_moment = False  # D of the affine transfers vanishes at the nodes
     steep_edge = True
+    in_lanes = True
 
 
 @along.on(Linear)

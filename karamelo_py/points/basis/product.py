@@ -11,7 +11,16 @@ from functools import cache
 from math import prod
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, define, index, point_function, real, shared
+from karamelo_py.compiler.compile import (
+    choose,
+    define,
+    first_lane,
+    index,
+    is_one,
+    point_function,
+    real,
+    shared,
+)
 from karamelo_py.compiler.symbols import Symbol, call, written
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.kinematics import Axisymmetric
@@ -34,6 +43,18 @@ class Stencil(NamedTuple):
     first: int  # number of the first of them
     lines: tuple[Along, ...]  # along each direction
     inv_r: float  # 1 / r of an axisymmetric point
+
+
+@shared
+def sees_same_nodes(stencil):
+    """Whether the points in all lanes see the same nodes."""
+    return is_one(stencil.first)
+
+
+@shared
+def with_one_node(stencil):
+    """The stencil of points that see the same nodes: their numbers have no lanes."""
+    return Stencil(first_lane(stencil.first), stencil.lines, stencil.inv_r)
 
 
 @point_function()
@@ -130,7 +151,14 @@ def _written(kin: type, width: int) -> dict[Callable, Callable]:
 
 
 def register(basis: type, width: int) -> None:
-    """Give `basis` (a class with `along`, `width` nodes a direction) every point function."""
+    """Give `basis` (a class with `along`, `width` nodes a direction) every point function.
+
+    And the attributes of its kind that it does not have itself.
+    """
+    cells = 1 if width == 2 else 3
+    usual = {"cells": cells, "nodes_per_cell": 1, "least_nodes": width, "steady_moment": True}
+    for name, value in usual.items():
+        setattr(basis, name, getattr(basis, name, value))
     for kin in TAGS:
         for function, implementation in _written(kin, width).items():
             function.on(basis, kin)(implementation)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, real, shared
+from karamelo_py.points.basis import first_node
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 
@@ -21,11 +22,8 @@ class QuadraticSpline(NamedTuple):
     method(ulmpm, APIC, quadratic-spline)
     """
 
-    cells = 3
-    nodes_per_cell = 1
-    least_nodes = 3
-    steady_moment = True
     steep_edge = False
+    in_lanes = True
 
 
 @along.on(QuadraticSpline)
@@ -33,7 +31,7 @@ def _(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
     nearest = int(a + real(0.5, a))
-    bulk = nearest >= 1 and nearest < last
+    bulk = (nearest >= 1) & (nearest < last)
     t = a - real(nearest, a)
     half = real(0.5, a)
     left, right = half - t, half + t
@@ -79,6 +77,11 @@ def _at_wall(grid, a, last):
     )
     # For hat functions, N D^-1 (X - x) is the gradient.
     return Along(first, a - real(first, a), weights, gradients, gradients)
+
+
+@first_node.on(QuadraticSpline)
+def _(basis, like):
+    return real(0.5, like)
 
 
 register(QuadraticSpline, 3)

@@ -25,10 +25,6 @@ class UGIMP(NamedTuple):
     method(ulmpm, FLIP, ugimp, 0.99)
     """
 
-    cells = 3
-    nodes_per_cell = 1
-    least_nodes = 3
-    steady_moment = True
     steep_edge = True
     shape = ("half_size",)
 

@@ -74,6 +74,8 @@ class LinearElastic(NamedTuple):
     material, neo-hookean
     """
 
+    in_lanes = True
+
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
     G: float  # shear modulus
@@ -99,6 +101,8 @@ class LinearElastic(NamedTuple):
 
 class FixedFrame(NamedTuple):
     """The same law without the turn: its stress stays behind when a point turns (Karamelo's)."""
+
+    in_lanes = True
 
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter

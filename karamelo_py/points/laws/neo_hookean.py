@@ -71,6 +71,8 @@ class NeoHookean(NamedTuple):
     material, linear
     """
 
+    in_lanes = True
+
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
     G: float  # shear modulus

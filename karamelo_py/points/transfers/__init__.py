@@ -16,7 +16,7 @@ point_fields
 inverts_spread
     whether it divides by D = sum_I N_I (X_I - x)(X_I - x)^T, which some bases let vanish.
 
-What is not defined for a class is that of FLIP and PIC: nothing is kept, v alone is mapped.
+What is not defined for a class is that of PIC: nothing is kept, v alone is mapped.
 """
 
 from typing import Any, NamedTuple
@@ -37,6 +37,11 @@ class Moment(NamedTuple):
 @point_function()
 def updated_velocity(transfer, v, v_pic, dv):
     """The point's velocity after the step."""
+
+
+@updated_velocity.otherwise
+def _(transfer, v, v_pic, dv):
+    return v_pic
 
 
 @point_function()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.points.transfers import Moment, affine, updated_velocity
-from karamelo_py.points.transfers.flip import Share, blend
+from karamelo_py.points.transfers import Moment, affine
+from karamelo_py.points.transfers.flip import Share, blended
 
 
 class AFLIP(NamedTuple):
@@ -30,9 +30,5 @@ class AFLIP(NamedTuple):
     inverts_spread = True
 
 
-@updated_velocity.on(AFLIP)
-def _(transfer, v, v_pic, dv):
-    return blend(transfer.alpha, v, v_pic, dv)
-
-
+blended(AFLIP)
 affine.register(AFLIP)

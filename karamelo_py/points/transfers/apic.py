@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import Moment, affine, updated_velocity
+from karamelo_py.points.transfers import Moment, affine
 
 
 class APIC(NamedTuple):
@@ -23,11 +23,6 @@ class APIC(NamedTuple):
 
     point_fields = (Moment,)
     inverts_spread = True
-
-
-@updated_velocity.on(APIC)
-def _(transfer, v, v_pic, dv):
-    return v_pic
 
 
 affine.register(APIC)

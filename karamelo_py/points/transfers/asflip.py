@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.points.transfers import Moment, affine, displacing_velocity, updated_velocity
-from karamelo_py.points.transfers.flip import Share, blend
+from karamelo_py.points.transfers import Moment, affine, displacing_velocity
+from karamelo_py.points.transfers.flip import Share, blended
 
 
 class ASFLIP(NamedTuple):
@@ -30,14 +30,10 @@ class ASFLIP(NamedTuple):
     inverts_spread = True
 
 
-@updated_velocity.on(ASFLIP)
-def _(transfer, v, v_pic, dv):
-    return blend(transfer.alpha, v, v_pic, dv)
-
-
 @displacing_velocity.on(ASFLIP)
 def _(transfer, v, v_pic):
     return v
 
 
+blended(ASFLIP)
 affine.register(ASFLIP)

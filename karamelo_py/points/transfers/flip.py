@@ -43,6 +43,12 @@ def blend(alpha, v, v_pic, dv):
     return add_scaled(scale(real(1, alpha) - alpha, v_pic), alpha, add(v, dv))
 
 
-@updated_velocity.on(FLIP)
-def _(transfer, v, v_pic, dv):
-    return blend(transfer.alpha, v, v_pic, dv)
+def blended(transfer: type) -> None:
+    """Let the velocity of points follow from `transfer` as that of FLIP does, by its `alpha`."""
+
+    @updated_velocity.on(transfer)
+    def _(transfer, v, v_pic, dv):
+        return blend(transfer.alpha, v, v_pic, dv)
+
+
+blended(FLIP)

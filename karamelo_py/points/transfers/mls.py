@@ -13,7 +13,6 @@ from karamelo_py.points.transfers import (
     kept_gradient,
     straining,
     taylor,
-    updated_velocity,
 )
 
 
@@ -32,11 +31,6 @@ class MLS(NamedTuple):
 
     point_fields = (Moment,)
     inverts_spread = True
-
-
-@updated_velocity.on(MLS)
-def _(transfer, v, v_pic, dv):
-    return v_pic
 
 
 @gradient_weight.on(MLS)

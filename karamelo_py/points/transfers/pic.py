@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import updated_velocity
-
 
 class PIC(NamedTuple):
     """v_p = v_pic, the updated nodal velocity at the point.
@@ -19,8 +17,3 @@ class PIC(NamedTuple):
     """
 
     inverts_spread = False
-
-
-@updated_velocity.on(PIC)
-def _(transfer, v, v_pic, dv):
-    return v_pic

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.points.transfers import Moment, taylor, updated_velocity
-from karamelo_py.points.transfers.flip import Share, blend
+from karamelo_py.points.transfers import Moment, taylor
+from karamelo_py.points.transfers.flip import Share, blended
 
 
 class TFLIP(NamedTuple):
@@ -29,9 +29,5 @@ class TFLIP(NamedTuple):
     inverts_spread = False
 
 
-@updated_velocity.on(TFLIP)
-def _(transfer, v, v_pic, dv):
-    return blend(transfer.alpha, v, v_pic, dv)
-
-
+blended(TFLIP)
 taylor.register(TFLIP)

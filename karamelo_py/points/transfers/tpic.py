@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.points.transfers import Moment, taylor, updated_velocity
+from karamelo_py.points.transfers import Moment, taylor
 
 
 class TPIC(NamedTuple):
@@ -21,11 +21,6 @@ class TPIC(NamedTuple):
 
     point_fields = (Moment,)
     inverts_spread = False
-
-
-@updated_velocity.on(TPIC)
-def _(transfer, v, v_pic, dv):
-    return v_pic
 
 
 taylor.register(TPIC)

@@ -54,7 +54,7 @@ class Motion(NamedTuple):
     strain: np.ndarray  # (6,) change of strain, 0 where the stress is prescribed
     turn: float
     shear: tuple[int, ...]  # components in simple shear
-    held: np.ndarray  # indices of the components whose stress is prescribed
+    prescribed: np.ndarray  # indices of the components whose stress is prescribed
     begin: np.ndarray  # their stress
     end: np.ndarray
 
@@ -105,17 +105,17 @@ class Point:
         Unreachable
             With what went wrong and in which increment.
         """
-        held = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
+        prescribed = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
         motion = Motion(
             strain=path.strain_at_end(self.strain, self.free) - self.strain,
             turn=path.turn,
             shear=tuple(COMPONENTS.index(name) for name in path.shear),
-            held=held,
-            begin=self.stress[held],
-            end=np.array([path.stress[COMPONENTS[k]] for k in held]),
+            prescribed=prescribed,
+            begin=self.stress[prescribed],
+            end=np.array([path.stress[COMPONENTS[k]] for k in prescribed]),
         )
         begun = self.time
-        rate = np.zeros(len(held))  # of the strains that are looked for, in paths
+        rate = np.zeros(len(prescribed))  # of the strains that are looked for, in paths
         marks = np.arange(path.increments + 1) / path.increments
         for number, (a, b) in enumerate(pairwise(marks), 1):
             try:
@@ -134,7 +134,7 @@ class Point:
             found = self._solve(motion, (b - a) * duration, a, b, rate)
         except Unreachable:
             middle = (a + b) / 2
-            if divisions == 0 or not len(motion.held):
+            if divisions == 0 or not len(motion.prescribed):
                 raise
             rate = self._go(motion, duration, a, middle, rate, divisions - 1)
             return self._go(motion, duration, middle, b, rate, divisions - 1)
@@ -142,12 +142,12 @@ class Point:
 
     def _solve(self, motion: Motion, dt: float, a: float, b: float, rate: np.ndarray) -> np.ndarray:
         """One increment: Newton's iteration for the strains whose stress is prescribed."""
-        held, target = motion.held, motion.begin + b * (motion.end - motion.begin)
+        prescribed, target = motion.prescribed, motion.begin + b * (motion.end - motion.begin)
         increment = (b - a) * motion.strain
         rigid = self._turned((b - a) * motion.turn, dt)
 
         def state_after(unknown: np.ndarray) -> tuple:
-            increment[held] = unknown
+            increment[prescribed] = unknown
             dl = self._flat(self._strained(increment, motion) + rigid)
             return advance(self.law, self.kin, self.state, dl, dt)
 
@@ -155,10 +155,10 @@ class Point:
             try:
                 state = state_after(unknown)
                 if jacobian(self.law, self.kin, state) > 0:
-                    return self._stress(state)[held] - target
+                    return self._stress(state)[prescribed] - target
             except (ArithmeticError, ValueError):
                 pass  # a logarithm of what is turned inside out, an overflow
-            return np.full(len(held), np.inf)
+            return np.full(len(prescribed), np.inf)
 
         unknown = self._newton(misfit, rate * (b - a), increment, target)
         try:

@@ -114,9 +114,9 @@ def elements_of(
     of = f"group '{group}'" if group is not None else "the mesh"
     highest = max(d for _, d, _ in cells)
     if highest > dimension or (highest < dimension and not lower) or highest < 1:
-        held = ", ".join(dict.fromkeys(name for name, _, _ in cells))
+        types = ", ".join(dict.fromkeys(name for name, _, _ in cells))
         raise ScriptError(
-            f"{of} does not fit {dimension}D: it has elements of type {held}",
+            f"{of} does not fit {dimension}D: it has elements of type {types}",
             argument="file" if group is None else "group",
             expected=_accepted(dimension),
         )

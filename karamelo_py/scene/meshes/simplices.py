@@ -52,12 +52,12 @@ class Simplices:
             local = x[rows] - self.origin[items]
             coordinates = np.einsum("nij,nj->ni", self.inverse[items], local)
             slack = self.slack[items]
-            held = (coordinates >= slack[:, 1:]).all(axis=1)
-            held &= 1 - coordinates.sum(axis=1) >= slack[:, 0]
+            within = (coordinates >= slack[:, 1:]).all(axis=1)
+            within &= 1 - coordinates.sum(axis=1) >= slack[:, 0]
             if self.flat:
                 beside = local - np.einsum("nij,nj->ni", self.edges[items], coordinates)
-                held &= np.einsum("ni,ni->n", beside, beside) <= self.tolerance**2
-            inside[rows[held]] = True
+                within &= np.einsum("ni,ni->n", beside, beside) <= self.tolerance**2
+            inside[rows[within]] = True
         return inside
 
 

@@ -15,8 +15,6 @@ class AngularMomentum(Compute):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     cx, cy, cz
         The centre.
 

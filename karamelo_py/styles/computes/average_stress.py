@@ -12,11 +12,6 @@ COMPONENTS = ("11", "22", "33", "12", "13", "23")
 class AverageStress(Compute):
     """Measure the mean Cauchy stress, published as ID_11, ID_22, ID_33, ID_12, ID_13, ID_23.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     compute(s, average_stress, all)

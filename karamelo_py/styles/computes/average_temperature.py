@@ -11,11 +11,6 @@ class AverageTemperature(Compute):
 
     All points count alike, and those of materials without a temperature as 0.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     compute(warmth, average_temperature, all)

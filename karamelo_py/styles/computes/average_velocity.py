@@ -8,11 +8,6 @@ from karamelo_py.scene.modify import Compute
 class AverageVelocity(Compute):
     """Measure the plain mean of the velocities of points; published as ID_x, ID_y, ID_z.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     compute(v, average_velocity, all)

@@ -11,11 +11,6 @@ class DissipatedEnergy(Compute):
     Plastic and viscous work, and what damage sets free. It is 0 of materials that dissipate
     nothing.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     compute(Ed, dissipated_energy, all)

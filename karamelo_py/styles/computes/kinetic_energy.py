@@ -8,11 +8,6 @@ from karamelo_py.scene.modify import Compute
 class KineticEnergy(Compute):
     """Measure the kinetic energy sum m v^2 / 2 of a group of points; published as ID.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     compute(Ek, kinetic_energy, all)

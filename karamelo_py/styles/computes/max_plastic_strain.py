@@ -11,11 +11,6 @@ class MaxPlasticStrain(Compute):
 
     Published as ID_Epmax and ID_Tmax; 0 where nothing can yield, or has a temperature.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     compute(worst, max_plastic_strain, all)

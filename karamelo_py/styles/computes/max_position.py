@@ -8,11 +8,6 @@ from karamelo_py.scene.modify import Compute
 class MaxPosition(Compute):
     """Measure the largest coordinates among points, each on its own; published as ID_x, ID_y, ID_z.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     compute(front, max_position, water)

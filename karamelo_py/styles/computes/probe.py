@@ -21,8 +21,6 @@ class Probe(Compute):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     column, columns
         Columns of dump particle. Their mean over the group counts points by their volume.
     point

@@ -8,11 +8,6 @@ from karamelo_py.scene.modify import Compute
 class StrainEnergy(Compute):
     """Measure the stored (elastic) energy of a group of points; published as ID.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     compute(Es, strain_energy, all)

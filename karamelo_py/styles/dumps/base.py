@@ -17,12 +17,16 @@ class Dump:
     Parameters
     ----------
     every
-        Steps between two snapshots; the first and the last state of a run are always written.
+        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
+        always written.
     file
-        File name; the first ``*`` becomes the step number.
+        File name. The first ``*`` becomes the step number; without ``*`` all snapshots follow each
+        other in one file.
     columns
         What to write, as the style understands it.
     """
+
+    style = ""
 
     def __init__(
         self,

@@ -14,7 +14,14 @@ SHRUNK, AT_LEAST = 2, 3
 
 
 class Binary:
-    """Mixed into a text dump: the same rows as numbers in double precision, little-endian."""
+    """Mixed into a text dump: the same rows as numbers in double precision, little-endian.
+
+    Parameters
+    ----------
+    file
+        File name, best with the ending ``.bin``. The first ``*`` becomes the step number; without
+        ``*`` all snapshots follow each other in one file.
+    """
 
     def _snapshot(self) -> Iterator[bytes]:
         hub = self.hub

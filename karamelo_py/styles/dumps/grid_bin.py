@@ -10,18 +10,6 @@ class GridBin(Binary, Grid):
     Numbers keep all their digits, and files are written faster than text. Everything else is as in
     dump grid.
 
-    Parameters
-    ----------
-    every
-        Steps between two snapshots. The first and the last state of a run are always written.
-    file
-        File name, best with the ending ``.bin``. The first ``*`` becomes the step number; without
-        ``*`` all snapshots follow each other in one file.
-    columns
-        What to write of each node, as in dump grid; ``x, y, z`` by default.
-    occupied
-        true: leave out nodes without mass.
-
     Example
     -------
     dump(d1, all, grid/bin, 100, dump_grid.*.bin, x, y, z, vx, vy)

@@ -11,13 +11,6 @@ class GridHdf5(OfNodes, Hdf5Dump):
 
     Parameters
     ----------
-    every
-        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
-        always written.
-    file
-        File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
-    columns
-        What to write of each node, as in dump grid; ``x, y, z`` by default.
     occupied
         true: nodes without mass are NaN.
 

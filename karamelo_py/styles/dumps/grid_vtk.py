@@ -20,13 +20,6 @@ class GridVtk(OfNodes, VtkDump):
 
     Parameters
     ----------
-    every
-        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
-        always written.
-    file
-        File name with a ``*``, which becomes the step number, and the ending ``.vtu``.
-    columns
-        What to write of each node, as in dump grid.
     occupied
         true: leave out nodes without mass, and cells that have such a node.
 

@@ -16,7 +16,13 @@ CHUNK = 1 << 16
 
 
 class Hdf5Dump(TableDump):
-    """A dump as arrays (snapshot, row); rows without a value (deleted points) hold NaN."""
+    """A dump as arrays (snapshot, row); rows without a value (deleted points) hold NaN.
+
+    Parameters
+    ----------
+    file
+        File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
+    """
 
     _snapshots = 0
 
@@ -103,16 +109,6 @@ class Hdf5(OfPoints, Hdf5Dump):
 
     Each column is an array over time and id. Of a point that is not there any more the numbers are
     NaN. The file is complete after every snapshot.
-
-    Parameters
-    ----------
-    every
-        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
-        always written.
-    file
-        File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
-    columns
-        What to write of each point, as in dump particle; ``x, y, z`` by default.
 
     Notes
     -----

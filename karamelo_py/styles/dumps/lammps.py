@@ -85,7 +85,14 @@ class LammpsDump(TableDump):
 
 
 class Gzipped:
-    """Mixed into a text dump: the same text, gzipped."""
+    """Mixed into a text dump: the same text, gzipped.
+
+    Parameters
+    ----------
+    file
+        File name, best with the ending ``.gz``. The first ``*`` becomes the step number; without
+        ``*`` all snapshots follow each other in one file.
+    """
 
     def encoder(self) -> Encoder:
         """A gzip stream without name and date, so that the same run gives the same bytes."""

@@ -23,16 +23,8 @@ class Movie(PyPlot):
         always drawn.
     file
         File name ending in .gif or, where the program ffmpeg is installed, .mp4.
-    width, height
-        Size of the picture: up to 50 in inches (of 100 pixels), above that in pixels; from 20 to
-        20000 pixels.
-    field
-        What colours the points: any column of dump particle. Without it the solid does (in 1D: vx
-        is drawn).
     vmin, vmax
         Ends of the colours. Without them the colours change when numbers outgrow them.
-    cmap, azimuth, elevation, axes, title
-        As in dump pyplot.
 
     Example
     -------

@@ -10,16 +10,6 @@ class ParticleBin(Binary, Particle):
     Numbers keep all their digits, and files are written faster than text. Everything else is as in
     dump particle.
 
-    Parameters
-    ----------
-    every
-        Steps between two snapshots. The first and the last state of a run are always written.
-    file
-        File name, best with the ending ``.bin``. The first ``*`` becomes the step number; without
-        ``*`` all snapshots follow each other in one file.
-    columns
-        What to write of each point, as in dump particle; ``x, y, z`` by default.
-
     Example
     -------
     dump(d1, all, particle/bin, 100, dump_particle.*.bin, x, y, z, vx, vy)

@@ -12,17 +12,6 @@ class ParticleGz(Gzipped, Particle):
 
     Everything else is as in dump particle.
 
-    Parameters
-    ----------
-    every
-        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
-        always written.
-    file
-        File name, best with the ending ``.gz``. The first ``*`` becomes the step number; without
-        ``*`` all snapshots follow each other in one file.
-    columns
-        What to write of each point, as in dump particle; ``x, y, z`` by default.
-
     Example
     -------
     dump(d1, all, particle/gz, 100, dump_p.*.LAMMPS.gz, x, y, z, vx, vy, vz, seq)

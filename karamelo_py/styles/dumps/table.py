@@ -73,7 +73,15 @@ class TableDump(Dump):
 
 
 class OfPoints:
-    """Rows are the material points."""
+    """Rows are the material points.
+
+    Parameters
+    ----------
+    columns
+        What to write of each point: x y z (position), x0 y0 z0 (first position), vx vy vz
+        (velocity), s11 s22 s33 s12 s13 s23 (Cauchy stress), e11 ... e23 (strain), seq (von Mises
+        stress), volume, mass and so on. ``x, y, z`` by default.
+    """
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:
@@ -95,7 +103,18 @@ class OfPoints:
 
 
 class OfNodes:
-    """Rows are the nodes of the background grids, or with `occupied` those that have mass."""
+    """Rows are the nodes of the background grids, or with `occupied` those that have mass.
+
+    Parameters
+    ----------
+    columns
+        What to write of each node: x y z (position), vx vy vz (velocity), vx_update ... (velocity
+        after the momentum update), fx fy fz (total force), mass, T where heat flows. ``x, y, z`` by
+        default.
+    occupied
+        true: leave out nodes without mass, which makes the files of a large and sparsely filled
+        domain small.
+    """
 
     rows_are = "nodes"
 

@@ -17,7 +17,13 @@ from karamelo_py.styles.dumps.table import POSITIONS, OfPoints, TableDump
 
 
 class VtkDump(TableDump):
-    """A series of VTU files, and a PVD file beside them that gives each its time."""
+    """A series of VTU files, and a PVD file beside them that gives each its time.
+
+    Parameters
+    ----------
+    file
+        File name with a ``*``, which becomes the step number, and the ending ``.vtu``.
+    """
 
     def __init__(
         self,
@@ -74,16 +80,6 @@ class Vtk(OfPoints, VtkDump):
 
     Beside them, a file of the same name with the ending ``.pvd`` lists all snapshots with their
     times: open that one.
-
-    Parameters
-    ----------
-    every
-        Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
-        always written.
-    file
-        File name with a ``*``, which becomes the step number, and the ending ``.vtu``.
-    columns
-        What to write of each point, as in dump particle.
 
     Example
     -------

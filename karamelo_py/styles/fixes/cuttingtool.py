@@ -19,8 +19,6 @@ class CuttingTool(PointForceFix):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     K
         Stiffness of the tool in shear moduli of the point: a number or a formula of time.
     x_tip, y_tip, z_tip

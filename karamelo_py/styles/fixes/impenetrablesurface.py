@@ -18,8 +18,6 @@ class ImpenetrableSurface(PointForceFix):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     K
         Stiffness of the wall in shear moduli of the point: a number or a formula of time.
     xs, ys, zs

@@ -18,8 +18,6 @@ class Indent(PointForceFix):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     kind
         The word ``sphere``.
     K

@@ -18,8 +18,6 @@ class IndentMinimizePenetration(PointForceFix):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     kind
         The word ``sphere``.
     R

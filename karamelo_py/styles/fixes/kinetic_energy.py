@@ -9,11 +9,6 @@ from karamelo_py.styles.computes.kinetic_energy import KineticEnergy as Measure
 class KineticEnergy(Measure, Fix):
     """Measure the kinetic energy sum m v^2 / 2 of a group of points; published as ID_s and ID.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     fix(Ek, kinetic_energy, all)

@@ -1,4 +1,4 @@
-"""Fixes that change nothing and measure forces for functions in expressions (commands/queries)."""
+"""Fixes that change nothing and measure forces for the functions of groups in expressions."""
 
 from __future__ import annotations
 

@@ -19,8 +19,6 @@ class MeldTool(PointForceFix):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     K
         Stiffness of the tool in shear moduli of the point, times a length: a number or a formula of
         time, as are all that follow.

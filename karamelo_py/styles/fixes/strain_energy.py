@@ -9,11 +9,6 @@ from karamelo_py.styles.computes.strain_energy import StrainEnergy as Measure
 class StrainEnergy(Measure, Fix):
     """Measure the stored (elastic) energy of a group of points; published as ID_s and ID.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     fix(Es, strain_energy, all)

@@ -35,6 +35,11 @@ class Bodies(NamedTuple):
 class PointForceFix(Fix):
     """Base of fixes that put a force on each point of their group.
 
+    Parameters
+    ----------
+    group
+        Group of points, or ``all``.
+
     Attributes
     ----------
     needs_stiffness

@@ -52,14 +52,14 @@ class ULMPMContacts(Method):
     glued together share a field and its force.
 
     The normal at a node is one for both solids, so that they get opposite impulses and momentum is
-    kept: from the sums of m grad N of the two, that of the solid that is held, else mostly the
-    larger one. Where more than two solids meet at a node, every pair that approaches takes its
-    impulse from the same velocities, reduced where a solid is in several pairs, and what remains is
-    taken again, up to 16 times: the order in which solids are defined does not matter, and momentum
-    is kept. Nodes that fix velocity_nodes holds are not moved by contact; what they would have
-    taken is added to the reaction that the fix publishes. Bardenhagen, Guilkey, Roessig, Brackbill,
-    Witzel & Foster 2001, "An improved contact algorithm for the material point method and
-    application to stress propagation in granular material".
+    kept: from the sums of m grad N of the two, that of the solid with a prescribed velocity, else
+    mostly the larger one. Where more than two solids meet at a node, every pair that approaches
+    takes its impulse from the same velocities, reduced where a solid is in several pairs, and what
+    remains is taken again, up to 16 times: the order in which solids are defined does not matter,
+    and momentum is kept. Nodes that fix velocity_nodes holds are not moved by contact; what they
+    would have taken is added to the reaction that the fix publishes. Bardenhagen, Guilkey, Roessig,
+    Brackbill, Witzel & Foster 2001, "An improved contact algorithm for the material point method
+    and application to stress propagation in granular material".
 
     See Also
     --------
@@ -101,20 +101,20 @@ class ULMPMContacts(Method):
             copies=np.array(copies, np.int64).reshape(-1, 2),
             # Pages that nothing is written to cost no memory.
             touched=np.zeros((nodes, count), np.int32),
-            held=np.zeros((nodes, d), np.int32),
+            prescribed=np.zeros((nodes, d), np.int32),
             meeting=np.zeros(count, np.int64),
             partners=np.zeros(count, np.int64),
             change=np.zeros((count, d)),
         )
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Friction and held nodes as the fixes have them now."""
+        """Friction and prescribed nodes as the fixes have them now."""
         contact.friction[:] = 0
         contact.pair[:] = -1
         for (a, b), fix in self._rubbing(hub):
             contact.friction[a, b] = contact.friction[b, a] = fix.friction
             contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
-        self._hold(hub, contact.held)
+        self._prescribe(hub, contact.prescribed)
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
         """Which nodes touched last: usf and usavg ask for it at the start of a step."""
@@ -156,17 +156,17 @@ class ULMPMContacts(Method):
                 first, second = fix.solids
                 yield (of[first.index], of[second.index]), fix
 
-    def _hold(self, hub: Hub, held: np.ndarray) -> None:
+    def _prescribe(self, hub: Hub, prescribed: np.ndarray) -> None:
         """Note which nodes fixes hold, and where the reaction of each is published."""
         holding = [fix for fix in hub.fixes.values() if fix.holds_nodes]
         # Pages that nothing is written to cost no memory.
-        if self._held is held:
-            held[:] = 0
-        self._held = held if holding else None
+        if self._prescribed is prescribed:
+            prescribed[:] = 0
+        self._prescribed = prescribed if holding else None
         for fix in holding:
             nodes = slice(None) if fix.group.all else fix.group.nodes
             for k, formula in enumerate(fix.formulas):
                 if formula is not None:
-                    held[nodes, k] = 1 + hub.values.slot(f"{fix.id}_x")
+                    prescribed[nodes, k] = 1 + hub.values.slot(f"{fix.id}_x")
 
-    _held: np.ndarray | None = None
+    _prescribed: np.ndarray | None = None

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from karamelo_py.language.forms import Forms, place_of
+from karamelo_py.language.by_dimension import Forms, place_of
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub

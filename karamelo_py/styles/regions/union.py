@@ -28,19 +28,19 @@ class Union(Region):
     intersection, difference
     """
 
+    # How the insides and the corners of the boxes of the parts are put together.
+    joined, low, high = np.logical_or, np.minimum, np.maximum
+
     def __init__(self, hub: Hub, first: Region, second: Region, *more: Region):
         parts = (first, second, *more)
         used = slice(0, require_domain(hub).dimension)
         super().__init__(
             hub,
-            np.min([part.box_lo[used] for part in parts], axis=0),
-            np.max([part.box_hi[used] for part in parts], axis=0),
+            self.low.reduce([part.box_lo[used] for part in parts]),
+            self.high.reduce([part.box_hi[used] for part in parts]),
             parts=parts,
         )
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which positions lie in one of the parts, see `Region.contains`."""
-        inside = self.parts[0].inside(x)
-        for part in self.parts[1:]:
-            inside |= part.inside(x)
-        return inside
+        """Which positions lie inside, see `Region.contains`."""
+        return self.joined.reduce([part.inside(x) for part in self.parts])

@@ -1,90 +1,16 @@
-"""Commands about the physics: scheme, precision, material, fix, compute."""
+"""Commands that define what acts and what is measured: fix, compute."""
 
 from __future__ import annotations
 
-from typing import Literal
-
-from karamelo_py.commands.materials import define
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import MEANINGS
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
+from karamelo_py.scene.guests import check_fix
 from karamelo_py.scene.hub import Catalogue, Hub
-from karamelo_py.scene.modify import Fix
-from karamelo_py.script.elsewhere import instead
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import SEEDS
-from karamelo_py.script.parser import parse_text
-
-
-def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
-    """Choose when in a step the stress is updated.
-
-    Parameters
-    ----------
-    style
-        ``musl`` when there is no such command.
-    arguments
-        What the style asks for; those that come with the program ask for nothing.
-
-    Example
-    -------
-    scheme(usl)
-
-    See Also
-    --------
-    method
-    """
-    target = registry.find("scheme", style)
-    hub.update.scheme = signature.call(target, hub, arguments, f"scheme {style}")
-
-
-def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
-    """Choose the precision of the numbers that points and nodes carry.
-
-    Parameters
-    ----------
-    kind
-        ``double`` (the default) or ``single``, which halves the memory.
-
-    Example
-    -------
-    precision(single)
-
-    Notes
-    -----
-    Comes before the first run.
-    """
-    if hub.update.step > 0:
-        raise ScriptError("the precision cannot change after the first run")
-    hub.settings.precision = kind
-
-
-def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument) -> None:
-    """Define a material.
-
-    Parameters
-    ----------
-    ID
-        Name of the material.
-    style
-        The law.
-    arguments
-        What the style asks for; see its page.
-
-    Example
-    -------
-    material(mat1, linear, 1000, 1000, 0.3)
-
-    See Also
-    --------
-    solid
-    """
-    if style in hub.parts["eos"] and arguments and not registry.knows("material", style):
-        # The form of 2020, material(ID, eosID, strengthID), has no style.
-        arguments = (Argument(parse_text(style)[0], hub.interpreter), *arguments)
-        style = "eos-strength"
-    define(hub, hub.materials, ID, style, arguments)
+from karamelo_py.script.other_programs import instead
 
 
 def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
@@ -121,7 +47,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     hub.fixes.add(ID, new, replace=True)
     hub.values.publish_vector(ID, new.published)
     _warn_if_empty(hub, "fix", ID, new)
-    _warn_if_idle(hub, style, new)
+    check_fix(hub, new)
     new.defined()
 
 
@@ -243,21 +169,6 @@ def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
                 "formulas will use the variable",
                 hint=f"choose another ID, such as {ID}_1",
             )
-
-
-def _warn_if_idle(hub: Hub, style: str, item: Fix) -> None:
-    """A fix that overrides nothing does nothing: perhaps a hook is misspelled."""
-    from karamelo_py.kernels.hooks import STAGES
-    from karamelo_py.scene.modify import Fix
-
-    if item.for_method or item.hooks() or type(item).refresh is not Fix.refresh:
-        return
-    own = [name for name in dir(item) if not hasattr(Fix, name) and callable(getattr(item, name))]
-    found = next(((name, hook) for name in own if (hook := nearest(name, STAGES))), None)
-    hub.warn(
-        f"fix {style} has no hook and no refresh: it does nothing",
-        hint=f"its author wrote {found[0]}; the hook is {found[1]}" if found else None,
-    )
 
 
 def _warn_if_empty(hub: Hub, kind: str, ID: str, item: object) -> None:

@@ -1,4 +1,4 @@
-"""Functions that only ever melt into others are compiled there, not on their own as well.
+"""Functions that are always inlined are compiled in their callers, not on their own as well.
 
 Numba optimises every function that it compiles and makes machine code of it, also of one that is
 written into each of its callers (`forceinline`) and that Python cannot call (no wrapper). With
@@ -22,7 +22,7 @@ def _own_functions(library: codegen.JITCodeLibrary) -> list:
     return [f for f in functions if not f.is_declaration and f.linkage == llvm.Linkage.external]
 
 
-def melts(library: codegen.JITCodeLibrary) -> bool:
+def is_inlined(library: codegen.JITCodeLibrary) -> bool:
     """Whether all that a library itself defines is always inlined: nobody calls its address."""
     own = _own_functions(library)
     return bool(own) and all(
@@ -34,25 +34,26 @@ def _use() -> None:
     """Put the class of libraries below in the place of Numba's."""
     set_environment = codegen.JITCPUCodegen.set_env
 
-    class Melting(codegen.JITCodeLibrary):
+    class InlinedLibrary(codegen.JITCodeLibrary):
         """The code of one compiled function and of all that it calls."""
 
-        melted = False
+        inlined = False
 
         def _optimize_functions(self, ll_module) -> None:
             # Left to the optimisation of the whole module, of other packages' functions, too.
             ll_module.data_layout = self._codegen._data_layout
 
         def add_linking_library(self, library) -> None:
-            # What melts has not linked in what it calls itself: whoever becomes machine code does.
-            inner = library._linking_libraries if library.melted else ()
+            # What is inlined has not linked in what it calls itself: whoever becomes machine code
+            # does.
+            inner = library._linking_libraries if library.inlined else ()
             for one in (library, *inner):
                 if one not in self._linking_libraries:
                     super().add_linking_library(one)
 
         def finalize(self) -> None:
-            self.melted = melts(self)
-            if self.melted:
+            self.inlined = is_inlined(self)
+            if self.inlined:
                 for function in _own_functions(self):
                     function.linkage = "linkonce_odr"  # as of all that is linked into others
                 self._finalized = True
@@ -60,7 +61,7 @@ def _use() -> None:
                 super().finalize()
 
         def _get_module_for_linking(self):
-            return self._final_module if self.melted else super()._get_module_for_linking()
+            return self._final_module if self.inlined else super()._get_module_for_linking()
 
     @functools.wraps(set_environment)
     def set_env(self, env_name: str, env) -> None:
@@ -69,7 +70,7 @@ def _use() -> None:
             set_environment(self, env_name, env)
 
     codegen.JITCPUCodegen.set_env = set_env
-    codegen.JITCPUCodegen._library_class = Melting
+    codegen.JITCPUCodegen._library_class = InlinedLibrary
 
 
 _use()

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Protocol
 
+from karamelo_py.language.faults import told
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.log import Log
 from karamelo_py.output.plots import Plots
@@ -102,7 +104,7 @@ class Output:
             self.hub.refresh_values()
         for item in due:
             try:
-                item.write()
+                self._do(item, "write")
             except ScriptError as error:
                 raise _located(error, item) from error.__cause__
             except OSError as error:
@@ -143,9 +145,16 @@ class Output:
 
     def _finish(self, item: Any) -> None:
         try:
-            item.finish()
+            self._do(item, "finish")
         except ScriptError as error:
             raise _located(error, item) from error.__cause__
+
+    @staticmethod
+    def _do(item: Any, what: str) -> None:
+        """Write or finish; exceptions of a dump say where they come from."""
+        style = getattr(item, "style", "")
+        with told(f"dump {style}", what, type(item), item.place) if style else nullcontext():
+            getattr(item, what)()
 
     def _items(self) -> list[Periodic]:
         return [self.log, *self.hub.dumps.values(), *self.plots]

@@ -1,4 +1,4 @@
-"""What always melts into its callers is not compiled on its own; what of Numba that leans on."""
+"""What is always inlined in its callers is not compiled on its own; what of Numba that leans on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numba import config, njit
 from numba.core import caching, ccallback, codegen, compiler, dispatcher
 from numba.core.typing import context, templates
 
-from karamelo_py.compiler import melting
+from karamelo_py.compiler import inlining
 from karamelo_py.compiler.compile import kernel, shared
 
 
@@ -21,17 +21,17 @@ def doubled(x):
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
-def test_what_melts(tmp_path, monkeypatch):
-    """A helper of point functions melts; a kernel, and a function of anybody else, do not."""
+def test_what_is_inlined(tmp_path, monkeypatch):
+    """A helper of point functions is inlined; a kernel, and a function of anybody else, are not."""
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))  # nothing is loaded
     seen = {}
-    melts = melting.melts
+    is_inlined = inlining.is_inlined
 
     def watched(library):
-        seen[library.name] = melts(library)
+        seen[library.name] = is_inlined(library)
         return seen[library.name]
 
-    monkeypatch.setattr(melting, "melts", watched)
+    monkeypatch.setattr(inlining, "is_inlined", watched)
 
     @njit
     def plain(x):

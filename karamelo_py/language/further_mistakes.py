@@ -64,7 +64,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
         What was wrong with that statement.
     """
     found: list[ScriptError] = []
-    told = {first.message}
+    seen = {first.message}
     dependents = Dependents()
     statement = interpreter.statement
     while dependents.note(statement) and len(found) < MOST:
@@ -74,9 +74,9 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
                 interpreter.execute(statement)
             except ScriptError as error:
                 # One name that is not known may stand in many lines.
-                if error.message not in told:
+                if error.message not in seen:
                     found.append(error)
-                told.add(error.message)
+                seen.add(error.message)
                 break
             except Quit:
                 return found

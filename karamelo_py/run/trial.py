@@ -1,0 +1,120 @@
+"""Parts of plug-ins are tried on one point, in plain Python, before loops are compiled with them.
+
+What is missing, or of the wrong length, so ends in a message about the part, not about a loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.laws import law_in, law_on
+from karamelo_py.kernels.visit import place_at
+from karamelo_py.language.faults import fault
+from karamelo_py.points.basis import entry, locate, support
+from karamelo_py.points.basis.product import Along, along
+from karamelo_py.points.kinematics import zero_symmetric
+from karamelo_py.points.laws import (
+    advance,
+    cauchy_stress,
+    elastic_strain,
+    energy_density,
+    initial_state,
+    jacobian,
+    kirchhoff_stress,
+    law_kind,
+    specific_volume,
+    wave_speed_squared,
+)
+from karamelo_py.points.transfers import updated_velocity
+from karamelo_py.scene.blame import Part, blamed, foreign_parts, is_foreign, part_of_law
+from karamelo_py.scene.hub import Hub
+
+TENSORS = (cauchy_stress, kirchhoff_stress, elastic_strain)
+NUMBERS = (jacobian, wave_speed_squared, energy_density)
+
+
+def try_parts(hub: Hub, setup: Any) -> None:
+    """Try the laws, the basis and the transfer of a scene that plug-ins brought.
+
+    Raises
+    ------
+    ScriptError
+        Naming the part, its package and its place in the script.
+    """
+    for solid in hub.solids.values():
+        if any(is_foreign(kind) for kind in law_kind(solid.material.law)):
+            _try_law(hub, setup, solid)
+    basis, transfer = setup.basis, setup.transfer
+    if is_foreign(type(basis)):
+        _try_basis(hub, setup)
+    if is_foreign(type(transfer)):
+        part = next(part for part in foreign_parts(hub) if part.kind is type(transfer))
+        v = (_one(setup),) * setup.kin.dimension
+        with _trial(hub, part):
+            _expect(part, updated_velocity, updated_velocity(transfer, v, v, v), len(v))
+
+
+def _one(setup: Any) -> Any:
+    return setup.nodes.sums.dtype.type(1)
+
+
+@contextmanager
+def _trial(hub: Hub, part: Part) -> Iterator[None]:
+    """Faults are told; numbers that one point happens not to stand are not what this is about."""
+    with blamed(hub, part), np.errstate(all="ignore"):
+        try:
+            yield
+        except (ArithmeticError, ValueError):
+            return
+
+
+def _expect(part: Part, function: Any, given: Any, count: int) -> None:
+    got = len(given) if isinstance(given, tuple) else type(given).__name__
+    if got != count:
+        what = f"{function.__name__} has to return a tuple of {count}, not {got}"
+        raise fault(part.name, what, part.place)
+
+
+def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
+    part = part_of_law(hub, solid.material)
+    kin, one = setup.kin, _one(setup)
+    law = law_in(law_on(solid.material.law, solid.h, solid.T0), type(one))
+    size = len(zero_symmetric(kin, one))
+    for strain in (0, 1e-3):
+        dl = (type(one)(strain),) * kin.tensor_size
+        with _trial(hub, part):
+            state = initial_state(law, kin, one)
+            after = advance(law, kin, state, dl, one)
+            if len(after) != len(state):
+                what = (
+                    f"what a point remembers is {len(state)} numbers at first and {len(after)} "
+                    "after a step: their number must not change"
+                )
+                raise fault(part.name, what, part.place)
+            for function in TENSORS:
+                _expect(part, function, function(law, kin, after), size)
+            for function in NUMBERS:
+                function(law, kin, after)
+            specific_volume(law)
+
+
+def _try_basis(hub: Hub, setup: Any) -> None:
+    basis, kin, points = setup.basis, setup.kin, setup.blocks[0].points
+    if not len(points.id):
+        return
+    part = next(part for part in foreign_parts(hub) if part.kind is type(basis))
+    grid = record(setup.grids, points.grid[0])
+    with _trial(hub, part):
+        where = points.x[0] if points.home is None else points.home
+        at = place_at(basis, kin, where, 0)
+        line = along(basis, kin, grid, at, 0) if along.defined(type(basis)) else None
+        if line is not None and not set(Along._fields) <= set(getattr(line, "_fields", ())):
+            raise fault(part.name, "along has to return an Along", part.place)
+        stencil = locate(basis, kin, grid, at)
+        for k in range(support(basis, kin)):
+            entry(basis, kin, grid, stencil, k)

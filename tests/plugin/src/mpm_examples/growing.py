@@ -1,0 +1,34 @@
+"""transfer growing: FLIP with a parameter of its own."""
+
+from typing import Annotated, NamedTuple
+
+from karamelo_py.compiler.tuples import add, scale
+from karamelo_py.language.signature import AtLeast, In
+from karamelo_py.points.transfers import updated_velocity
+
+
+class Growing(NamedTuple):
+    """FLIP whose points multiply their velocity in every step.
+
+    Parameters
+    ----------
+    factor
+        By how much, each time.
+    times
+        How often in a step.
+
+    Example
+    -------
+    method(ulmpm, growing, linear, 1.5)
+    method(ulmpm, growing, linear, 1.5, 2)
+    """
+
+    factor: Annotated[float, In(0, 4)]
+    times: Annotated[int, AtLeast(1)] = 1
+
+    inverts_spread = False  # only the affine transfers do
+
+
+@updated_velocity.on(Growing)
+def _(transfer, v, v_pic, dv):
+    return scale(transfer.factor**transfer.times, add(v, dv))

@@ -1,0 +1,40 @@
+"""scheme plain-usl: a step as a table of rows."""
+
+from typing import NamedTuple
+
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
+from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.nodes import UpdateToVelocity
+from karamelo_py.kernels.step import ACCELERATE, MOVE, SERIES, SUMS
+from karamelo_py.kernels.table import AtPoints, Gather, Nodes
+
+
+@shared
+def updated(s):
+    """The task that makes v* the velocity which deforms the points: no node counts as light."""
+    return UpdateToVelocity(real(0, s.nodes.sums[0, MASS]))
+
+
+updated.goes_through = UpdateToVelocity.goes_through
+
+
+class PlainUSL(NamedTuple):
+    """Update stress last, as in the textbook: nothing is done about nodes with little mass.
+
+    Example
+    -------
+    scheme(plain-usl)
+    """
+
+    courant = (0.65, 0.4)  # the stable step over h/c, and with one point a cell
+    rows = (
+        AtPoints(INITIAL_INTEGRATE, 0),
+        SUMS,  # mass, momentum and force to the nodes
+        *ACCELERATE,  # their update, and the fixes on nodes
+        Nodes(updated),
+        SERIES,
+        *MOVE,  # velocities back to the points, which move
+        Gather(Strain()),  # their stress, from the same velocity of the nodes
+        AtPoints(FINAL_INTEGRATE, 1),
+    )

@@ -1,0 +1,43 @@
+"""basis smooth: hats with rounded slopes, a product of one function a direction."""
+
+from typing import Annotated, NamedTuple
+
+from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.tuples import scale
+from karamelo_py.language.signature import In
+from karamelo_py.points.basis.linear import Linear
+from karamelo_py.points.basis.product import Along, along, register
+
+
+class Smooth(NamedTuple):
+    """Hats, the more rounded the larger the share of the cubic r^2 (3 - 2 r) in them.
+
+    Parameters
+    ----------
+    share
+        That of the cubic.
+
+    Example
+    -------
+    method(ulmpm, FLIP, smooth, 1, 0.5)
+    """
+
+    share: Annotated[float, In(0, 1)] = 0.5
+
+    cells = 1
+    nodes_per_cell = 1
+    least_nodes = 2
+    steady_moment = False
+    steep_edge = True
+
+
+@along.on(Smooth)
+def _(basis, kin, grid, place, direction):
+    hat = along(Linear(), kin, grid, place, direction)
+    r, one, two = hat.r, real(1, hat.r), real(2, hat.r)
+    right = r + basis.share * r * (one - r) * (two * r - one)
+    slope = one + basis.share * (real(6, r) * r * (one - r) - one)
+    return Along(hat.first, r, (one - right, right), scale(slope, hat.gradients), hat.affine)
+
+
+register(Smooth, 2)

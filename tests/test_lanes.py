@@ -1,0 +1,157 @@
+"""Several points at once: each lane gives the bits of a point alone; nothing is beyond the last."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from karamelo_py.compiler.compile import (
+    accumulate,
+    choose,
+    fma,
+    in_all,
+    kernel,
+    of_present,
+    real,
+)
+from karamelo_py.compiler.fields import load, store
+from karamelo_py.compiler.lanes import Eights, Fours, group
+from karamelo_py.compiler.tuples import row
+from karamelo_py.points.basis import entry, locate, support
+from karamelo_py.points.basis.linear import Linear
+from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
+from karamelo_py.points.grid import Grid
+from karamelo_py.points.kinematics import PlaneStrain, Space, zero_tensor
+from karamelo_py.points.laws import advance, initial_state
+from karamelo_py.points.laws.linear import LinearElastic
+from karamelo_py.points.laws.neo_hookean import NeoHookean
+
+pytestmark = pytest.mark.xdist_group("lanes")
+KIN = PlaneStrain()
+WIDTHS = {np.float64: (4, Fours()), np.float32: (8, Eights())}
+
+
+@kernel
+def _numbers_alone(a, b, out, n):
+    for p in range(n):
+        _number(a, b, out, p)
+
+
+@kernel
+def _number(a, b, out, p):
+    x, y = a[p], b[0, p]
+    out[0, p] = fma(x, y, real(2, x)) / (x * x + real(1, x))
+    out[1, p] = choose(x > y, min(x, real(0.5, x)), max(x, y, -y)) - abs(y)
+    out[2, p] = real(int(x + real(3, x)), x) + real(in_all(x < real(9, x)), y)
+
+
+@kernel
+def _numbers_in_lanes(tag, width, a, b, out, n):
+    for q in range(0, n, width):
+        _number(a, b, out, group(tag, q, min(width, n - q)))
+
+
+@pytest.mark.parametrize("real_type", WIDTHS)
+@pytest.mark.parametrize("n", [1, 8, 13])
+def test_arithmetic(real_type, n):
+    """All that numbers can do, with a last group that is not full; what is behind it stays."""
+    width, tag = WIDTHS[real_type]
+    rng = np.random.default_rng(1)
+    a, b = rng.normal(size=n).astype(real_type), rng.normal(size=(1, n)).astype(real_type)
+    alone, together = np.full((2, 3, n + 8), 7, real_type)
+    _numbers_alone(a, b, alone, n)
+    _numbers_in_lanes(tag, width, a, b, together, n)
+    assert together.tobytes() == alone.tobytes()
+    assert (together[:, n:] == 7).all()
+
+
+@kernel
+def _advance(law, kin, state, dl, dt, p):
+    like = state[0, p]
+    old = load(state, p, initial_state(law, kin, like))
+    store(state, p, advance(law, kin, old, load(dl, p, zero_tensor(kin, like)), dt))
+
+
+@kernel
+def _advance_alone(law, kin, state, dl, dt, n):
+    for p in range(n):
+        _advance(law, kin, state, dl, dt, p)
+
+
+@kernel
+def _advance_in_lanes(law, kin, state, dl, dt, n):
+    for q in range(0, n, 4):
+        _advance(law, kin, state, dl, dt, group(Fours(), q, min(4, n - q)))
+
+
+@pytest.mark.parametrize("kin", [PlaneStrain(), Space()], ids=["plane", "space"])
+@pytest.mark.parametrize("law", [LinearElastic(1e-3, 500.0, 400.0), NeoHookean(1e-3, 500.0, 400.0)])
+def test_laws_unchanged(law, kin):
+    """The same function of a law, four points at once; eleven points end within a group."""
+    n = 11
+    start = np.array(initial_state(law, kin, 1.0))
+    dl = 1e-3 * np.random.default_rng(2).normal(size=(kin.tensor_size, n))
+    alone = np.repeat(start[:, None], n, axis=1)
+    together = alone.copy()
+    for _ in range(3):
+        _advance_alone(law, kin, alone, dl, 1e-3, n)
+        _advance_in_lanes(law, kin, together, dl, 1e-3, n)
+    assert (alone != start[:, None]).any()
+    assert together.tobytes() == alone.tobytes()
+
+
+GRID = Grid(
+    x0=0.0, y0=0.0, z0=0.0, h=0.5, inv_h=2.0, spacing=0.5, nx=6, ny=5, nz=1, lx=6.0, ly=5.0,
+    lz=1.0, slack=1e-9, step_x=6, step_y=1, first=0,
+)  # fmt: skip
+
+
+@kernel
+def _map(basis, grid, x, mass, nodes, seen, p):
+    """Mass and position to the nodes, and a field of the nodes to the points."""
+    here = x[0, p], x[1, p]
+    stencil = locate(basis, KIN, grid, here)
+    total = real(0, here[0]), real(0, here[0]), real(0, here[0])
+    for k in range(support(basis, KIN)):
+        i, weight, gradient = entry(basis, KIN, grid, stencil, k)
+        part = of_present(p, mass[p]) * weight
+        accumulate(nodes, i, 0, (part, part * here[0], part * here[1]))
+        found = row(seen, i, 0, total)
+        total = (
+            fma(weight, found[0], total[0]),
+            fma(gradient[0], found[1], total[1]),
+            fma(gradient[1], found[2], total[2]),
+        )
+    store(x, p, total)
+
+
+@kernel
+def _map_alone(basis, grid, x, mass, nodes, seen, n):
+    for p in range(n):
+        _map(basis, grid, x, mass, nodes, seen, p)
+
+
+@kernel
+def _map_in_lanes(basis, grid, x, mass, nodes, seen, n):
+    for q in range(0, n, 4):
+        _map(basis, grid, x, mass, nodes, seen, group(Fours(), q, min(4, n - q)))
+
+
+@pytest.mark.parametrize("basis", [Linear(), QuadraticSpline()])
+@pytest.mark.parametrize("spread", [0.1, 2.4], ids=["one cell", "many cells"])
+def test_weights_gather_and_scatter(basis, spread):
+    """Points of one cell take the short way; sums at nodes differ by the order of additions."""
+    n = 14
+    rng = np.random.default_rng(3)
+    x = np.zeros((3, n))
+    x[:2] = 0.05 + spread * rng.uniform(size=(2, n))
+    mass = rng.uniform(1, 2, n)
+    seen = rng.normal(size=(42, 4))
+    alone, together = np.zeros((2, 42, 4))
+    x1, x2 = x.copy(), x.copy()
+    _map_alone(basis, GRID, x1, mass, alone, seen, n)
+    _map_in_lanes(basis, GRID, x2, mass, together, seen, n)
+    assert x2.tobytes() == x1.tobytes()
+    assert alone[:, 0].sum() == pytest.approx(mass.sum(), rel=1e-14)
+    np.testing.assert_allclose(together[:, :3], alone[:, :3], rtol=0, atol=1e-14 * mass.sum())
+    assert (together[:, 3] == 0).all()  # what lies behind the components of a record
