@@ -9,7 +9,7 @@ import subprocess
 import sys
 import warnings
 from textwrap import dedent
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -466,3 +466,15 @@ def test_a_folder_that_cannot_be_used_is_warned_of_in_a_run(tmp_path, monkeypatc
     assert err.getvalue().count("warning") == 1
     assert str(tmp_path / "file" / "kernels") in err.getvalue()
     assert "KARAMELO_PY_CACHE names another folder" in err.getvalue()
+
+
+def test_constants_in_modules_of_modules_are_followed():
+    """``import package.constants`` and ``package.constants.K`` in a kernel: K is in its hash."""
+    package, constants = ModuleType("package"), ModuleType("package.constants")
+    package.constants = constants
+    names = {"package": package, "__name__": "package.kernels"}
+    exec("def doubled(x):\n    return package.constants.K * x", names)
+    prints = []
+    for constants.K in (2, 5, 2):
+        prints.append(fingerprint.fingerprint([names["doubled"]], (), frozenset()))
+    assert prints[0] == prints[2] != prints[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
 from karamelo_py.compiler.compile import (
     accumulate,
@@ -58,11 +59,49 @@ def test_arithmetic(real_type, n):
     width, tag = WIDTHS[real_type]
     rng = np.random.default_rng(1)
     a, b = rng.normal(size=n).astype(real_type), rng.normal(size=(1, n)).astype(real_type)
+    a[: n // 4], b[0, : n // 2 : 2] = 0.0, -0.0
     alone, together = np.full((2, 3, n + 8), 7, real_type)
     _numbers_alone(a, b, alone, n)
     _numbers_in_lanes(tag, width, a, b, together, n)
     assert together.tobytes() == alone.tobytes()
     assert (together[:, n:] == 7).all()
+
+
+@kernel
+def _extremes_alone(a, b, out, n):
+    for p in range(n):
+        out[0, p] = max(a[p], b[0, p])
+        out[1, p] = min(a[p], b[0, p])
+
+
+@kernel
+def _extremes_in_lanes(a, b, out, n):
+    for q in range(0, n, 4):
+        p = group(Fours(), q, min(4, n - q))
+        out[0, p] = max(a[p], b[0, p])
+        out[1, p] = min(a[p], b[0, p])
+
+
+def test_extremes_of_what_is_no_number():
+    """NaN on either side and zeros of both signs, as alone."""
+    values = np.array([np.nan, 1.0, -0.0, 0.0, np.inf])
+    a, b = (np.ascontiguousarray(v.ravel()) for v in np.meshgrid(values, values))
+    alone, together = np.zeros((2, 2, 25))
+    _extremes_alone(a, b[None], alone, 25)
+    _extremes_in_lanes(a, b[None], together, 25)
+    assert together.tobytes() == alone.tobytes()
+
+
+@kernel
+def _whole_times_half(a, out):
+    p = group(Fours(), 0, 4)
+    out[0, p] = int(a[p]) * 0.5
+
+
+def test_whole_numbers_are_not_cut_off():
+    """Cells times a real number would lose what is behind the point: that does not compile."""
+    with pytest.raises(TypingError):
+        _whole_times_half(np.ones(4), np.zeros((1, 4)))
 
 
 @kernel

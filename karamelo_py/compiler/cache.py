@@ -214,11 +214,15 @@ class KernelCache(_Cache):
             path.unlink(missing_ok=True)
 
 
+# What chooses code by type, and what is in every kernel.
+WHOLE_FILES = [inlining.__file__, WHOLE, Path(WHOLE).with_name("compile.py")]
+
+
 def _setting() -> str:
     """What all kernels depend on."""
     versions = (platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__)
     how = (config.OPT, config.BOUNDSCHECK, config.LOOP_VECTORIZE, config.SLP_VECTORIZE)
-    whole = [Path(file).read_bytes() for file in (inlining.__file__, WHOLE)]
+    whole = [Path(file).read_bytes() for file in WHOLE_FILES]
     return repr((versions, [str(h) for h in how], whole))
 
 

@@ -168,6 +168,7 @@ def point_function(*, tags: int = 1, branches: bool = False) -> Callable[[Callab
             return added(implementation)
 
         dispatch.tags = tags
+        dispatch.branches = branches
         dispatch.find = find
         declare_point_function(dispatch)
         dispatch.on = on

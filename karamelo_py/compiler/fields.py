@@ -90,8 +90,8 @@ def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     """The field of `count` nodes, (count, components), zero: untouched pages cost no memory."""
     width = kind.shape(kin)
-    # Records of three or more take the place of four or eight, the width of registers.
-    return kind(np.zeros((count, width if width < 3 else -(-width // 4) * 4), real))
+    # Three numbers, wherever they begin, are loaded and stored as four, the width of a register.
+    return kind(np.zeros((count, width if width < 3 else -(-(width + 1) // 4) * 4), real))
 
 
 def field(fields: tuple, kind: type) -> Any:

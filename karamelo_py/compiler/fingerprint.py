@@ -323,7 +323,7 @@ def _look(thing: Any) -> tuple[str, list]:
 def _function(function: Callable) -> tuple[str, list]:
     if hasattr(function, "find") and hasattr(function, "tags"):
         # Its implementations are in the choices.
-        return f"point function {name_of(function)} {function.tags}", []
+        return f"point function {name_of(function)} {function.tags} {function.branches}", []
     if _opaque(function):
         return f"function {name_of(function)}", []
     code = function.__code__
@@ -334,14 +334,24 @@ def _function(function: Callable) -> tuple[str, list]:
         if value is _NOWHERE:
             continue
         parts += [name, value]
-        if isinstance(value, python.ModuleType) and value.__name__.partition(".")[0] not in _OPAQUE:
-            parts += [vars(value)[other] for other in names if other in vars(value)]
+        parts += _from_module(value, names, ())
     for cell in function.__closure__ or ():
         try:
             parts.append(cell.cell_contents)
         except ValueError:
             parts.append("empty")
     return f"function {digest}", parts + _choosers(function)
+
+
+def _from_module(value: Any, names: tuple[str, ...], above: tuple) -> list:
+    """What a function may take from a module, or from modules in it, by the names in its code."""
+    if not isinstance(value, python.ModuleType) or value in above:
+        return []
+    if value.__name__.partition(".")[0] in _OPAQUE:
+        return []
+    found = [vars(value)[name] for name in names if name in vars(value)]
+    inner = (_from_module(one, names, (*above, value)) for one in found)
+    return found + [part for parts in inner for part in parts]
 
 
 _NOWHERE = object()

@@ -46,7 +46,6 @@ from karamelo_py.compiler.compile import (
 from karamelo_py.compiler.tuples import row
 
 _I32 = ir.IntType(32)
-_OPTIONS = {"forceinline": True, "no_cfunc_wrapper": True}
 
 
 class Lanes(types.Type):
@@ -130,6 +129,9 @@ def _wider(a: Any, b: Any) -> Lanes | None:
     lanes, other = (a, b) if isinstance(a, Lanes) else (b, a)
     if not isinstance(lanes, Lanes) or not isinstance(other, types.Number | types.Boolean):
         return None
+    # Numbers of cells beside a real number would be cut off: `real(i, x)` makes lanes of reals.
+    if not isinstance(lanes.scalar, types.Float) and isinstance(other, types.Float):
+        return None
     return lanes
 
 
@@ -153,6 +155,8 @@ def _binary(operation: Any, of_floats: str | None, of_ints: str | None) -> None:
             lanes = _wider(*arguments)
             if lanes is None:
                 return None
+            if not (of_floats if isinstance(lanes.scalar, types.Float) else of_ints):
+                return None
             return signature(
                 lanes, *(a if isinstance(a, Lanes) else lanes.scalar for a in arguments)
             )
@@ -170,7 +174,7 @@ for _operations, _floats, _ints in (
     ((operator.add, operator.iadd), "fadd", "add"),
     ((operator.sub, operator.isub), "fsub", "sub"),
     ((operator.mul, operator.imul), "fmul", "mul"),
-    ((operator.truediv, operator.itruediv), "fdiv", "sdiv"),
+    ((operator.truediv, operator.itruediv), "fdiv", None),
     ((operator.and_,), None, "and_"),
     ((operator.or_,), None, "or_"),
 ):
@@ -314,7 +318,7 @@ def _extreme(function: Callable, sign: str) -> None:
             return None
         names = [f"a{k}" for k in range(len(arguments))]
         lines = ["best = a0"]
-        lines += [f"best = select(best {sign} {name}, best, {name})" for name in names[1:]]
+        lines += [f"best = select({name} {sign} best, {name}, best)" for name in names[1:]]
         return define(", ".join(names), *lines, "return best", select=_select)
 
 
@@ -880,9 +884,8 @@ def _largest_lane(typing_context, a):
         largest = _lane(builder, arguments[0], 0)
         for k in range(1, a.width):
             value = _lane(builder, arguments[0], k)
-            # So ordered, NaN comes through.
-            larger = builder.fcmp_ordered(">", largest, value)
-            largest = builder.select(larger, largest, value)
+            larger = builder.fcmp_ordered(">", value, largest)
+            largest = builder.select(larger, value, largest)
         return largest
 
     return a.scalar(a), codegen

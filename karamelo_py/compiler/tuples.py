@@ -112,31 +112,6 @@ def _record(table, i):
     return define("table, i", made, make=table.instance_class, record=record)
 
 
-def optional_row(array, i, like):
-    """Row `i` of an array that may be absent (None): then, and for an empty `like`, empty."""
-    return () if array is None else row(array, i, 0, like)
-
-
-@by_type(optional_row)
-def _optional_row(array, i, like):
-    if isinstance(array, types.NoneType):
-        return lambda array, i, like: ()
-    return lambda array, i, like: row(array, i, 0, like)
-
-
-def put_optional(array, i, values):
-    """Store into row `i` of an array that may be absent (None)."""
-    if array is not None:
-        put_at(array, i, 0, values)
-
-
-@by_type(put_optional)
-def _put_optional(array, i, values):
-    if isinstance(array, types.NoneType):
-        return lambda array, i, values: None
-    return lambda array, i, values: put_at(array, i, 0, values)
-
-
 def add_optional(a, factor, b):
     """a + factor * b, where an empty `b` counts as zero."""
     return add_scaled(a, factor, b) if len(b) else a
@@ -147,28 +122,6 @@ def _add_optional(a, factor, b):
     if len(b) == 0:
         return lambda a, factor, b: a
     return lambda a, factor, b: add_scaled(a, factor, b)
-
-
-def add_to_optional(array, i, factor, values):
-    """Add factor * values to row `i` of an array that may be absent (None).
-
-    Values beyond the length of the row are left out.
-    """
-    if array is not None:
-        for k in range(array.shape[1]):
-            array[i, k] += factor * values[k]
-
-
-@by_type(add_to_optional)
-def _add_to_optional(array, i, factor, values):
-    if isinstance(array, types.NoneType):
-        return lambda array, i, factor, values: None
-
-    def add(array, i, factor, values):
-        for k in range(array.shape[1]):
-            array[i, k] = fma(factor, values[k], array[i, k])
-
-    return add
 
 
 def clear_optional(array, i):
@@ -187,21 +140,6 @@ def _clear_optional(array, i):
             array[i, k] = 0
 
     return clear
-
-
-def put_from(array, i, first, values):
-    """array[i, k] = values[k] for k >= first."""
-    for k in range(first, len(values)):
-        array[i, k] = values[k]
-
-
-@by_type(put_from)
-def _put_from(array, i, first, values):
-    def put(array, i, first, values):
-        for k in range(first, len(values)):
-            array[i, k] = values[k]
-
-    return put
 
 
 def add_row(a, first, b):

@@ -164,10 +164,13 @@ class NodalMean(NamedTuple):
 class PointByPoint(NamedTuple):
     """Every point has its own change of volume."""
 
+    in_lanes = True
+
 
 class FBar(NamedTuple):
     """Changes of volume are averaged over the surroundings, against volumetric locking."""
 
+    in_lanes = True
     point_fields = (VolumeRatio,)
     node_fields = (NodalMean,)
 

@@ -128,8 +128,10 @@ def in_lanes(visit, s, block):
 @by_type(in_lanes)
 def _in_lanes(visit, s, block):
     tasks, quantities = visit[0], visit[1]
-    basis, grids = s[s.fields.index("basis")], s[s.fields.index("grids")]
-    parts = [*tasks, *quantities, basis]
+    basis, transfer, averaging, grids = (
+        s[s.fields.index(name)] for name in ("basis", "transfer", "averaging", "grids")
+    )
+    parts = [*tasks, *quantities, basis, transfer, averaging]
     knows = all(getattr(part.instance_class, "in_lanes", False) for part in parts)
     if not knows or reflected.defined(grids.instance_class):
         return lambda visit, s, block: OneByOne()

@@ -102,10 +102,17 @@ def fused(rows: Iterable[Any]) -> list[Any]:
     def sweep(scatter: Scatter | None, more: bool = False) -> Sweep:
         found = scatter or Scatter((), OldWeights())
         visit = Visit(_tasks(waiting), found.quantities, found.weights)
-        return Sweep(visit, waiting[0].share, True, scatter is not None, found.clears, True, more)
+        share = waiting[0].share if waiting else 1.0
+        # The new places are read by a scatter of the next step, whoever made them.
+        moves = bool(waiting) or more
+        scatters = scatter is not None
+        return Sweep(visit, share, bool(waiting), scatters, found.clears, moves, more)
 
     for row in kept:
         if isinstance(row, Gather):
+            if waiting and waiting[0].share != row.share:
+                out.append(sweep(None))
+                waiting = []
             waiting.append(row)
         elif isinstance(row, Scatter):
             out.append(sweep(row))
@@ -128,9 +135,14 @@ def staged(rows: Iterable[Any]) -> list[Any]:
         for visit in loops:
             if scatter is None and _kinds(visit.tasks) == _kinds(tasks):
                 return visit
-            if scatter is not None and _kinds(visit.quantities) == _kinds(scatter.quantities):
+            if scatter is not None and (*_kinds(visit.quantities), type(visit.weights)) == (
+                *_kinds(scatter.quantities),
+                type(scatter.weights),
+            ):
                 return visit
-        return Visit(tasks, () if scatter is None else scatter.quantities, PresentWeights())
+        if scatter is None:
+            return Visit(tasks, (), OldWeights())
+        return Visit(tasks, scatter.quantities, scatter.weights)
 
     out: list[Any] = []
     for row in rows:

@@ -19,8 +19,10 @@ from karamelo_py.kernels.export import (
     export_state,
     export_velocity_moment,
 )
+from karamelo_py.kernels.g2p import FBar
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.language.scene import Scene
+from karamelo_py.points.boundary import ReflectingGrid
 from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density
 from karamelo_py.points.transfers import Moment
 
@@ -140,7 +142,10 @@ class Fields:
         update = self.hub.update
         basis = getattr(update.method, "basis", None)
         owners = [*self.hub.fixes.values(), update.method, update.transfer, basis, update.scheme]
+        owners += [getattr(update.method, "frame", None)]
         owners += [Conducting] if update.thermal else []
+        owners += [ReflectingGrid] if update.boundary == "reflect" else []
+        owners += [FBar] if update.anti_locking else []
         found: dict[str, tuple[type, int]] = {}
         for kind in fields.declared(owners, "point_fields"):
             for k, column in enumerate(fields.columns_of(kind)):

@@ -67,6 +67,8 @@ def scene_key(hub: Hub) -> tuple:
         hub.domain.h if hub.domain else None,
         tuple(hub.solids.values()),
         update.method,
+        type(update.scheme),
+        update.scheme,
         update.transfer,
         type(update.transfer),
         update.thermal,

@@ -218,7 +218,7 @@ class PointsView(_View):
         self.time = float(control.values[TIME])
         self.ids = simulation.members(group)
         self.moved = False
-        self._declared: dict[type, np.ndarray] = {}
+        self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
 
     def _gather(self, of: Callable) -> np.ndarray:
         return self._simulation.by_id(of)[..., self.ids].T
@@ -232,8 +232,9 @@ class PointsView(_View):
     def __getitem__(self, kind: type) -> np.ndarray:
         """(n, components) of a field that a fix declares in its ``point_fields``."""
         if kind not in self._declared:
-            self._declared[kind] = self._gather(self._of(kind))
-        return self._declared[kind]
+            array = np.array(self._gather(self._of(kind)))
+            self._declared[kind] = array, array.copy()
+        return self._declared[kind][0]
 
     def __setitem__(self, kind: type, value: np.ndarray) -> None:
         self[kind][...] = value
@@ -241,8 +242,9 @@ class PointsView(_View):
     def write_back(self) -> None:
         """Write what a hook has changed; called when it returns."""
         super().write_back()
-        for kind, array in self._declared.items():
-            self._scatter(self._of(kind), array)
+        for kind, (array, before) in self._declared.items():
+            if not np.array_equal(array, before, equal_nan=True):
+                self._scatter(self._of(kind), array)
 
     @staticmethod
     def _of(kind: type) -> Callable:

@@ -28,6 +28,7 @@ class AFLIP(NamedTuple):
 
     point_fields = (Moment,)
     inverts_spread = True
+    in_lanes = True
 
 
 blended(AFLIP)

@@ -23,6 +23,7 @@ class APIC(NamedTuple):
 
     point_fields = (Moment,)
     inverts_spread = True
+    in_lanes = True
 
 
 affine.register(APIC)

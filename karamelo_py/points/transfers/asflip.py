@@ -28,6 +28,7 @@ class ASFLIP(NamedTuple):
 
     point_fields = (Moment,)
     inverts_spread = True
+    in_lanes = True
 
 
 @displacing_velocity.on(ASFLIP)

@@ -34,6 +34,7 @@ class FLIP(NamedTuple):
     alpha: Annotated[float, Share]
 
     inverts_spread = False
+    in_lanes = True
     variants = MappingProxyType({"gradient-enhanced": "TFLIP"})
 
 

@@ -32,6 +32,7 @@ class MLS(NamedTuple):
 
     point_fields = (Moment,)
     inverts_spread = True
+    in_lanes = True
 
 
 @gradient_weight.on(MLS)

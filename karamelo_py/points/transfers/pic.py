@@ -19,6 +19,7 @@ class PIC(NamedTuple):
     """
 
     inverts_spread = False
+    in_lanes = True
 
 
 take_nodal_velocity(PIC)

@@ -27,6 +27,7 @@ class TFLIP(NamedTuple):
 
     point_fields = (Moment,)
     inverts_spread = False
+    in_lanes = True
 
 
 blended(TFLIP)

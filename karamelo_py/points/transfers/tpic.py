@@ -21,6 +21,7 @@ class TPIC(NamedTuple):
 
     point_fields = (Moment,)
     inverts_spread = False
+    in_lanes = True
 
 
 taylor.register(TPIC)

@@ -62,6 +62,7 @@ class XPIC(NamedTuple):
         return (Series,) if self.order > 1 else ()
 
     inverts_spread = False
+    in_lanes = True
 
 
 @updated_velocity.on(XPIC)

@@ -1,0 +1,50 @@
+"""A scheme's table: what shares a visit, and what does not."""
+
+from __future__ import annotations
+
+from karamelo_py.kernels.g2p import Move, Strain, StrainInMove
+from karamelo_py.kernels.nodes import Update
+from karamelo_py.kernels.p2g import InternalForce, MassMomentum
+from karamelo_py.kernels.step import FORCE, MASS_AND_MOMENTUM, SUMS
+from karamelo_py.kernels.sweep import OldWeights, PresentWeights
+from karamelo_py.kernels.table import Gather, Nodes, Sweep, fused, staged
+from karamelo_py.schemes.musl import MUSL
+from karamelo_py.schemes.usl import USL
+
+
+def sweeps(rows):
+    return [row for row in rows if isinstance(row, Sweep)]
+
+
+def kinds(sweep):
+    return [type(tag) for tag in (*sweep.visit.tasks, *sweep.visit.quantities)]
+
+
+def test_usl_visits_the_points_once():
+    """Sulsky, Chen & Schreyer 1994: all that points do follows from one nodal velocity."""
+    (only,) = sweeps(fused(USL.rows))
+    assert kinds(only) == [Move, StrainInMove, MassMomentum, InternalForce]
+    assert only.only_if_more
+
+
+def test_musl_visits_them_twice_and_stages_are_parts_of_these():
+    visits = [sweep.visit for sweep in sweeps(fused(MUSL.rows))]
+    assert len(visits) == 2
+    assert all(sweep.visit in visits for sweep in sweeps(staged(MUSL.rows)))
+
+
+def test_parts_of_a_step_of_other_lengths_do_not_share_a_visit():
+    first, second = sweeps(fused((SUMS, Nodes(Update()), Gather(Move()), Gather(Strain(), 0.5))))
+    assert (kinds(first), first.share) == ([Move], 1.0)
+    assert (second.share, second.scatters) == (0.5, True)
+    assert type(second.visit.tasks[0]) is Strain
+
+
+def test_a_scatter_may_stand_alone():
+    """Force apart from mass, and a step that ends at the nodes."""
+    rows = (MASS_AND_MOMENTUM, FORCE, Nodes(Update()), Gather(Move()), Nodes(Update()))
+    force, move, sums = sweeps(fused(rows))
+    assert (force.gathers, force.scatters, force.moves) == (False, True, False)
+    assert (move.gathers, move.scatters) == (True, False)
+    assert (sums.gathers, sums.scatters, sums.only_if_more) == (False, True, True)
+    assert [type(s.visit.weights) for s in sweeps(staged(rows))[:2]] == [PresentWeights, OldWeights]
