@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from tempfile import mkdtemp
 
 import numpy as np
 
@@ -16,7 +17,7 @@ def final_hub(script: Path, threads: int | None = None) -> Hub:
     """The hub after a script has run."""
     hub = Hub(Console(quiet=True))
     hub.settings.threads = threads
-    hub.folder = Path(script).parent  # others write logs at the same time
+    hub.folder = Path(mkdtemp(dir=Path(script).parent))  # others write logs at the same time
     hub.interpreter = Interpreter(hub)
     hub.interpreter.run_file(str(script))
     return hub
