@@ -96,17 +96,13 @@ class Undefined(TypeError):
         self.classes = classes
 
 
-def point_function(*, tags: int = 1, branches: bool = False) -> Callable[[Callable], Callable]:
+def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     The decorated function gives name, parameters and docstring. Implementations are added with
     ``name.on(Class, ...)`` and serve both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and
     inside kernels, where the types are known at compile time and no branch is left. A plug-in adds
     its own in the same way. ``name.otherwise`` marks what classes without their own get.
-
-    With `branches`, implementations may branch over the numbers of a point: they are called for one
-    lane after another (:mod:`karamelo_py.compiler.lanes`), except those of classes that say
-    ``in_lanes = True``.
     """
 
     def declare(stub: Callable) -> Callable:
@@ -141,13 +137,7 @@ def point_function(*, tags: int = 1, branches: bool = False) -> Callable[[Callab
         dispatch.__doc__ = stub.__doc__
 
         def choose(*arguments: Any) -> Callable | None:
-            classes = tuple(tag_class(a) for a in arguments[:tags])
-            found = find(classes)
-            if branches and found and not getattr(classes[0], "in_lanes", False):
-                from karamelo_py.compiler.lanes import one_by_one
-
-                return one_by_one(dispatch, arguments) or found
-            return found
+            return find(tuple(tag_class(a) for a in arguments[:tags]))
 
         by_type(dispatch)(choose)
 
@@ -168,7 +158,6 @@ def point_function(*, tags: int = 1, branches: bool = False) -> Callable[[Callab
             return added(implementation)
 
         dispatch.tags = tags
-        dispatch.branches = branches
         dispatch.find = find
         declare_point_function(dispatch)
         dispatch.on = on

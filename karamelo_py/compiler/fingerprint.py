@@ -323,7 +323,7 @@ def _look(thing: Any) -> tuple[str, list]:
 def _function(function: Callable) -> tuple[str, list]:
     if hasattr(function, "find") and hasattr(function, "tags"):
         # Its implementations are in the choices.
-        return f"point function {name_of(function)} {function.tags} {function.branches}", []
+        return f"point function {name_of(function)} {function.tags}", []
     if _opaque(function):
         return f"function {name_of(function)}", []
     code = function.__code__

@@ -4,8 +4,8 @@ A kernel that indexes arrays of points, (components, points), with a `Group` ins
 gets `Lanes`: one number for each of 4 or 8 points that lie one after another. Lanes add, multiply
 and compare like numbers, node numbers made of them gather from arrays of nodes, (nodes,
 components), and `accumulate` scatters to them, lane after lane in the order of the points. Point
-functions need not know; what must branch over a point's numbers is done one lane after another
-(`one_by_one`). Results of a lane are those of the same operations on numbers, to the last bit.
+functions need not know; powers and logarithms are taken one lane after another (`one_by_one`).
+Results of a lane are those of the same operations on numbers, to the last bit.
 
 The last group of a tile may have fewer points than lanes: what is loaded for the others is that of
 the first point, and nothing is stored or given to nodes for them.

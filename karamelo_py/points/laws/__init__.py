@@ -84,48 +84,48 @@ def number(function: Callable) -> Callable:
     return function
 
 
-@point_function(branches=True)
+@point_function()
 def initial_state(law, kin, like):
     """The state of an undeformed, unstressed point."""
 
 
-@point_function(branches=True)
+@point_function()
 def advance(law, kin, state, dl, dt):
     """The state after the increment dl = dt grad v of a step dt."""
 
 
-@point_function(branches=True)
+@point_function()
 def kirchhoff_stress(law, kin, state):
     """det F times the Cauchy stress, which times the reference volume makes the nodal forces."""
 
 
-@point_function(branches=True)
+@point_function()
 def cauchy_stress(law, kin, state):
     """Cauchy stress, for output."""
 
 
-@point_function(branches=True)
+@point_function()
 def jacobian(law, kin, state):
     """det F."""
 
 
-@point_function(branches=True)
+@point_function()
 def deformation(law, kin, state):
     """F, of laws whose state holds it; left out by the others."""
 
 
-@point_function(branches=True)
+@point_function()
 def wave_speed_squared(law, kin, state):
     """Square of the speed of the fastest small disturbance, for the stable step."""
 
 
 @number
-@point_function(branches=True)
+@point_function()
 def energy_density(law, kin, state):
     """Stored energy per reference volume."""
 
 
-@point_function(branches=True)
+@point_function()
 def constrained_velocity(law, own, given):
     """Velocity of a point after a step: what the grid gives, or of rigid bodies their own."""
 
@@ -136,25 +136,25 @@ def _(law, own, given):
 
 
 @number
-@point_function(branches=True)
+@point_function()
 def dissipated_energy(law, kin, state):
     """Energy that is gone, per reference volume; left out by laws that dissipate nothing."""
 
 
 @number
-@point_function(branches=True)
+@point_function()
 def damage(law, kin, state):
     """0 intact to 1 broken; left out by laws without."""
 
 
 @number
-@point_function(branches=True)
+@point_function()
 def damage_initiation(law, kin, state):
     """Grows from 0, damage begins at 1; left out by laws without."""
 
 
 @number
-@point_function(branches=True)
+@point_function()
 def temperature(law, kin, state):
     """Temperature; 0 of laws without."""
 
@@ -164,7 +164,7 @@ def _(law, kin, state):
     return specific_volume(law) - specific_volume(law)
 
 
-@point_function(branches=True)
+@point_function()
 def with_temperature(law, kin, state, T):
     """The state at the temperature `T`, which laws without a temperature pass over."""
 
@@ -174,7 +174,7 @@ def _(law, kin, state, T):
     return state
 
 
-@point_function(branches=True)
+@point_function()
 def heat_capacity(law, like):
     """Heat per mass and kelvin; 0 of laws without temperature."""
 
@@ -184,7 +184,7 @@ def _(law, like):
     return real(0, like)
 
 
-@point_function(branches=True)
+@point_function()
 def conductivity(law, like):
     """Heat flux per gradient of temperature; 0 of laws without temperature."""
 
@@ -194,23 +194,23 @@ def _(law, like):
     return real(0, like)
 
 
-@point_function(branches=True)
+@point_function()
 def elastic_strain(law, kin, state):
     """Elastic strain, for output."""
 
 
 @number
-@point_function(branches=True)
+@point_function()
 def plastic_strain(law, kin, state):
     """Equivalent plastic strain, for output; left out by laws without."""
 
 
-@point_function(branches=True)
+@point_function()
 def with_stress(law, kin, state, stress):
     """The state whose Cauchy stress is `stress` (initial_stress); left out by laws without."""
 
 
-@point_function(branches=True)
+@point_function()
 def specific_volume(law):
     """Reference volume per mass."""
 
