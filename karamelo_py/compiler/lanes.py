@@ -240,7 +240,7 @@ def _call_vector(name: str, lanes: Lanes) -> Callable:
         function = cgutils.get_or_insert_function(
             builder.module,
             ir.FunctionType(vector, [vector] * len(values)),
-            f"llvm.{name}.v{lanes.width}f{lanes.scalar.bitwidth}",
+            f"llvm.{name}.{_shape(lanes)}",
         )
         return builder.call(function, values)
 
@@ -451,16 +451,20 @@ def spread(typing_context, tag, value):
     return lanes(tag, value), codegen
 
 
+def _masked(builder: Any, p: Any, width: int) -> Any:
+    """Which lanes of a group have a point."""
+    count = _splat(builder, builder.extract_value(p, 1), Lanes(types.int64, width))
+    numbers = _constant(list(range(width)), ir.IntType(64))
+    return builder.icmp_signed("<", numbers, count)
+
+
 @intrinsic
 def _present(typing_context, p):
     """Which lanes have a point."""
     mask = Lanes(types.boolean, p.width)
 
     def codegen(context, builder, sig, arguments):
-        lanes = Lanes(types.int64, p.width)
-        count = _splat(builder, builder.extract_value(arguments[0], 1), lanes)
-        numbers = _constant(list(range(p.width)), ir.IntType(64))
-        return builder.icmp_signed("<", numbers, count)
+        return _masked(builder, arguments[0], p.width)
 
     return mask(p), codegen
 
@@ -481,10 +485,10 @@ def _pointer(context, builder, kind, array, indices):
     )  # fmt: skip
 
 
-def _masked(builder: Any, p: Any, width: int) -> Any:
-    count = _splat(builder, builder.extract_value(p, 1), Lanes(types.int64, width))
-    numbers = _constant(list(range(width)), ir.IntType(64))
-    return builder.icmp_signed("<", numbers, count)
+def _shape(lanes: Lanes) -> str:
+    """What LLVM's intrinsics call a vector: v4f64."""
+    kind = "f" if isinstance(lanes.scalar, types.Float) else "i"
+    return f"v{lanes.width}{kind}{lanes.scalar.bitwidth}"
 
 
 def _load(context, builder, array, pointer, p, lanes):
@@ -493,12 +497,10 @@ def _load(context, builder, array, pointer, p, lanes):
     size = lanes.scalar.bitwidth // 8
     at = builder.bitcast(pointer, vector.as_pointer())
     mask = _masked(builder, p, lanes.width)
-    kind = "f" if isinstance(lanes.scalar, types.Float) else "i"
-    name = f"v{lanes.width}{kind}{lanes.scalar.bitwidth}"
     function = cgutils.get_or_insert_function(
         builder.module,
         ir.FunctionType(vector, [vector.as_pointer(), _I32, mask.type, vector]),
-        f"llvm.masked.load.{name}.p0",
+        f"llvm.masked.load.{_shape(lanes)}.p0",
     )
     zero = ir.Constant(vector, None)
     loaded = builder.call(function, [at, ir.Constant(_I32, size), mask, zero])
@@ -519,13 +521,11 @@ def _store(context, builder, pointer, p, lanes, value):
         with then:
             builder.store(value, at, align=size)
         with otherwise:
-            kind = "f" if isinstance(lanes.scalar, types.Float) else "i"
-            name = f"v{lanes.width}{kind}{lanes.scalar.bitwidth}"
             mask = _masked(builder, p, lanes.width)
             function = cgutils.get_or_insert_function(
                 builder.module,
                 ir.FunctionType(ir.VoidType(), [vector, vector.as_pointer(), _I32, mask.type]),
-                f"llvm.masked.store.{name}.p0",
+                f"llvm.masked.store.{_shape(lanes)}.p0",
             )
             builder.call(function, [value, at, ir.Constant(_I32, size), mask])
 

@@ -192,18 +192,6 @@ def _plus(number, present):
     return lambda number, present: number + present[0]
 
 
-def times(number, present):
-    """number * present[0], or the number alone where `present` is empty."""
-    return number * present[0] if len(present) else number
-
-
-@by_type(times)
-def _times(number, present):
-    if len(present) == 0:
-        return lambda number, present: number
-    return lambda number, present: number * present[0]
-
-
 def increased(present, change):
     """(present[0] + change,), or nothing where `present` is empty."""
     return (present[0] + change,) if len(present) else ()

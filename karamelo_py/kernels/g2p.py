@@ -76,7 +76,6 @@ class Move(NamedTuple):
     """Gather v* and its change; settle velocity and new position."""
 
     in_lanes = True
-    strains = False
     says = "g2p, move"
     reads = ("x", "v")
     writes = ("x moved", "v", "moment", "bounces")
@@ -86,7 +85,6 @@ class Strain(NamedTuple):
     """Gather the gradient of the nodal velocity; settle the state of the law."""
 
     in_lanes = True
-    strains = True
     says = "stress"
     reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
     writes = ("state", "deformation gradient")
@@ -96,7 +94,6 @@ class SecondStrain(NamedTuple):
     """The same for the second of two strain increments of a step."""
 
     in_lanes = True
-    strains = True
     says = "second half of the stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -106,17 +103,18 @@ class StrainInMove(NamedTuple):
     """`Strain` in one visit with `Move`, behind it: what v* gave already is not gathered again."""
 
     in_lanes = True
-    strains = True
     says = "stress"
     reads = Strain.reads
     writes = Strain.writes
+
+
+STRAINS = Strain, SecondStrain, StrainInMove  # which take averaged volumes, where there are
 
 
 class TrialStrain(NamedTuple):
     """Gather the gradient; settle only by what factor it would change the volume (F-bar)."""
 
     in_lanes = True
-    strains = False
     says = "trial volume"
     reads = Strain.reads
     writes = ("volume ratio",)
@@ -126,7 +124,6 @@ class SeriesTerm(NamedTuple):
     """Gather the present term of the series of XPIC."""
 
     in_lanes = True
-    strains = False
     says = "term of the series to the points"
     reads = ("x",)
     writes = ("term of series",)

@@ -157,7 +157,6 @@ class TemperatureGradient(NamedTuple):
 
     temperature: np.ndarray  # (N, 1)
 
-    strains = False
     says = "gradient of temperature"
     reads = ("x",)
     writes = ("heat gradient",)
@@ -178,7 +177,6 @@ class Warming(NamedTuple):
     update: np.ndarray  # (N, 2)
     mean: np.ndarray  # (N, 2)
 
-    strains = False
     says = "temperature"
     reads = ("x", "state", "material", "temperature", "capacity", "conductance", "share")
     writes = ("state",)

@@ -36,7 +36,7 @@ from karamelo_py.kernels.arrays import (
     Hooks,
     NoHooks,
 )
-from karamelo_py.kernels.g2p import FBar, Move, SeriesTerm, TrialStrain
+from karamelo_py.kernels.g2p import STRAINS, FBar, Move, SeriesTerm, TrialStrain
 from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks
 from karamelo_py.kernels.nodes import (
     ClearMean,
@@ -487,7 +487,7 @@ class _Spelled:
                 add("if more:")
             self.clear(row.clears, "    " if row.only_if_more else "")
         length = "dt" if row.share == 1 else f"real({row.share}, dt) * dt"
-        if row.gathers and any(tag.strains for tag in row.visit.tasks):
+        if row.gathers and any(isinstance(tag, STRAINS) for tag in row.visit.tasks):
             add(f"average_volumes(s.averaging, s, mode, {length})")
         scatters = "more" if row.only_if_more else str(row.scatters)
         add(

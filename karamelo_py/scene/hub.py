@@ -153,8 +153,8 @@ class Hub:
     @property
     def simulation(self) -> Any:
         """The arrays of the scene as it is now, made when first asked for."""
-        engine = registry.find("engine", self.settings.engine)
         if self._simulation is None or not self._simulation.fits(self):
+            engine = registry.find("engine", self.settings.engine)
             with blamed(self):
                 self._simulation = engine(self, self._simulation)
         return self._simulation
