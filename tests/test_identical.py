@@ -133,6 +133,25 @@ def test_any_way_through_a_compiled_run(state):
     assert same_bits(whole, state(crossing(2, "dump(d, all, particle, 7, d.*.txt, x)", "run(100)")))
 
 
+@pytest.mark.xdist_group("identical")
+def test_order_of_points(tmp_path):
+    """The order within tiles follows from places and ids, not from the order before: so restarts
+    go on as if nothing had been."""
+    path = tmp_path / "in.script"
+    path.write_text(crossing(2, "run(50)"), encoding="utf-8")
+    simulation = final_hub(path).simulation
+    orders = []
+    for seed in (1, 2):
+        for one in simulation.setup.blocks:
+            shuffled = np.random.default_rng(seed).permutation(one.points.id.size)
+            for _, array in arrays_of(one.points):
+                array[:] = array[..., shuffled]
+        simulation.sort()
+        orders.append([one.points.id.copy() for one in simulation.setup.blocks])
+    assert all(np.array_equal(a, b) for a, b in zip(*orders, strict=True))
+    assert simulation.tiles.sorts > 3
+
+
 @pytest.mark.full
 def test_compiled_stages(state):
     """Fused and staged, each compiled into one piece, give the same bits."""

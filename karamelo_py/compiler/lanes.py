@@ -427,6 +427,11 @@ class Eights(NamedTuple):
     width = 8
 
 
+def lanes_for(bits: int) -> type:
+    """How many points are visited at once, of numbers with so many bits; kept sorted for that."""
+    return {64: Fours, 32: Eights}[bits]
+
+
 @intrinsic
 def group(typing_context, tag, first, count):
     """The `count` points from `first` on, as many as the tag says at most."""

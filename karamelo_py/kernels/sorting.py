@@ -41,39 +41,45 @@ def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
 
 
 @kernel
-def order_in_tiles(kin, grids, basis, size, x, of, begins, ends, width, count, cell, order):
-    """Sort the points of each tile by the first node that they see, stably.
+def order_in_tiles(kin, grids, basis, size, points, x, begins, ends, width, bins, cell, order):
+    """Sort the points of each tile by the first node that they see, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
-    first. `count` (cells of a tile,) and `cell` (2, n) are scratch; `order` (n,) is by tile.
+    first. The order follows from where the points are, not from where they were. `bins` (2, cells
+    of a tile) and `cell` (2, n) are scratch; `order` (n,) is by tile.
     """
     d = dimension(kin)
     for t in range(len(begins)):
         begin, end = begins[t], ends[t]
-        bins = size**d
-        count[:] = 0
+        bins[0, :] = 0
+        bins[1, :] = -1
         for q in range(begin, end):
             p = order[q]
-            grid = record(grids, of[p])
+            grid = record(grids, points.grid[p])
             number = 0
             for k in range(d):
                 a = in_cells(grid, k, x[k, p]) + first_node(basis, grid.h)
                 number = number * size + max(int(a), 0) % size
             cell[0, q] = number
             cell[1, q] = p
-            count[number] += 1
-        # Twice: whole groups, then the others; `count` becomes where the next point of a cell goes.
+            bins[0, number] += 1
+        # Twice: whole groups, then the others. From here on, where a cell begins and where it ends.
         place = begin
         for rest in (False, True):
-            for c in range(bins):
-                here = count[c]
-                if here >= 0 and (here % width != 0) == rest:
-                    count[c] = -1 - place
+            for c in range(bins.shape[1]):
+                here = bins[0, c]
+                if bins[1, c] < 0 and (here % width != 0) == rest:
+                    bins[:, c] = place
                     place += here
         for q in range(begin, end):
-            c = cell[0, q]
-            order[-1 - count[c]] = cell[1, q]
-            count[c] -= 1
+            c, p = cell[0, q], cell[1, q]
+            at = bins[1, c]
+            bins[1, c] += 1
+            # Nearly all were in this order before.
+            while at > bins[0, c] and points.id[order[at - 1]] > points.id[p]:
+                order[at] = order[at - 1]
+                at -= 1
+            order[at] = p
 
 
 @kernel

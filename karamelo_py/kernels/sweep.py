@@ -27,7 +27,7 @@ from karamelo_py.compiler.compile import (
     shared,
 )
 from karamelo_py.compiler.fields import load_vector
-from karamelo_py.compiler.lanes import Eights, Fours, group, spread
+from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
@@ -135,30 +135,19 @@ def _in_lanes(visit, s, block):
     knows = all(getattr(part.instance_class, "in_lanes", False) for part in parts)
     if not knows or reflected.defined(grids.instance_class):
         return lambda visit, s, block: OneByOne()
-    real_type = block[0][block[0].fields.index("mass")].dtype
-    if real_type == types.float32:
-        return lambda visit, s, block: Eights()
-    return lambda visit, s, block: Fours()
+    made = lanes_for(block[0][block[0].fields.index("mass")].dtype.bitwidth)
+    return lambda visit, s, block: made()
 
 
-@point_function()
 def width_of(width):
     """How many points are visited at once; constant at compile time."""
+    return width.width
 
 
-@width_of.on(OneByOne)
-def _(width):
-    return 1
-
-
-@width_of.on(Fours)
-def _(width):
-    return 4
-
-
-@width_of.on(Eights)
-def _(width):
-    return 8
+@by_type(width_of)
+def _width_of(width):
+    number = width.instance_class.width
+    return lambda width: number
 
 
 @point_function()

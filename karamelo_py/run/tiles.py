@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.lanes import lanes_for
 from karamelo_py.kernels.arrays import Block, Setup, Tiling, arrays_of
 from karamelo_py.kernels.nodes import ClearSums
 from karamelo_py.kernels.sorting import order_in_tiles, order_points, widest
@@ -131,12 +132,12 @@ class Tiles:
         begins = np.concatenate([[0], ends[:-1]])
         occupied = np.flatnonzero(ends > begins)
         self.used[occupied] = 1
-        width = 4 if x.dtype == np.float64 else 8
+        width = lanes_for(8 * x.itemsize).width
         cells = np.empty((2, x.shape[1]), np.int64)
-        count = np.empty(self.size**self.dimension, np.int64)
+        bins = np.empty((2, self.size**self.dimension), np.int64)
         order_in_tiles(
-            s.kin, s.grids, s.basis, self.size, x, points.grid, begins[occupied], ends[occupied],
-            width, count, cells, order,
+            s.kin, s.grids, s.basis, self.size, points, x, begins[occupied], ends[occupied], width,
+            bins, cells, order,
         )  # fmt: skip
         grid = np.searchsorted(self.first, occupied, side="right") - 1
         # Tiles of one colour have places of the same parity in every direction.
