@@ -7,8 +7,9 @@ import inspect
 
 import numba
 import pytest
+from llvmlite.binding import ffi
 from numba import config, njit
-from numba.core import caching, ccallback, codegen, compiler, dispatcher
+from numba.core import base, caching, ccallback, codegen, compiler, dispatcher, targetconfig
 from numba.core.typing import context, templates
 
 from karamelo_py.compiler import inlining
@@ -57,6 +58,10 @@ INSIDE = {
     codegen.CPUCodeLibrary._optimize_final_module: "e405bd473752",
     codegen.CPUCodeLibrary._finalize_final_module: "95bbf4fcbb90",
     codegen.CPUCodeLibrary._get_module_for_linking: "56dde0e0555b",
+    codegen.CPUCodeLibrary.serialize_using_object_code: "a895c26d01ba",
+    codegen.CPUCodeLibrary.serialize_using_bitcode: "37c06b79c860",
+    codegen.CPUCodeLibrary._unserialize: "c83d278d9934",
+    codegen.JITCodeLibrary._finalize_specific: "81c2abfc04e9",
     codegen.JITCPUCodegen.set_env: "207cf44be0e0",
     codegen.JitEngine.is_symbol_defined: "8acc1ebba0b0",
     caching._Cache: "ee22baec643a",
@@ -66,6 +71,9 @@ INSIDE = {
     ccallback.CFunc.compile: "08edc561907b",
     compiler.CompileResult._reduce: "5f86eacfa520",
     compiler.CompileResult._rebuild: "44fa9dc22558",
+    targetconfig.TargetConfig: "5296215326fb",
+    base._initialize_llvm_lock_event.__wrapped__: "997412d97a23",
+    ffi._LLVMLock: "674e02dc78ae",
     context.BaseContext._lookup_global: "08d354cbcacf",
     templates.make_overload_template: "7f6974584cb1",
 }

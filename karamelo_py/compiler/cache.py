@@ -30,7 +30,7 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from karamelo_py.compiler import inlining
+from karamelo_py.compiler import held, inlining
 from karamelo_py.compiler.fingerprint import (
     WHOLE,
     Choice,
@@ -215,7 +215,7 @@ class KernelCache(_Cache):
 
 
 # What chooses code by type, and what is in every kernel.
-WHOLE_FILES = [inlining.__file__, WHOLE, Path(WHOLE).with_name("compile.py")]
+WHOLE_FILES = [inlining.__file__, held.__file__, WHOLE, Path(WHOLE).with_name("compile.py")]
 
 
 def _setting() -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import gc
+import inspect
 import os
 from collections.abc import Callable
 from typing import Any
@@ -14,6 +16,7 @@ from numba.core import event
 from numba.core.ccallback import CFunc
 from numba.extending import intrinsic, overload
 
+from karamelo_py.compiler import inlining, lean  # noqa: F401
 from karamelo_py.compiler.cache import KernelCache
 from karamelo_py.compiler.fingerprint import (
     SPELLED,
@@ -23,6 +26,7 @@ from karamelo_py.compiler.fingerprint import (
     serves,
     tag_class,
 )
+from karamelo_py.compiler.held import hold
 
 
 class _NoCollections(event.Listener):
@@ -55,6 +59,15 @@ os.environ.setdefault("GOMP_SPINCOUNT", "500")
 _INLINED = {"forceinline": True, "no_cfunc_wrapper": True}
 
 
+_HOW = {
+    "nogil": True,
+    "error_model": "numpy",
+    "_nrt": False,
+    "forceinline": False,
+    "no_cfunc_wrapper": True,
+}
+
+
 def kernel(function: Callable | None = None, **options: Any) -> Callable:
     """Compile a loop over points or nodes; cached on disk, free of the interpreter lock.
 
@@ -64,11 +77,44 @@ def kernel(function: Callable | None = None, **options: Any) -> Callable:
     """
     if function is None:
         return lambda f: kernel(f, **options)
-    options = {"forceinline": False, "no_cfunc_wrapper": True} | options
-    compiled = njit(nogil=True, error_model="numpy", _nrt=False, **options)(function)
+    options = _HOW | options
+    compiled = njit(**options)(function)
     if not config.DISABLE_JIT:
         compiled._cache = KernelCache(function, options)
     return compiled
+
+
+def inner_kernel(function: Callable) -> Callable:
+    """A kernel that only kernels call, kept on disk for all of them."""
+    inlining.kept.add(function.__qualname__)
+    return kernel(function, no_cpython_wrapper=True)
+
+
+def subkernel(function: Callable) -> Callable:
+    """A function that kernels call, too large to be written into each place that calls it."""
+    inlining.left.add(function.__qualname__)
+    return njit(**_HOW, no_cpython_wrapper=True)(function)
+
+
+def entered(function: Callable) -> Callable:
+    """A kernel for Python and for other kernels, which takes its tuples held."""
+    names = inspect.signature(function).parameters
+    inner = inner_kernel(function)
+    call = define(
+        ", ".join(names),
+        f"return inner({', '.join(f'hold({name})' for name in names)})",
+        inner=inner,
+        hold=hold,
+    )
+    call.__module__, call.__qualname__ = function.__module__, f"{function.__qualname__}.entry"
+    entry = kernel(call)
+
+    @functools.wraps(function)
+    def enter(*arguments: Any) -> Any:
+        return entry(*arguments)
+
+    by_type(enter)(lambda *arguments: call)
+    return enter
 
 
 def by_type(function: Callable) -> Callable:

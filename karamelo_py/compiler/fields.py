@@ -37,6 +37,7 @@ from numba.core.imputils import impl_ret_borrowed
 from numba.extending import lower_builtin, type_callable
 
 from karamelo_py.compiler.compile import by_type, define
+from karamelo_py.compiler.held import is_held, item_of
 
 
 def scalar(kin: Any) -> int:
@@ -117,13 +118,18 @@ def _type_field(context):
     return typed
 
 
+def _item_of_value(context, builder, numba_type, value, k):
+    return builder.extract_value(value, k)
+
+
 @lower_builtin(field, types.BaseTuple, types.Any)
 def _lower_field(context, builder, signature, arguments):
     fields, kind = signature.args
     k = _place_of(kind, fields)
     if k is None:
         return context.get_dummy_value()
-    array = builder.extract_value(builder.extract_value(arguments[0], k), 0)
+    read = item_of if is_held(fields) else _item_of_value
+    array = read(context, builder, fields[k], read(context, builder, fields, arguments[0], k), 0)
     return impl_ret_borrowed(context, builder, signature.return_type, array)
 
 

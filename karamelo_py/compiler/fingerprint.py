@@ -195,9 +195,11 @@ def describe(numba_type: Any) -> str:
     if isinstance(numba_type, types.BaseNamedTuple):
         items = zip(numba_type.fields, numba_type, strict=True)
         inner = ",".join(f"{name}={describe(item)}" for name, item in items)
-        return f"{_class_name(numba_type.instance_class)}({inner})"
+        how = type(numba_type).__name__  # held or a value
+        return f"{how} {_class_name(numba_type.instance_class)}({inner})"
     if isinstance(numba_type, types.BaseTuple):
-        return f"({','.join(describe(item) for item in numba_type)},)"
+        how = type(numba_type).__name__
+        return f"{how}({','.join(describe(item) for item in numba_type)},)"
     if isinstance(numba_type, (types.Callable, types.Opaque)) and numba_type != types.none:
         raise Unknown(str(numba_type))
     return f"{type(numba_type).__name__}:{numba_type}"

@@ -1,11 +1,13 @@
-"""Functions that are always inlined are compiled in their callers, not on their own as well.
+"""Machine code is made once, of what Python calls: all else is left to those who call it.
 
 Numba optimises every function that it compiles and makes machine code of it, also of one that is
-written into each of its callers (`forceinline`) and that Python cannot call (no wrapper). With
-point functions ten calls deep that is half of the work of a first compilation, for code that nobody
-runs. Here such a function is kept as it is and left to its callers. This leans on the inside of
-Numba: pyproject.toml names the versions that it was written for, and a test knows their text. The
-text of this file is in the key of every kernel on disk.
+written into each of its callers (`forceinline`) or that only compiled code calls. With point
+functions ten calls deep that is half of the work of a first compilation, for code that nobody
+runs. Here functions that are always inlined, and those that were `left` to their callers, are
+neither optimised nor emitted on their own; those that are `kept` are optimised, for they are on
+disk for other callers, but not emitted either. This leans on the inside of Numba: pyproject.toml
+names the versions that it was written for, and a test knows their text. The text of this file is in
+the key of every kernel on disk.
 """
 
 from __future__ import annotations
@@ -20,6 +22,15 @@ def _own_functions(library: codegen.JITCodeLibrary) -> list:
     """What a library itself defines, without what it links in."""
     functions = library._final_module.functions
     return [f for f in functions if not f.is_declaration and f.linkage == llvm.Linkage.external]
+
+
+left: set[str] = set()  # qualified names of functions that nobody but compiled code calls
+kept: set[str] = set()  # the same, of those that are kept on disk
+
+
+def _is_inner(library: codegen.JITCodeLibrary, names: set[str]) -> bool:
+    """Whether a library is of one of these functions, with nothing for others to call it by."""
+    return library.name in names and len(_own_functions(library)) == 1
 
 
 def is_inlined(library: codegen.JITCodeLibrary) -> bool:
@@ -52,13 +63,22 @@ def _use() -> None:
                     super().add_linking_library(one)
 
         def finalize(self) -> None:
-            self.inlined = is_inlined(self)
+            self.inlined = is_inlined(self) or _is_inner(self, left)
             if self.inlined:
                 for function in _own_functions(self):
                     function.linkage = "linkonce_odr"  # as of all that is linked into others
                 self._finalized = True
             else:
                 super().finalize()
+
+        def _finalize_specific(self) -> None:
+            if not _is_inner(self, kept):
+                super()._finalize_specific()
+
+        def serialize_using_object_code(self) -> tuple:
+            if _is_inner(self, kept):
+                return self.serialize_using_bitcode()
+            return super().serialize_using_object_code()
 
         def _get_module_for_linking(self):
             return self._final_module if self.inlined else super()._get_module_for_linking()

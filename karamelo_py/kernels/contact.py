@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import kernel, point_function
+from karamelo_py.compiler.compile import entered, point_function, subkernel
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change
 from karamelo_py.kernels.p2g import Normal
@@ -60,7 +60,7 @@ class Pair(NamedTuple):
     share_b: float
 
 
-@kernel
+@subkernel
 def _shares(contact, d, nodes, n, m):
     """Weights of the two bodies' outward sums in their common normal.
 
@@ -86,14 +86,14 @@ def _shares(contact, d, nodes, n, m):
     return share**4, (1 - share) ** 4
 
 
-@kernel
+@subkernel
 def _pair(contact, d, nodes, n, m):
     per_a, per_b = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     share_a, share_b = _shares(contact, d, nodes, n, m)
     return Pair(n, m, per_a, per_b, share_a, share_b)
 
 
-@kernel
+@subkernel
 def _yielding(contact, pair, k):
     """Change of the relative velocity with an impulse along direction k."""
     of_n = 0.0 if contact.prescribed[pair.n, k] else pair.per_a
@@ -101,14 +101,14 @@ def _yielding(contact, pair, k):
     return of_n + of_m
 
 
-@kernel
+@subkernel
 def _outward(nodes, pair, k):
     """Component k of the common normal, not normalised, from the first body to the second."""
     normal = field(nodes.fields, Normal)
     return pair.share_a * normal[pair.n, k] - pair.share_b * normal[pair.m, k]
 
 
-@kernel
+@subkernel
 def _slide(contact, nodes, pair, k, push):
     """Component of the relative velocity once the impulse `push` m grad N has been given."""
     along = push * _outward(nodes, pair, k)
@@ -116,7 +116,7 @@ def _slide(contact, nodes, pair, k, push):
     return relative - along * _yielding(contact, pair, k)
 
 
-@kernel
+@subkernel
 def _approach(d, nodes, pair):
     """How fast two bodies approach, times the length of their normal."""
     approach = 0.0
@@ -126,7 +126,7 @@ def _approach(d, nodes, pair):
     return approach
 
 
-@kernel
+@subkernel
 def _take(contact, values, a, i, n, k, impulse, per_mass):
     """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
@@ -138,7 +138,7 @@ def _take(contact, values, a, i, n, k, impulse, per_mass):
         values[slot - 1 + k] -= force
 
 
-@kernel
+@subkernel
 def _meet(contact, nodes, n):
     """Put the fields that have mass at the place of node `n` into `meeting`; their number.
 
@@ -156,13 +156,13 @@ def _meet(contact, nodes, n):
     return count
 
 
-@kernel
+@subkernel
 def _node(contact, place, i):
     """The node at a place of the `i`-th of the fields that meet there."""
     return place + contact.meeting[i] * contact.stride
 
 
-@kernel
+@subkernel
 def _clear_change(contact, d, count):
     for i in range(count):
         for k in range(d):
@@ -194,7 +194,7 @@ def _(which, contact, d, nodes, n, m, b):
     return abs(contact.touched[n, b]) == which.step
 
 
-@kernel
+@subkernel
 def _count_partners(which, contact, d, nodes, place, count):
     """Note in how many such pairs each of the fields that meet is; whether any is."""
     found = False
@@ -210,12 +210,12 @@ def _count_partners(which, contact, d, nodes, place, count):
     return found
 
 
-@kernel
+@subkernel
 def _share(contact, i, j):
     return 1.0 / max(contact.partners[i], contact.partners[j], 1)
 
 
-@kernel
+@subkernel
 def _compliance(contact, d, nodes, pair, size):
     """Change of the relative velocity along the normal, of length `size`, with an impulse."""
     compliance = 0.0
@@ -225,7 +225,7 @@ def _compliance(contact, d, nodes, pair, size):
     return compliance
 
 
-@kernel
+@subkernel
 def _rub(contact, d, nodes, pair, friction, push, size, share):
     """Impulse along the surface over the speed of sliding, and whether it stops all sliding."""
     compliance = 0.0
@@ -241,7 +241,7 @@ def _rub(contact, d, nodes, pair, friction, push, size, share):
     return min(stop, friction * push) / slip, stop <= friction * push
 
 
-@kernel
+@subkernel
 def _touch_pair(contact, d, nodes, values, i, j, place, share):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
@@ -277,7 +277,7 @@ def _touch_pair(contact, d, nodes, values, i, j, place, share):
             values[contact.pair[b, a] + k] += impulse / values[DT]
 
 
-@kernel
+@subkernel
 def _touch_place(contact, kin, nodes, values, place, count):
     """Resolve contact where `count` fields meet."""
     d = dimension(kin)
@@ -296,7 +296,7 @@ def _touch_place(contact, kin, nodes, values, place, count):
                 nodes.update[n, of_change(kin) + k] += contact.change[i, k]
 
 
-@kernel
+@entered
 def _touch_nodes(contact, kin, nodes, spans, values):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
     fields = contact.slot.size
@@ -318,7 +318,7 @@ def _touch_nodes(contact, kin, nodes, spans, values):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
 
 
-@kernel
+@subkernel
 def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
     """Take `share` of the relative velocity across the surface, or of all where the pair sticks."""
     v = nodes.velocity
@@ -342,7 +342,7 @@ def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
             contact.change[j, k] += impulse * pair.per_b
 
 
-@kernel
+@subkernel
 def _stay_place(contact, d, nodes, place, count, step):
     if not _count_partners(Touched(step), contact, d, nodes, place, count):
         return
@@ -362,7 +362,7 @@ def _stay_place(contact, d, nodes, place, count, step):
                 nodes.velocity[n, k] += contact.change[i, k]
 
 
-@kernel
+@entered
 def _stay_nodes(contact, kin, nodes, spans, step):
     """Where contact acted in `step`, keep the velocity that deforms from opening or closing it.
 

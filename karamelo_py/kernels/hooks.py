@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.compile import caller_of, kernel, point_function
+from karamelo_py.compiler.compile import caller_of, entered, point_function, subkernel
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.kernels.arrays import (
     BEFORE,
@@ -123,7 +123,7 @@ def heat_hook(function: Callable, *, publishes: bool = False) -> CompiledHook:
     return CompiledHook(function, "heated points", publishes, False, False)
 
 
-@kernel
+@subkernel
 def _evaluate(hooks, h, component, count, control, result, shift):
     """Formula of one component over the chosen members, at the present time plus `shift`.
 
@@ -148,7 +148,7 @@ def _evaluate(hooks, h, component, count, control, result, shift):
     control.values[TIME] = time
 
 
-@kernel
+@subkernel
 def _locate_nodes(kin, grids, hooks, count):
     """Positions of the chosen nodes."""
     where = hooks.scratch
@@ -168,7 +168,7 @@ def _locate_nodes(kin, grids, hooks, count):
             where[3 + axis, q] = where[axis, q]
 
 
-@kernel
+@subkernel
 def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, count, share):
     """Act on the chosen nodes; add to the published totals."""
     step_back = min(dt, control.values[TIME])  # nothing was before time 0
@@ -221,7 +221,7 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
             control.values[slot + c] += total
 
 
-@kernel
+@subkernel
 def clear_total(hooks, h, control):
     """The totals of a hook start from zero."""
     slot = hooks.table[h].slot
@@ -230,7 +230,7 @@ def clear_total(hooks, h, control):
             control.values[slot + c] = 0.0
 
 
-@kernel
+@entered
 def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
 
@@ -369,7 +369,7 @@ def _(what, kin, hooks, control, dt, h, count):
         control.values[slot] += total
 
 
-@kernel
+@subkernel
 def _apply_at_points(what, kin, ids, hooks, control, dt, h, count):
     """Act on the chosen points, where they are before the step."""
     where = hooks.scratch
@@ -381,7 +381,7 @@ def _apply_at_points(what, kin, ids, hooks, control, dt, h, count):
     act_on_points(what, kin, hooks, control, dt, h, count)
 
 
-@kernel
+@entered
 def clear_totals(stage, hooks, control):
     """Totals of point functions start from zero: they are summed over the blocks."""
     for h in range(len(hooks.table)):
@@ -389,7 +389,7 @@ def clear_totals(stage, hooks, control):
             clear_total(hooks, h, control)
 
 
-@kernel
+@entered
 def point_hooks(stage, what, kin, ids, hooks, control, dt):
     """Call the point functions of `stage` on the members in a block."""
     dt = float(dt)

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.compile import (
     by_type,
     define,
+    entered,
     kernel,
     over_blocks,
     point_function,
@@ -20,6 +21,7 @@ from karamelo_py.compiler.compile import (
     shared,
 )
 from karamelo_py.compiler.fields import load, load_vector
+from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import (
@@ -90,7 +92,7 @@ def _sweep(block, s, mode, visit, then, gathers, scatters, dt):
 _sweep_blocks = over_blocks(_sweep)
 
 
-@kernel
+@entered
 def _read_reports(tiling, control):
     clock = control.clock[0]
     rate = 0.0
@@ -140,7 +142,7 @@ def sweep(s, mode, visit, dt, gathers, scatters, moves):
     return clock.wrong == 0
 
 
-@kernel
+@entered
 def _look_at_moves(frame, kin, grids, points, tiling, control):
     clock = control.clock[0]
     now = clock.now
@@ -181,7 +183,7 @@ def step_size(s):
 ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
 
 
-@kernel
+@entered
 def choose_dt(control):
     """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end.
 
@@ -205,7 +207,7 @@ def choose_dt(control):
     control.values[DT] = dt
 
 
-@kernel
+@entered
 def finish(control):
     """End of a step: the points are where they moved to, time goes on, the next dt is chosen."""
     clock = control.clock[0]
@@ -567,6 +569,7 @@ def run_steps(scheme, visits, mode, s, hooks, count):
     one can have left the surroundings of its tile. When that is depends on the points only, never
     on where a run is interrupted.
     """
+    s, hooks = hold(s), hold(hooks)
     values = s.control.values
     clock = s.control.clock[0]
     if not begin(scheme, visits, mode, s):

@@ -17,16 +17,18 @@ from karamelo_py.compiler.compile import (
     by_type,
     choose,
     define,
+    entered,
     first_failing,
     in_all,
     index,
-    kernel,
     largest,
     point_function,
     real,
     shared,
+    subkernel,
 )
 from karamelo_py.compiler.fields import load_vector
+from karamelo_py.compiler.held import address, at_address, at_hand, hold, is_held
 from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Places
@@ -233,7 +235,7 @@ def _(width, quantities, w, stencil, loads):
         _scatter(quantities, w, stencil, loads)
 
 
-@kernel
+@subkernel
 def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     """Visit the points of the t-th occupied tile of a block in the context `s`.
 
@@ -241,11 +243,23 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     loop serves a scheme's fused and its single stages. `then` says which of the two arrays of
     places takes the new ones.
     """
+    s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
     grid = record(s.grids, tiling.grid[t])
     places = places_of(s.frame, points, s.now, then)
-    w = Work(
-        s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, s.nodes, points, block.laws, places
+    w = hold(
+        Work(
+            s.frame,
+            s.kin,
+            s.basis,
+            grid,
+            s.transfer,
+            s.averaging,
+            s.nodes,
+            points,
+            block.laws,
+            places,
+        )
     )
     width = in_lanes(visit, s, block)
     furthest = zero_of(width, dt)
@@ -279,9 +293,10 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     tiling.report[t, 2] = wrong
 
 
-@kernel
+@subkernel
 def visit_nodes(task, kin, nodes, spans, dt, t):
     """Do `task` at the nodes of the t-th span."""
+    nodes = at_hand(nodes)
     for n in range(spans[1 + t, 0], spans[1 + t, 1]):
         at_node(task, kin, nodes, index(n), dt)
 
@@ -291,6 +306,11 @@ def visit_nodes(task, kin, nodes, spans, dt, t):
 
 def _leaves(numba_type: Any, path: str, names: dict[str, Any], leaves: dict[str, str]) -> str:
     """An expression that makes a tuple of this type again from the numbers and arrays in it."""
+    if is_held(numba_type):
+        leaf, again = f"v{len(leaves)}", f"again{len(names)}"
+        names[again] = at_address(numba_type)
+        leaves[leaf] = f"address({path})"
+        return f"{again}({leaf})"
     if not isinstance(numba_type, types.BaseTuple):
         leaf = f"v{len(leaves)}"
         leaves[leaf] = path
@@ -315,7 +335,7 @@ def in_threads(function: Any, parameters: str) -> Any:
             function(*arguments, t)
 
     def written_out(mode, begin, end, *arguments):
-        names = {"function": function, "prange": prange}
+        names = {"function": function, "prange": prange, "address": address}
         threaded = mode.instance_class is Threaded
         leaves: dict[str, str] = {}
         again = [
@@ -355,7 +375,7 @@ def sweep_points(mode, visit, s, block, then, gathers, scatters, dt):
     """Sweep over the points of one block of the setup `s`."""
 
 
-@kernel
+@entered
 def _visit_all(mode, visit, s, block, then, gathers, scatters, dt):
     colour = block.tiling.colour
     for c in range(colour.size - 1):
@@ -376,7 +396,7 @@ def sweep_nodes(mode, task, kin, nodes, spans, dt):
     """Do `task` at every node in use."""
 
 
-@kernel
+@entered
 def _visit_all_spans(mode, task, kin, nodes, spans, dt):
     _visit_spans(mode, 0, spans[0, 0], task, kin, nodes, spans, dt)
 
