@@ -92,7 +92,7 @@ class Many(Group):
 
 
 class Few(Group):
-    initial_integrate = point_hook(lambda mass, v, x_old, x, value, before, dt: (v, x))
+    initial_integrate = point_hook(lambda mass, v, x_old, x, value, before, dt, kick: (v, x))
 
 
 class Undirected(Fix):
