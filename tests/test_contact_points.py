@@ -74,7 +74,7 @@ def test_no_pair_is_missed(d, overlap):
     for reach in (spacing, 0.5 * spacing):
         bound.force[:] = 0
         law, kin = MinimizePenetration(0.0), KINEMATICS[d]()
-        found = push_apart(law, kin, bound, cells, reach, 0.1, total)
+        found = push_apart(law, kin, bound, cells, reach, 0.1, 0.1, total)
         f1, f2, count = by_hand(d, x1, x2, r1, r2, reach, 0.1)
         assert found == count > 0
         assert bound.force == pytest.approx(np.concatenate([f1, f2]), rel=1e-10, abs=1e-10)

@@ -55,7 +55,7 @@ class Group(Fix):
         self.formulas = (Expression(1.0),)
 
 
-def uncompilable(mass, v, x_old, x, value, before, dt):
+def uncompilable(mass, v, x_old, x, value, before, dt, kick):
     return v * len(f"{value:.3e}"), x, 0.0
 
 
@@ -63,7 +63,7 @@ class Light(Group):
     post_grid_to_point = point_hook(uncompilable)
 
 
-def at_point(mass, v, x_old, x, value, before, dt):
+def at_point(mass, v, x_old, x, value, before, dt, kick):
     return v, x, 1.0
 
 
@@ -87,12 +87,16 @@ class Hot(Group):
     initial_integrate = heat_hook(at_point)
 
 
+def too_few(mass, v, v_star, force, value, before, dt):
+    return v, v_star, force, 0.0
+
+
 class Many(Group):
-    post_particles_to_grid = node_hook(at_point)
+    post_particles_to_grid = node_hook(too_few)
 
 
 class Few(Group):
-    initial_integrate = point_hook(lambda mass, v, x_old, x, value, before, dt: (v, x))
+    initial_integrate = point_hook(lambda mass, v, x_old, x, value, before, dt, kick: (v, x))
 
 
 class Undirected(Fix):
@@ -394,7 +398,7 @@ def test_init(hub):
         ("swapped", "final_integrate is a moment of points, and its hook was made for nodes"),
         ("cold", "supply_heat is a moment of heated points, and its hook was made for points"),
         ("hot", "initial_integrate is a moment of points, and its hook was made for heated"),
-        ("many", "post_particles_to_grid: at_point has to take the 8 arguments of a hook on nodes"),
+        ("many", "post_particles_to_grid: too_few has to take the 8 arguments of a hook on nodes"),
         ("few", "initial_integrate: <lambda> has to return 3 numbers, not (1.0, 1.0)"),
         ("undirected", "it has no formulas, so post_particles_to_grid would act in no direction"),
         ("viewless", "initial_integrate has to take one argument, the view of the group"),

@@ -176,6 +176,8 @@ CLOCK = np.dtype(
         ("fixed_dt", np.float64),  # step of set_dt, or 0
         ("dt_factor", np.float64),
         ("end_time", np.float64),
+        ("last_dt", np.float64),  # of the last step; of the present one before there was any
+        ("kick", np.float64),  # how long the forces act: between the middles of the two steps
         ("rate", np.float64),  # of the fastest point, c + max |v_i|
         ("new_rate", np.float64),  # of the last sweep
         ("move", np.float64),  # of the point that went furthest in this step, in cells

@@ -21,7 +21,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import entered, point_function, subkernel
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change
+from karamelo_py.kernels.arrays import MASS, TIMESTEP, of_change
 from karamelo_py.kernels.p2g import Normal
 from karamelo_py.kernels.step import touch, touch_velocity
 from karamelo_py.points.kinematics import dimension
@@ -127,12 +127,13 @@ def _approach(d, nodes, pair):
 
 
 @subkernel
-def _take(contact, values, a, i, n, k, impulse, per_mass):
+def _take(contact, control, a, i, n, k, impulse, per_mass):
     """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
     if not slot:
         contact.change[i, k] += impulse * per_mass
-    force = impulse / values[DT]
+    force = impulse / control.clock[0].kick
+    values = control.values
     values[contact.slot[a] + k] += force
     if slot:
         values[slot - 1 + k] -= force
@@ -242,7 +243,7 @@ def _rub(contact, d, nodes, pair, friction, push, size, share):
 
 
 @subkernel
-def _touch_pair(contact, d, nodes, values, i, j, place, share):
+def _touch_pair(contact, d, nodes, control, i, j, place, share):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
     pair = _pair(contact, d, nodes, _node(contact, place, i), _node(contact, place, j))
@@ -263,22 +264,23 @@ def _touch_pair(contact, d, nodes, values, i, j, place, share):
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
         rub, sticks = _rub(contact, d, nodes, pair, contact.friction[a, b], push, size, share)
+    values, kick = control.values, control.clock[0].kick
     step = int(values[TIMESTEP]) + 1
     contact.touched[pair.n, b] = -step if sticks else step
     for k in range(d):
         impulse = push * _outward(nodes, pair, k) / size
         if rub > 0:
             impulse += rub * _slide(contact, nodes, pair, k, push / size)
-        _take(contact, values, a, i, pair.n, k, -impulse, pair.per_a)
-        _take(contact, values, b, j, pair.m, k, impulse, pair.per_b)
+        _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a)
+        _take(contact, control, b, j, pair.m, k, impulse, pair.per_b)
         if contact.pair[a, b] >= 0:
-            values[contact.pair[a, b] + k] -= impulse / values[DT]
+            values[contact.pair[a, b] + k] -= impulse / kick
         if contact.pair[b, a] >= 0:
-            values[contact.pair[b, a] + k] += impulse / values[DT]
+            values[contact.pair[b, a] + k] += impulse / kick
 
 
 @subkernel
-def _touch_place(contact, kin, nodes, values, place, count):
+def _touch_place(contact, kin, nodes, control, place, count):
     """Resolve contact where `count` fields meet."""
     d = dimension(kin)
     contact.partners[:count] = 1  # whether a single pair approaches, it looks itself
@@ -288,7 +290,7 @@ def _touch_place(contact, kin, nodes, values, place, count):
         _clear_change(contact, d, count)
         for i in range(count):
             for j in range(i + 1, count):
-                _touch_pair(contact, d, nodes, values, i, j, place, _share(contact, i, j))
+                _touch_pair(contact, d, nodes, control, i, j, place, _share(contact, i, j))
         for i in range(count):
             n = _node(contact, place, i)
             for k in range(d):
@@ -297,9 +299,10 @@ def _touch_place(contact, kin, nodes, values, place, count):
 
 
 @entered
-def _touch_nodes(contact, kin, nodes, spans, values):
+def _touch_nodes(contact, kin, nodes, spans, control):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
     fields = contact.slot.size
+    values = control.values
     for a in range(fields):
         for k in range(3):
             values[contact.slot[a] + k] = 0.0
@@ -312,7 +315,7 @@ def _touch_nodes(contact, kin, nodes, spans, values):
                 continue
             count = _meet(contact, nodes, n)
             if count > 1:
-                _touch_place(contact, kin, nodes, values, n % contact.stride, count)
+                _touch_place(contact, kin, nodes, control, n % contact.stride, count)
     for c in range(len(contact.copies)):
         for k in range(3):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
@@ -384,7 +387,7 @@ def _stay_nodes(contact, kin, nodes, spans, step):
 
 @touch.on(SeparateFields)
 def _(contact, s):
-    _touch_nodes(contact, s.kin, s.nodes, s.spans, s.control.values)
+    _touch_nodes(contact, s.kin, s.nodes, s.spans, s.control)
 
 
 @touch_velocity.on(SeparateFields)

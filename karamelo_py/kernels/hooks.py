@@ -8,7 +8,9 @@ Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star
     `value` and `before` are the formula at the time of the step and one step earlier, `share` is
     one over the number of members with mass; the totals are summed and published, with what
     a change of v before the update adds to the momentum of points over dt.
-Point function ``(mass, v, x_old, x, value, before, dt) -> (v, x, total)``
+    `dt` is the time that forces act for in the step, half of the last step and half of this one.
+Point function ``(mass, v, x_old, x, value, before, dt, kick) -> (v, x, total)``
+    `dt` is the time that the point moves for, `kick` the time that forces act for.
 Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``
     acts on points where heat flows: `value` and `other` are the first and the second formula,
     `face` is the area that the point shows, `supply` the heat it gets per time, `share` how much it
@@ -51,10 +53,14 @@ from karamelo_py.points.kinematics import dimension
 
 _F8 = types.float64
 NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)
-POINT_FUNCTION = types.UniTuple(_F8, 3)(*[_F8] * 7)
+POINT_FUNCTION = types.UniTuple(_F8, 3)(*[_F8] * 8)
+HEAT_FUNCTION = types.UniTuple(_F8, 3)(*[_F8] * 7)
+
+FUNCTIONS = {"nodes": NODE_FUNCTION, "points": POINT_FUNCTION, "heated points": HEAT_FUNCTION}
 
 _call_node_function = caller_of(NODE_FUNCTION)
 _call_point_function = caller_of(POINT_FUNCTION)
+_call_heat_function = caller_of(HEAT_FUNCTION)
 
 
 NODE_STAGES = {
@@ -93,7 +99,7 @@ class CompiledHook(NamedTuple):
     @property
     def signature(self) -> types.Type:
         """What its function takes and returns."""
-        return NODE_FUNCTION if self.on_nodes else POINT_FUNCTION
+        return FUNCTIONS[self.where]
 
 
 # What a compiled hook acts on at each moment.
@@ -171,7 +177,7 @@ def _locate_nodes(kin, grids, hooks, count):
 @subkernel
 def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, count, share):
     """Act on the chosen nodes; add to the published totals."""
-    step_back = min(dt, control.values[TIME])  # nothing was before time 0
+    step_back = min(control.clock[0].last_dt, control.values[TIME])  # nothing was before time 0
     _locate_nodes(kin, grids, hooks, count)
     d = dimension(kin)
     for c in range(d):
@@ -309,7 +315,7 @@ def act_on_points(what, kin, hooks, control, dt, h, count):
 @act_on_points.on(Motion)
 def _(what, kin, hooks, control, dt, h, count):
     v, y = what.v, what.y
-    step_back = min(dt, control.values[TIME])
+    step_back = min(control.clock[0].last_dt, control.values[TIME])
     d = dimension(kin)
     for c in range(d):
         if hooks.programs[h, c].begin < 0:
@@ -329,6 +335,7 @@ def _(what, kin, hooks, control, dt, h, count):
                 hooks.scratch[VALUE, q],
                 hooks.scratch[BEFORE, q],
                 dt,
+                control.clock[0].kick,
             )
             v[c, p] = velocity
             # As far as a point moves, its corners do.
@@ -350,7 +357,7 @@ def _(what, kin, hooks, control, dt, h, count):
     for q in range(count):
         p = hooks.chosen[q]
         before = what.supply[0, p]
-        share, supply, T = _call_point_function(
+        share, supply, T = _call_heat_function(
             hooks.table[h].address,
             what.capacity[0, p],
             what.temperature[0, p],

@@ -159,7 +159,7 @@ def _find_cells(d, bodies, cells, width):
 
 
 @kernel
-def _touch(law, kin, bodies, reach, dt, i, j, total):
+def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     """The force between two points, if they touch; whether they do."""
     x, f = bodies.x, bodies.force
     dx = subtract(vector_at(kin, x, j), vector_at(kin, x, i))
@@ -174,7 +174,7 @@ def _touch(law, kin, bodies, reach, dt, i, j, total):
     dv = subtract(vector_at(kin, bodies.v, j), vector_at(kin, bodies.v, i))
     force = force_between(
         law, kin, dx, sqrt(squared), bodies.radius[i], bodies.radius[j],
-        bodies.mass[i], bodies.mass[j], dv, dt,
+        bodies.mass[i], bodies.mass[j], dv, dt, kick,
     )  # fmt: skip
     for k in range(dimension(kin)):
         f[i, k] += force[k]
@@ -184,7 +184,7 @@ def _touch(law, kin, bodies, reach, dt, i, j, total):
 
 
 @kernel
-def push_apart(law, kin, bodies, cells, reach, dt, total):
+def push_apart(law, kin, bodies, cells, reach, dt, kick, total):
     """Add the forces of all pairs that touch; returns their number.
 
     Two points touch when they are closer than the sum of their radii, and closer than `reach` in
@@ -210,5 +210,5 @@ def push_apart(law, kin, bodies, cells, reach, dt, total):
                 last = (a * ny + b) * nz + min(cz + 1, nz - 1)
                 begin = cells.start[first - 1] if first > 0 else 0
                 for q in range(begin, cells.start[last]):
-                    touching += _touch(law, kin, bodies, reach, dt, i, cells.order[q], total)
+                    touching += _touch(law, kin, bodies, reach, dt, kick, i, cells.order[q], total)
     return touching

@@ -176,8 +176,24 @@ def check_moves(s):
 
 @shared
 def step_size(s):
-    """dt of the present step, in the precision of the run."""
+    """dt of the present step, in the precision of the run: how long points move."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
+
+
+@shared
+def last_step_size(s):
+    """dt of the step before, which the velocity at the start of this one belongs to."""
+    return real(s.control.clock[0].last_dt, s.nodes.sums[0, MASS])
+
+
+@shared
+def kick(s):
+    """How long forces act in this step.
+
+    Places belong to the ends of steps, velocities to their middles: forces lead from the middle of
+    one step to that of the next.
+    """
+    return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
 
 
 ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
@@ -205,6 +221,9 @@ def choose_dt(control):
     elif 0 < remaining < 2 * dt * (1 - ROUNDING):
         dt = 0.5 * remaining
     control.values[DT] = dt
+    if control.values[TIMESTEP] == 0:
+        clock.last_dt = dt
+    clock.kick = 0.5 * (clock.last_dt + dt)
 
 
 @entered
@@ -213,6 +232,7 @@ def finish(control):
     clock = control.clock[0]
     clock.now = 1 - clock.now
     dt = control.values[DT]
+    clock.last_dt = dt
     time = control.values[TIME] + dt
     # Exactly the end, when this step was shortened to reach it.
     control.values[TIME] = clock.end_time if clock.end_time - control.values[TIME] == dt else time
@@ -237,9 +257,8 @@ def _(hooks, stage, target, s):
 
 @at_nodes.on(Hooks)
 def _(hooks, stage, target, s):
-    dt = step_size(s)
     kept = s.control.clock[0].kept
-    node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, dt, kept)
+    node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), kept)
 
 
 @shared
@@ -434,6 +453,8 @@ class _Spelled:
         at_points,
         average_volumes,
         check_moves,
+        kick,
+        last_step_size,
         real,
         step_size,
         sweep,
@@ -477,7 +498,7 @@ class _Spelled:
         elif isinstance(row, table.Nodes):
             made = callable(row.task)
             task = f"{self.name(row.task, 'make')}(s)" if made else self.tag(row.task)
-            add(f"sweep_nodes(mode, {task}, s.kin, s.nodes, s.spans, dt)")
+            add(f"sweep_nodes(mode, {task}, s.kin, s.nodes, s.spans, kick(s))")
         else:
             self.sweep(row)
 
@@ -488,7 +509,8 @@ class _Spelled:
             if row.only_if_more:
                 add("if more:")
             self.clear(row.clears, "    " if row.only_if_more else "")
-        length = "dt" if row.share == 1 else f"real({row.share}, dt) * dt"
+        whole = "last_step_size(s)" if row.of_last_step else "dt"
+        length = whole if row.share == 1 else f"real({row.share}, dt) * {whole}"
         if row.gathers and any(isinstance(tag, STRAINS) for tag in row.visit.tasks):
             add(f"average_volumes(s.averaging, s, mode, {length})")
         scatters = "more" if row.only_if_more else str(row.scatters)

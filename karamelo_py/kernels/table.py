@@ -34,10 +34,11 @@ class AtNodes(NamedTuple):
 
 
 class Gather(NamedTuple):
-    """Grid to points: a task, with the share of dt that it takes."""
+    """Grid to points: a task, with the share of dt that it takes, of this step or of the last."""
 
     task: NamedTuple
     share: float = 1.0
+    of_last_step: bool = False  # the velocity before the update belongs to the last step
 
 
 class Scatter(NamedTuple):
@@ -72,6 +73,7 @@ class Sweep(NamedTuple):
 
     visit: Visit
     share: float = 1.0
+    of_last_step: bool = False
     gathers: bool = True
     scatters: bool = True
     clears: NamedTuple | None = None
@@ -102,15 +104,15 @@ def fused(rows: Iterable[Any]) -> list[Any]:
     def sweep(scatter: Scatter | None, more: bool = False) -> Sweep:
         found = scatter or Scatter((), OldWeights())
         visit = Visit(_tasks(waiting), found.quantities, found.weights)
-        share = waiting[0].share if waiting else 1.0
+        share, of_last_step = waiting[0][1:] if waiting else (1.0, False)
         # The new places are read by a scatter of the next step, whoever made them.
         moves = bool(waiting) or more
         scatters = scatter is not None
-        return Sweep(visit, share, bool(waiting), scatters, found.clears, moves, more)
+        return Sweep(visit, share, of_last_step, bool(waiting), scatters, found.clears, moves, more)
 
     for row in kept:
         if isinstance(row, Gather):
-            if waiting and waiting[0].share != row.share:
+            if waiting and waiting[0][1:] != row[1:]:
                 out.append(sweep(None))
                 waiting = []
             waiting.append(row)
@@ -147,10 +149,10 @@ def staged(rows: Iterable[Any]) -> list[Any]:
     out: list[Any] = []
     for row in rows:
         if isinstance(row, Gather):
-            out.append(Sweep(loop_of((row.task,), None), row.share, True, False))
+            out.append(Sweep(loop_of((row.task,), None), *row[1:], True, False))
         elif isinstance(row, Scatter):
             visit = loop_of((), row)
-            out.append(Sweep(visit, 1.0, False, True, row.clears, moves=False))
+            out.append(Sweep(visit, gathers=False, clears=row.clears, moves=False))
         else:
             out.append(row)
     return out

@@ -49,12 +49,12 @@ def _(kin, volume, x):
 
 
 @point_function()
-def force_between(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt):
+def force_between(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
     """Force on point 1 from point 2, at dx = x2 - x1 with |dx| = r below the sum of the radii."""
 
 
 @force_between.on(Hertz)
-def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt):
+def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
     p = radius1 + radius2 - r
     round_ = radius1 * radius2 / (radius1 + radius2)
     stiffness = 4.0 / 3.0 if dimension(kin) == 3 else pi / 4.0
@@ -62,10 +62,10 @@ def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt):
 
 
 @force_between.on(MinimizePenetration)
-def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt):
+def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
     reduced = mass1 * mass2 / (mass1 + mass2)
     p = radius1 + radius2 - r
-    push = reduced * p / (dt * dt)
+    push = reduced * p / (dt * kick)
     force = scale(-push / r, dx)
     if law.friction > 0:
         along = 0.0
@@ -78,6 +78,6 @@ def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt):
         slip = sqrt(slip)
         if slip > 0:
             # Friction stops the slip of two free points at most: it does not turn it around.
-            rub = min(law.friction * push, reduced * slip / dt)
+            rub = min(law.friction * push, reduced * slip / kick)
             force = add_scaled(force, rub / slip, slide)
     return force

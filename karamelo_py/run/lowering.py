@@ -63,6 +63,7 @@ class State(NamedTuple):
     laws: dict[tuple, np.ndarray]  # state for each kind of law
     fields: dict[type, np.ndarray]  # declared fields that are kept
     contact: NamedTuple  # how solids touch, with what it remembers
+    last_dt: float  # the step that the velocities belong to the middle of
 
 
 def check_scene(hub: Hub) -> None:
@@ -177,6 +178,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         method.resume(contact, previous.contact)
     control = Control(hub.values.array, new_clock())
     clock = control.clock[0]
+    clock.last_dt = previous.last_dt if previous else 0.0
     clock.spacing = min(lattice.h for lattice in lattices)
     clock.heat_limit = clock.heat_reference = stable_conduction(hub)
     clock.kept = getattr(transfer, "alpha", 0)

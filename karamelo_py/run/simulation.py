@@ -251,6 +251,7 @@ class Simulation:
             laws,
             {kind: self.declared(kind).T for kind in kept},
             self.setup.contact,
+            float(self.setup.control.clock[0].last_dt),
         )
 
     def set_stress(self, ids: np.ndarray, given: dict[str, np.ndarray]) -> None:

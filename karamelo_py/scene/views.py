@@ -109,7 +109,7 @@ class NodesView(_View):
         Node numbers.
     """
 
-    _fields = ("dt", "time", "index")
+    _fields = ("dt", "kick", "time", "index")
 
     def __init__(self, s: Any, group: Any, stage: int, before_update: bool):
         super().__init__()
@@ -120,6 +120,7 @@ class NodesView(_View):
         self._d = s.kin.dimension
         self._kin = s.kin
         self.dt = float(s.control.values[DT])
+        self.kick = float(s.control.clock[0].kick)
         self.time = float(s.control.values[TIME])
         if group.all:
             spans = s.spans[1 : 1 + s.spans[0, 0]]
@@ -207,7 +208,7 @@ class NodesView(_View):
 class PointsView(_View):
     """The points of a group, at one stage of a step, in the order of their ids."""
 
-    _fields = ("dt", "time", "ids", "moved")
+    _fields = ("dt", "kick", "time", "ids", "moved")
 
     def __init__(self, simulation: Any, group: Any, then: bool):
         super().__init__()
@@ -215,6 +216,7 @@ class PointsView(_View):
         self._then = then
         control = simulation.setup.control
         self.dt = float(control.values[DT])
+        self.kick = float(control.clock[0].kick)
         self.time = float(control.values[TIME])
         self.ids = simulation.members(group)
         self.moved = False

@@ -44,7 +44,7 @@ class USAVG(NamedTuple):
         Nodes(SumsToVelocity()),
         AtNodes(POST_UPDATE_GRID_STATE, ON_VELOCITY),
         CONTACT_BEFORE,
-        Gather(Strain(), 0.5),
+        Gather(Strain(), 0.5, of_last_step=True),
         FORCE,
         *ACCELERATE,
         SERIES,

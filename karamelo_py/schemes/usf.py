@@ -40,7 +40,7 @@ class USF(NamedTuple):
         Nodes(SumsToVelocity()),
         AtNodes(POST_UPDATE_GRID_STATE, ON_VELOCITY),
         CONTACT_BEFORE,
-        Gather(Strain()),
+        Gather(Strain(), of_last_step=True),
         FORCE,
         *ACCELERATE,
         SERIES,

@@ -15,9 +15,9 @@ def force_of_nodes(mass, v, v_star, force, value, before, dt, share):
     return v, v_star, force, force
 
 
-def momentum_rate(mass, v, x_old, x, value, before, dt):
-    """The total is the momentum over the time step."""
-    return v, x, mass * v / dt
+def momentum_rate(mass, v, x_old, x, value, before, dt, kick):
+    """The total is the momentum over the time that forces act for."""
+    return v, x, mass * v / kick
 
 
 class Measuring(Fix):

@@ -83,11 +83,11 @@ class PairContact(Fix):
         for block in s.blocks:
             x = block.points.x[now]
             collect(s.kin, x, block.points, block.laws, *self._ranges, self._bodies)
-        if self._push(s.kin, points.dt):
+        if self._push(s.kin, points.dt, points.kick):
             for block in s.blocks:
                 distribute(s.kin, block.points, *self._ranges, self._bodies)
         self.publish_components(self._total)
 
-    def _push(self, kin: Any, dt: float) -> int:
+    def _push(self, kin: Any, dt: float, kick: float) -> int:
         bodies, cells = self._bodies, self._cells
-        return push_apart(self.law(), kin, bodies, cells, self._reach, dt, self._total)
+        return push_apart(self.law(), kin, bodies, cells, self._reach, dt, kick, self._total)

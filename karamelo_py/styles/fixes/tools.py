@@ -30,6 +30,7 @@ class Bodies(NamedTuple):
     face: np.ndarray  # (n,) area of one face; per radian around an axis
     stiffness: np.ndarray  # (n,) shear modulus, less what damage has taken of it
     dt: float
+    kick: float  # how long forces act in the step
 
 
 class PointForceFix(Fix):
@@ -91,6 +92,7 @@ class PointForceFix(Fix):
             face=side ** (d - 1) * radius,
             stiffness=stiffness,
             dt=points.dt,
+            kick=points.kick,
         )
 
     def _column(self, name: str, ids: np.ndarray) -> np.ndarray:
@@ -138,7 +140,7 @@ def apart(bodies: Bodies, penetration: np.ndarray, normal: np.ndarray) -> np.nda
 
     m p / dt^2, for a point that nothing else holds (de Vaucorbeil & Nguyen 2021).
     """
-    push = bodies.mass * np.maximum(penetration, 0) / bodies.dt**2
+    push = bodies.mass * np.maximum(penetration, 0) / (bodies.dt * bodies.kick)
     return push[:, None] * normal
 
 
@@ -152,7 +154,7 @@ def rubbed(
     slip = velocity - bodies.v
     slip = slip - (slip * normal).sum(axis=1, keepdims=True) * normal
     speed = np.linalg.norm(slip, axis=1)
-    rub = np.minimum(mu * np.linalg.norm(push, axis=1), bodies.mass * speed / bodies.dt)
+    rub = np.minimum(mu * np.linalg.norm(push, axis=1), bodies.mass * speed / bodies.kick)
     return slip * np.divide(rub, speed, out=np.zeros_like(speed), where=speed > 0)[:, None]
 
 

@@ -9,14 +9,14 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction
 
 
-def start(mass, v, x_old, x, value, before, dt):
+def start(mass, v, x_old, x, value, before, dt, kick):
     """The step starts from the value one step earlier."""
     return before, x, 0.0
 
 
-def carry(mass, v, x_old, x, value, before, dt):
+def carry(mass, v, x_old, x, value, before, dt, kick):
     """The point moves with the value; the total is the force that makes it do so."""
-    return value, x_old + dt * value, mass * (value - v) / dt
+    return value, x_old + dt * value, mass * (value - v) / kick
 
 
 class VelocityParticles(Fix):
