@@ -12,7 +12,7 @@ by numerical differentiation, and holds the rest against independent numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan, cos, pi, sin, sqrt, tan
+from math import atan, cos, exp, pi, sin, sqrt, tan
 from pathlib import Path
 
 import numpy as np
@@ -266,9 +266,14 @@ def contact_time(distance: float, radii: float, speed: float) -> float:
     return (distance - radii) / speed
 
 
-def prandtl_load(cohesion: float) -> float:
-    """Limit pressure of a strip footing on weightless clay: (2 + pi) c (Prandtl 1920)."""
-    return (2 + pi) * cohesion
+def prandtl_load(cohesion: float, phi: float = 0.0) -> float:
+    """Limit pressure of a strip footing on weightless soil with an angle of friction in radians.
+
+    (e^(pi tan(phi)) tan^2(pi/4 + phi/2) - 1) c / tan(phi), of clay (2 + pi) c (Prandtl 1920).
+    """
+    if phi == 0:
+        return (2 + pi) * cohesion
+    return (exp(pi * tan(phi)) * tan(pi / 4 + phi / 2) ** 2 - 1) * cohesion / tan(phi)
 
 
 # --- Curves ------------------------------------------------------------------------------------

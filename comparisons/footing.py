@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import radians
+
 from comparisons.exact import prandtl_load
 from comparisons.row import Row
 
@@ -13,12 +15,15 @@ def compare(run, axes, full):
     limit = prandtl_load(1)
     cases = {"volumes averaged": ({}, limit, 0.05)}
     if full:
+        words = {"phi": 20, "v": 0.16}
+        cases["friction and dilatancy of 20 degrees"] = words, prandtl_load(1, radians(20)), 0.08
         cases["volumes not averaged"] = {"bar": "false"}, (1.15 * limit, 2 * limit), 0.0
     for name, (words, load, within) in cases.items():
         log = run(**words).log
         late = (log.Time > 0.7) & (log.Time < 0.99)
-        source = "locks" if words else "Prandtl 1920 (exact)"
+        source = "locks" if "bar" in words else "Prandtl 1920 (exact)"
         yield Row(f"load / c, {name}", load, log.load[late].mean(), within, source)
         axes.plot(log.Time, log.load, lw=1, label=name)
-    axes.axhline(limit, color="k", lw=1, ls="--", label="2 + pi")
+        if "bar" not in words:
+            axes.axhline(load, color="k", lw=1, ls="--")
     axes.set(xlabel="time (s)", ylabel="load / c")

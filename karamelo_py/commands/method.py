@@ -132,7 +132,8 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
 
     Nearly incompressible and plastic bodies are too stiff where each point keeps its own volume:
     low-order functions cannot follow. Averaging the increment of volume with the weights of the
-    basis takes the excess of constraints away (Coombs et al. 2018).
+    basis takes the excess of constraints away (Coombs et al. 2018). The mean stress is averaged
+    alike: the forces do the work of the averaged strain.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    One more visit of the points for each update of the stress.
+    One more visit of the points for each update of the stress, and one for the forces.
 
     See Also
     --------

@@ -120,6 +120,15 @@ class TrialStrain(NamedTuple):
     writes = ("volume ratio",)
 
 
+class AverageStress(NamedTuple):
+    """Gather the averaged mean stress of F-bar."""
+
+    in_lanes = True
+    says = "averaged mean stress"
+    reads = ("x",)
+    writes = ("averaged stress",)
+
+
 class SeriesTerm(NamedTuple):
     """Gather the present term of the series of XPIC."""
 
@@ -158,6 +167,24 @@ class NodalMean(NamedTuple):
         return 2
 
 
+class AveragedStress(NamedTuple):
+    """Mean stress of a point and its surroundings."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+
+
+class NodalStress(NamedTuple):
+    """Sum of weight, volume and mean stress, and of weight and volume; then the mean."""
+
+    array: Any
+
+    kept = False
+    shape = NodalMean.shape
+
+
 class PointByPoint(NamedTuple):
     """Every point has its own change of volume."""
 
@@ -165,11 +192,16 @@ class PointByPoint(NamedTuple):
 
 
 class FBar(NamedTuple):
-    """Changes of volume are averaged over the surroundings, against volumetric locking."""
+    """Changes of volume are averaged over the surroundings, against volumetric locking.
+
+    With d_p the rate of volume of a point and V_p its volume, the average is
+    sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted with volumes it is its own adjoint: the
+    mean stress averaged alike makes the forces whose power is that of the averaged strain.
+    """
 
     in_lanes = True
-    point_fields = (VolumeRatio,)
-    node_fields = (NodalMean,)
+    point_fields = (VolumeRatio, AveragedStress)
+    node_fields = (NodalMean, NodalStress)
 
 
 @point_function()
@@ -255,6 +287,11 @@ def _(task, w, x):
 @empty.on(TrialStrain)
 def _(task, w, x):
     return zero_tensor(w.kin, x[0])
+
+
+@empty.on(AverageStress)
+def _(task, w, x):
+    return real(0, x[0])
 
 
 @empty.on(SeriesTerm)
@@ -358,6 +395,12 @@ def _(task, w, stencil, k, total):
     return _gradient(w, stencil, k, total)
 
 
+@gathered.on(AverageStress)
+def _(task, w, stencil, k, total):
+    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    return fma(weight, field(w.nodes.fields, NodalStress)[i, 0], total)
+
+
 @gathered.on(SeriesTerm)
 def _(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
@@ -415,6 +458,12 @@ def _(task, w, stencil, p, dt, total, totals, fastest):
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     dl = spatial_increment(w.frame, w.kin, scale(dt, total), f)
     field(w.points.fields, VolumeRatio)[0, p] = volume_ratio(w.kin, dl)
+    return real(0, dt), fastest
+
+
+@settled.on(AverageStress)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    field(w.points.fields, AveragedStress)[0, p] = total
     return real(0, dt), fastest
 
 

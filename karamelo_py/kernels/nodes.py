@@ -10,7 +10,7 @@ from karamelo_py.compiler.compile import by_type, point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_optional
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
-from karamelo_py.kernels.g2p import NodalMean
+from karamelo_py.kernels.g2p import NodalMean, NodalStress
 from karamelo_py.kernels.p2g import Normal, SeenMass
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
@@ -38,6 +38,12 @@ class TakeMean(NamedTuple):
     """The weighted mean from its two sums, at the nodes."""
 
     goes_through = ("nodal mean", "nodal mean")
+
+
+class TakeMeanStress(NamedTuple):
+    """The same of the mean stress."""
+
+    goes_through = ("nodal stress", "nodal stress")
 
 
 class StartSeries(NamedTuple):
@@ -109,6 +115,7 @@ def _(task, kin, nodes, n, dt):
         nodes.sums[n, k] = 0
     clear_optional(field(nodes.fields, Normal), n)
     clear_optional(field(nodes.fields, SeenMass), n)
+    clear_optional(field(nodes.fields, NodalStress), n)
 
 
 @at_node.on(ClearVelocity)
@@ -176,9 +183,18 @@ def _(task, kin, nodes, n, dt):
 
 @at_node.on(TakeMean)
 def _(task, kin, nodes, n, dt):
-    mean = field(nodes.fields, NodalMean)
-    if mean[n, 1] > 0:
-        mean[n, 0] /= mean[n, 1]
+    _take_mean(field(nodes.fields, NodalMean), n)
+
+
+@at_node.on(TakeMeanStress)
+def _(task, kin, nodes, n, dt):
+    _take_mean(field(nodes.fields, NodalStress), n)
+
+
+@shared
+def _take_mean(sums, n):
+    if sums[n, 1] > 0:
+        sums[n, 0] /= sums[n, 1]
 
 
 @at_node.on(StartSeries)

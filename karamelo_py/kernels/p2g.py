@@ -22,10 +22,19 @@ from karamelo_py.compiler.tuples import (
     subtract,
 )
 from karamelo_py.kernels.arrays import MASS, of_force
-from karamelo_py.kernels.g2p import NodalMean, VolumeRatio, zero_vector
+from karamelo_py.kernels.g2p import (
+    AveragedStress,
+    FBar,
+    NodalMean,
+    NodalStress,
+    PointByPoint,
+    VolumeRatio,
+    zero_vector,
+)
 from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, Updated, add_force, force_stress
+from karamelo_py.points.kinematics import add_pressure, stretching_mean, zero_symmetric
 from karamelo_py.points.laws import jacobian, kirchhoff_stress, specific_volume
 from karamelo_py.points.transfers import Moment, add_momentum, gradient_weight, zero_moment
 from karamelo_py.points.transfers.xpic import Series, TermOfSeries
@@ -61,6 +70,14 @@ class Volumes(NamedTuple):
     in_lanes = True
     says = "volumes to grid"
     reads = ("mass", "state", "material", "volume ratio")
+
+
+class AveragedForce(NamedTuple):
+    """Scatter the internal force of the averaged mean stress less that of a point's own (F-bar)."""
+
+    in_lanes = True
+    says = "internal force of the averaged mean stress"
+    reads = ("mass", "state", "material", "deformation gradient", "averaged stress")
 
 
 class SeriesBack(NamedTuple):
@@ -148,6 +165,42 @@ def _(quantity, w, stencil, k, load):
     accumulate_optional(field(w.nodes.fields, SeenMass), i, (weight * mass * mass,))
 
 
+@point_function()
+def mean_stress(averaging, kin, law, state, volume):
+    """Volume times mean stress, and volume, of a point of reference `volume`; () without F-bar."""
+
+
+@mean_stress.on(PointByPoint)
+def _(averaging, kin, law, state, volume):
+    return ()
+
+
+@mean_stress.on(FBar)
+def _(averaging, kin, law, state, volume):
+    tau = stretching_mean(kin, kirchhoff_stress(law, kin, state))
+    return volume * tau, volume * jacobian(law, kin, state)
+
+
+@load_of.on(AveragedForce)
+def _(quantity, w, p, like):
+    law = law_of(w, p)
+    state = state_of(w, law, p, like)
+    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    volume = _mass(w, p) * specific_volume(law)
+    own, present = mean_stress(w.averaging, w.kin, law, state, volume)
+    change = present * field(w.points.fields, AveragedStress)[0, p] - own
+    none = zero_symmetric(w.kin, change)
+    return force_stress(w.frame, w.kin, add_pressure(w.kin, change, none, -change), f)
+
+
+@scattered.on(AveragedForce)
+def _(quantity, w, stencil, k, load):
+    i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
+    g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
+    part = add_force(w.frame, w.kin, zero_vector(w.kin, weight), load, g)
+    accumulate(w.nodes.sums, i, of_force(w.kin), part)
+
+
 @load_of.on(InternalForce)
 def _(quantity, w, p, like):
     law = law_of(w, p)
@@ -157,17 +210,19 @@ def _(quantity, w, p, like):
     # Minus volume times stress, with the sign of the internal force.
     stress = scale(-volume, force_stress(w.frame, w.kin, kirchhoff_stress(law, w.kin, state), f))
     force = load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
-    return stress, scale(of_present(p, real(1, volume)), force)
+    mean = mean_stress(w.averaging, w.kin, law, state, volume)
+    return stress, scale(of_present(p, real(1, volume)), force), mean
 
 
 @scattered.on(InternalForce)
 def _(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
-    stress, outer = load
+    stress, outer, mean = load
     none = zero_vector(w.kin, weight)
     part = add_force(w.frame, w.kin, add_optional(none, weight, outer), stress, g)
     accumulate(w.nodes.sums, i, of_force(w.kin), part)
+    accumulate_optional(field(w.nodes.fields, NodalStress), i, scale(weight, mean))
 
 
 @point_function()

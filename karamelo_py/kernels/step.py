@@ -41,7 +41,7 @@ from karamelo_py.kernels.arrays import (
     of_force,
     of_momentum,
 )
-from karamelo_py.kernels.g2p import STRAINS, FBar, Move, SeriesTerm, TrialStrain
+from karamelo_py.kernels.g2p import STRAINS, AverageStress, FBar, Move, SeriesTerm, TrialStrain
 from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks
 from karamelo_py.kernels.nodes import (
     ClearMean,
@@ -52,10 +52,12 @@ from karamelo_py.kernels.nodes import (
     StartSeries,
     SumsToVelocity,
     TakeMean,
+    TakeMeanStress,
     Update,
     UpdateToVelocity,
 )
 from karamelo_py.kernels.p2g import (
+    AveragedForce,
     InternalForce,
     MassMomentum,
     MomentumAgain,
@@ -412,6 +414,23 @@ def _(averaging, s, mode, dt):
     sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.spans, dt)
 
 
+@point_function()
+def average_stress(averaging, s, mode):
+    """Put the averaged mean stress in the place of the points' own; by default each has its own."""
+
+
+@average_stress.otherwise
+def _(averaging, s, mode):
+    return None
+
+
+@average_stress.on(FBar)
+def _(averaging, s, mode):
+    dt = step_size(s)
+    sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.spans, dt)
+    visit_here(s, mode, Visit((AverageStress(),), (AveragedForce(),), OldWeights()), dt, True, True)
+
+
 @shared
 def light_node(s):
     """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of a point that the node sees.
@@ -444,6 +463,14 @@ HEAT = _call(
         else "heat to the nodes, its flow, temperature of the points"
     ),
 )
+AVERAGED = _call(
+    "average_stress(s.averaging, s, mode)",
+    lambda s: (
+        "force of the averaged mean stress in one visit of the points"
+        if isinstance(s.averaging, FBar)
+        else None
+    ),
+)
 CONTACT = _call(
     "touch(s.contact, s)",
     lambda s: "contact of v*" if touch.defined(type(s.contact)) else None,
@@ -466,6 +493,7 @@ VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.Nodes(SumsToVelocity()))
 FORCE = table.Scatter((InternalForce(),), OldWeights())
 # v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
 ACCELERATE = (
+    AVERAGED,
     HEAT,
     table.AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS),
     AXIS,

@@ -39,6 +39,7 @@ from karamelo_py.points.kinematics.symmetric import (
     leading_symmetric,
     nominal,
     spin,
+    stretching_mean,
     symmetric_part,
     trace,
     von_mises,

@@ -41,6 +41,12 @@ def add_pressure(kin, factor: Number, s: Symmetric, p: Number):
     return kin.symmetric(lambda i, j: factor * s[i, j] + (p if i == j else 0))
 
 
+@formula()
+def stretching_mean(kin, s: Symmetric):
+    """Mean of a symmetric tensor over the directions that can stretch."""
+    return sum(s[i, i] for i in kin.axes) / len(kin.axes)
+
+
 @shared
 def deviator(kin, s):
     """s - tr(s)/3 I of a symmetric tensor."""
