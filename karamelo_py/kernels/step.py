@@ -340,7 +340,7 @@ def _(contact, s, steps):
     return None
 
 
-@kernel
+@entered
 def _clear_radial(kin, nodes, grids):
     for g in range(grids.first.size):
         if abs(grids.x0[g]) > grids.slack[g] * grids.h[g]:
