@@ -118,7 +118,7 @@ def _parser(command: str) -> CommandLine:
     parser = CommandLine(
         prog="karamelo-py",
         usage="karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [-log FILE] [-out FOLDER]\n"
-        "                          [--quiet] [--debug]\n"
+        "                          [-restart FILE] [--quiet] [--debug]\n"
         "       karamelo-py COMMAND ...",
         description=f"karamelo-py {__version__}: the material point method",
         epilog="karamelo-py COMMAND -h explains a command. karamelo-py SCRIPT is short for\n"
@@ -146,6 +146,11 @@ def _parser(command: str) -> CommandLine:
             help="threads to use (default: all cores where the scene is large enough)",
         )  # fmt: skip
         add_output_options(script)
+        if name == "run":
+            script.add_argument(
+                "-restart", "--restart", type=Path, metavar="FILE",
+                help="go on from a file that restart(...) has written",
+            )  # fmt: skip
         script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
     styles = add("styles", _styles, "List commands and styles, and where they come from.")
     styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
@@ -190,8 +195,15 @@ def _run(options: argparse.Namespace) -> int:
     hub.settings.debug = options.debug
     hub.checking = options.checking
     direct(hub, options)
-    interpreter = Interpreter(hub, presets=dict(options.var))
-    hub.interpreter = interpreter
+    presets = dict(options.var)
+    if getattr(options, "restart", None) is not None:
+        from karamelo_py.run.restart import Restart
+
+        hub.restart = Restart(options.restart)
+        presets = hub.restart.presets(presets)
+    interpreter = Interpreter(hub, presets=presets)
+    if hub.restart is not None:
+        interpreter.replay = hub.restart.replay()
     try:
         interpreter.run_file(script)
     except Interrupted:

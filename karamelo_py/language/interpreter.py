@@ -5,12 +5,14 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.further_mistakes import further_errors
+from karamelo_py.language.replay import Record, Replay, spelled
 from karamelo_py.script import expressions
 from karamelo_py.script.errors import Place, Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
@@ -75,6 +77,10 @@ class Interpreter:
         Numbers, texts and formulas by name.
     files : list of Path
         Scripts that were read.
+    record
+        What was done so far, for files to go on from.
+    replay
+        What is gone through once more, until the script is where an earlier run of it left off.
     """
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
@@ -85,8 +91,15 @@ class Interpreter:
         self._presets: dict[str, str] = {}
         self._frames: list[_Frame] = []
         self.statement: Statement | None = None  # the last that was begun
+        self.record = Record()
+        self.replay: Replay | None = None
         for name, text in (presets or {}).items():
             self._set_preset(name, text)
+
+    @property
+    def presets(self) -> dict[str, str]:
+        """Variables from the command line, as text."""
+        return dict(self._presets)
 
     # -- running ----------------------------------------------------------------------------------
 
@@ -183,9 +196,10 @@ class Interpreter:
         try:
             if self._presets:
                 self._refuse_unused_presets(statements)
-            self._go_on(self._frames[-1])
-        except Quit:
-            return
+            with suppress(Quit):
+                self._go_on(self._frames[-1])
+            if self.replay is not None:
+                raise self.replay.other_script("this one ends before")
         except ScriptError as error:
             # Once a run has begun, the rest of the script has been tried.
             if isinstance(self.hub, Rehearsed) and not self.hub.rehearsed:
@@ -214,9 +228,11 @@ class Interpreter:
         self.statement = statement
         self.hub.place = statement.place
         depth = len(self._frames)
+        done = len(self.record.statements)
         try:
-            self._execute(statement)
+            self._execute_recorded(statement)
         except ScriptError as error:
+            del self.record.statements[done:]
             error.place = error.place or statement.place
             if not error.included:
                 error.included = self._including(depth - 1)
@@ -226,6 +242,24 @@ class Interpreter:
             raise ScriptError(
                 "this is nested too deeply", place=statement.place, hint="use more names"
             ) from None
+
+    def _execute_recorded(self, statement: Statement) -> None:
+        if isinstance(statement, Call) and registry.knows("command", statement.name):
+            command = registry.find("command", statement.name)
+            if getattr(command, "may_differ", False):
+                self._execute(statement)
+                return
+        text = spelled(statement)
+        self.record.statements.append(text)
+        replay = self.replay
+        if replay is None:
+            self._execute(statement)
+            return
+        replay.next(text, statement.place)
+        last = replay.at_end
+        self._execute(statement)
+        if last and self.replay is replay:
+            raise replay.other_script("there a run stood here", statement.place)
 
     def _including(self, depth: int) -> list[Place]:
         """The include statements of the first `depth` scripts in progress, the nearest first."""

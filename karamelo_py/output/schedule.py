@@ -43,6 +43,8 @@ class Output:
         self.log = Log(hub)
         self.plots = Plots(hub)
         self.units: Units | None = None
+        # Written after all others, which then have nothing to write of the same state.
+        self.last: list[Periodic] = []
         # Which dump a file belongs to.
         self.files: dict[Path, str] = {}
 
@@ -68,8 +70,8 @@ class Output:
             return
         raise ScriptError(what, argument="file", expected="the name of another file")
 
-    def begin(self, run: Any = None) -> None:
-        """Write the headers and the first state of a run."""
+    def begin(self, *, within: bool = False) -> None:
+        """Write the headers and the first state of a run; not that of one gone on `within`."""
         if self.hub.rehearsing:
             return
         if self.plots.file is not None and not len(self.plots):
@@ -79,7 +81,8 @@ class Output:
                 hint="plot(ID, every, x, y) gives a curve",
             )
         self.log.begin()
-        self.write(last=True)
+        if not within:
+            self.write(last=True)
 
     def next_step(self, step: int) -> int:
         """The first step after `step` at which something is due."""
@@ -113,6 +116,13 @@ class Output:
             item.last_step = step
             if isinstance(item.every, ByTime):
                 item.every.passed = item.every.now(time)
+
+    def write_last(self) -> None:
+        """Write what comes after all others alone."""
+        for item in self.last:
+            if item.last_step != self.hub.update.step:
+                self._do(item, "write")
+                item.last_step = self.hub.update.step
 
     def end(self, last: bool = True) -> None:
         """Write the last state of a run (unless `last` is false), and complete plots and dumps."""
@@ -157,7 +167,7 @@ class Output:
             getattr(item, what)()
 
     def _items(self) -> list[Periodic]:
-        return [self.log, *self.hub.dumps.values(), *self.plots]
+        return [self.log, *self.hub.dumps.values(), *self.plots, *self.last]
 
 
 def _located(error: ScriptError, item: Any) -> ScriptError:

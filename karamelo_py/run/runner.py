@@ -74,8 +74,24 @@ class Runner:
         if hub.checking:
             report(hub, self.end_time)
             raise Quit
+        replay = hub.interpreter.replay
+        if replay is not None and not replay.at_end:
+            self._pass_over()
+            return
         with self._telling_of_compilation(), blamed(hub):
             self._run(hub.simulation)
+        hub.runs.append(self._values())
+
+    def _values(self) -> dict[str, float]:
+        return {name: self.hub.values.get(name) for name in self.hub.values.names()}
+
+    def _pass_over(self) -> None:
+        """A run that was over when the state was written that the script goes on from."""
+        after = self.hub.restart.runs[len(self.hub.runs)]
+        for name, value in after.items():
+            if name in self.hub.values:
+                self.hub.values.set(name, value)
+        self.hub.runs.append(after)
 
     def _check_condition(self) -> None:
         names = self.condition.names if self.condition is not None else frozenset()
@@ -90,22 +106,30 @@ class Runner:
     def _run(self, simulation: Simulation) -> None:
         hub = self.hub
         started = time.perf_counter()
-        simulation.begin(self.end_time)
+        first_step, first_time = simulation.step, simulation.time
+        going_on = hub.restart is not None
+        if going_on:
+            hub.restart.take(hub, outputs=True)
+            hub.restart = hub.interpreter.replay = None
+            simulation.go_on(self.end_time)
+        else:
+            simulation.begin(self.end_time)
         diagnosis.warn_about_groups(hub)
         diagnosis.warn_about_step(hub, simulation)
         diagnosis.warn_about_precision(hub, simulation)
         simulation.compile()
-        first_step = simulation.step
-        first_time = simulation.time
-        self._banner(simulation)
+        self._banner(simulation, going_on)
         with self._timed("output"):
-            hub.output.begin(self)
+            hub.output.begin(within=going_on)
         hub.console.begin_run(simulation.step, 0.0)
         try:
             with self._interruptible():
                 self._loop(simulation, first_step, first_time)
             with self._timed("output"):
                 hub.console.end_run()
+                if self.interrupted:
+                    # Before the last state of this run is written, which a longer one has not.
+                    hub.output.write_last()
                 hub.output.end()
         except BaseException:
             hub.console.end_run()
@@ -241,10 +265,10 @@ class Runner:
             if spent > 0.5 * (expected or 0.0):
                 cache.keep_time(scene, spent)
 
-    def _banner(self, simulation: Simulation) -> None:
+    def _banner(self, simulation: Simulation, going_on: bool) -> None:
         hub = self.hub
         hub.console.banner(
-            "Run",
+            f"Run, gone on with at step {simulation.step}" if going_on else "Run",
             {
                 "method": hub.update.words,
                 "points": int(simulation.present.sum()),

@@ -110,6 +110,10 @@ class Hub:
         Numbers that fixes and computes publish, and time, timestep, dt.
     place
         Place of the statement in progress.
+    runs
+        The published values at the end of each run so far.
+    restart
+        What the script goes on from, until it is where that was written.
     rehearsing
         True while the rest of a script is tried before the first step: nothing runs or is written.
     checking
@@ -125,6 +129,7 @@ class Hub:
         self.rehearsed = False
         self.checking = False
         self.interpreter: Any = None
+        self.restart: Any = None
         self.domain: Any = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
@@ -141,6 +146,7 @@ class Hub:
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
+        self.runs: list[dict[str, float]] = []
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.output.files import reported, whole
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.table import OfPoints, TableDump
 
 # The least compression: with the bytes of like order together, more takes twice the time for a few
@@ -24,6 +25,7 @@ class Hdf5Dump(TableDump):
         File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
     """
 
+    remembers = ("_snapshots",)
     _snapshots = 0
 
     def write(self) -> None:
@@ -52,6 +54,36 @@ class Hdf5Dump(TableDump):
                     root[name].resize(self._snapshots, axis=0)
                 raise
         self._snapshots += 1
+
+    def resumed(self) -> None:
+        """Go on in the file of an earlier run, with the snapshots that it had then.
+
+        They are copied: a file that a killed program was writing can be read, not written to.
+        """
+        import h5py
+
+        path, count = self.path(), self._snapshots
+        if count == 0 or self.one_file_per_step:
+            return
+        try:
+            with (
+                h5py.File(path, "r", libver="latest", swmr=True, locking=False) as old,
+                whole(path) as file,
+                h5py.File(file.name, "w", libver="latest", locking=False) as root,
+            ):
+                if len(old["step"]) < count:
+                    raise OSError
+                self._prepare(root, old["id"][:])
+                for name in ("id", "type"):
+                    root[name].resize(old[name].shape)
+                    root[name][:] = old[name][:]
+                for name in ("time", "step", *self.columns):
+                    root[name].resize((count, *old[name].shape[1:]))
+                    for k in range(count):
+                        root[name][k] = old[name][k]
+        except (OSError, KeyError, ScriptError):
+            self.warn_of_absence()
+            self._snapshots = 0
 
     def _prepare(self, root: Any, ids: np.ndarray) -> None:
         """Make the empty arrays, with names of their axes, as xarray reads them."""

@@ -35,6 +35,8 @@ class Movie(PyPlot):
     dump pyplot
     """
 
+    remembers = ("frames",)
+
     @cached_property
     def frames(self) -> Frames:
         """The pictures so far."""

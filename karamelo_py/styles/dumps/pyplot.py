@@ -104,6 +104,18 @@ class PyPlot(Dump):
         self.look = {"azimuth": azimuth, "elevation": elevation, "axes": axes}
         self.symmetric, self.cmap = colours_of(field or "vx", self.limits, cmap)
         self._picture: Any = None
+        self._limits: tuple[float, float] | None = None
+
+    remembers = ("seen",)
+
+    @property
+    def seen(self) -> tuple[float, float] | None:
+        """The limits of the field so far."""
+        return self._picture.limits if self._picture is not None else self._limits
+
+    @seen.setter
+    def seen(self, limits: tuple[float, float] | None) -> None:
+        self._limits = limits
 
     def check_format(self) -> str:
         """The format that the file name asks for."""
@@ -147,7 +159,9 @@ class PyPlot(Dump):
             lengths=f" [{units.length}]" if units else "",
             **self.look,
         )
-        return picture.make(self.hub.domain, self.size, DPI, options)
+        made = picture.make(self.hub.domain, self.size, DPI, options)
+        made.begin_with(self._limits)
+        return made
 
     def _side(self, x: np.ndarray) -> float:
         """Side length of a typical point."""
