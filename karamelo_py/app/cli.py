@@ -12,11 +12,12 @@ from typing import Any, NoReturn
 
 from karamelo_py import __version__
 from karamelo_py.app.outputs import add_output_options, direct
+from karamelo_py.app.start import INTERRUPTED, leaving_at_once
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, nearest, render_message
 
 ERROR = 1
-INTERRUPTED = 130  # as a shell reports a program that SIGINT ended
+SIGNALLED = 128  # as a shell reports a program that a signal ended: this and its number
 
 RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
 CHECK = """\
@@ -185,10 +186,11 @@ def _run(options: argparse.Namespace) -> int:
     script = options.input or options.script
     if script is None:
         raise ScriptError("no script is named", expected="karamelo-py SCRIPT")
-    from karamelo_py.language.interpreter import Interpreter
-    from karamelo_py.output.console import Console
-    from karamelo_py.run.runner import Interrupted
-    from karamelo_py.scene.hub import Hub
+    with leaving_at_once():
+        from karamelo_py.language.interpreter import Interpreter
+        from karamelo_py.output.console import Console
+        from karamelo_py.run.runner import Interrupted
+        from karamelo_py.scene.hub import Hub
 
     hub = Hub(Console(quiet=options.quiet))
     hub.settings.threads = options.threads
@@ -206,9 +208,9 @@ def _run(options: argparse.Namespace) -> int:
         interpreter.replay = hub.restart.replay()
     try:
         interpreter.run_file(script)
-    except Interrupted:
+    except Interrupted as signal:
         _complain("interrupted: the log and the dumps are complete up to here")
-        return INTERRUPTED
+        return SIGNALLED + signal.args[0]
     if not hub.rehearsed:
         _tell_of_no_run(hub, script)
     return 0

@@ -37,11 +37,11 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     -----
     ``karamelo-py SCRIPT -restart FILE`` goes on: the statements of the script are gone through,
     runs that were over are passed over, and the one that was in progress goes on behind the step of
-    the file. Its results are those of a run that was never interrupted, bit for bit, with any number of
-    threads; the log and the dumps go on in their files, whose later lines are cut off. Up to there
-    the script has to be the same, except for commands that only say how a run goes on or what it
-    writes (set_dt, dt_factor, set_output, dump, plot and the like); how long the last run is may
-    change.
+    the file. Its results are those of a run that was never interrupted, bit for bit, with any
+    number of threads; the log and the dumps go on in their files, whose later lines are cut off.
+    Up to there the script has to be the same, except for commands that only say how a run
+    goes on or what it writes (set_dt, dt_factor, set_output, dump, plot and the like); how long the
+    last run is may change.
 
     A file holds everything that points and nodes carry, what fixes, computes, dumps and plots have
     seen or added up, and the values that the script has read. It is in HDF5, and whole or not

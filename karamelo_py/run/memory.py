@@ -5,8 +5,8 @@ A part names the attributes in which it keeps what it has seen or added up::
     class Dose(Compute):
         remembers = ("total",)
 
-Numbers, texts, bytes, arrays, lists, tuples and dictionaries of these can be kept, and objects whose
-class says in the same way what they remember. Classes add to what their bases name. After such a
+Numbers, texts, bytes, arrays, lists, tuples and dictionaries of these can be kept, and objects
+whose class says in the same way what they remember. Classes add to what their bases name. After a
 part has got back what it remembers, its method ``resumed()`` is called where it has one.
 """
 
@@ -38,10 +38,8 @@ def memory_of(part: Any, arrays: list[np.ndarray]) -> dict[str, Any]:
         try:
             found[name] = _written(getattr(part, name), arrays)
         except TypeError as error:
-            who = f"{getattr(part, 'style', '') or type(part).__name__}"
-            raise fault(
-                who, f"remembers: {name} is {error}", getattr(part, "place", None)
-            ) from None
+            who, place = type(part).__name__, getattr(part, "place", None)
+            raise fault(who, f"remembers: {name} is {error}", place) from None
     return found
 
 

@@ -53,6 +53,7 @@ class Restarts(Rhythmic):
 
     def write(self) -> None:
         """Write the present state."""
+        self.last_step = self.hub.update.step  # goes into the file
         write(self.hub, self.file, within=True)
 
 
@@ -207,7 +208,7 @@ class Restart:
                     part.resumed()
 
 
-OUTPUTS = ("dump", "log", "curve")
+OUTPUTS = ("dump", "log", "curve", "restart")
 
 
 def _parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
@@ -224,6 +225,8 @@ def _all_parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
             yield (catalogue.kind, ID, kind), part
     for curve in hub.output.plots:
         yield ("curve", curve.id, ""), curve
+    for item in hub.output.last:
+        yield ("restart", str(item.file), ""), item
     # The last one: what it shows is what the others remember.
     yield ("log", "", ""), hub.output.log
 

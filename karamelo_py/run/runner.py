@@ -27,11 +27,14 @@ CHUNK = 100  # steps between two looks at the run, and between two snapshots, at
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
 
 
+# Ctrl-C; batch systems, kill; a terminal that is closed (which Windows does not tell).
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
 
 
 class Interrupted(Exception):
-    """The user pressed Ctrl-C; everything is written."""
+    """The user pressed Ctrl-C, or another signal (its number) came; everything is written."""
 
 
 def _kind_of_scene(hub: Hub) -> str:
@@ -61,7 +64,7 @@ class Runner:
         self.until = until
         self.place = hub.place
         self.spent = {"compilation": 0.0, "steps": 0.0, "output": 0.0}
-        self.interrupted = False
+        self.interrupted = 0  # the signal
 
     def run(self) -> None:
         """Do it."""
@@ -118,6 +121,7 @@ class Runner:
         diagnosis.warn_about_step(hub, simulation)
         diagnosis.warn_about_precision(hub, simulation)
         simulation.compile()
+        began = simulation.step
         self._banner(simulation, going_on)
         with self._timed("output"):
             hub.output.begin(within=going_on)
@@ -135,9 +139,9 @@ class Runner:
             hub.console.end_run()
             hub.output.abort()
             raise
-        self._summary(simulation, first_step, time.perf_counter() - started)
+        self._summary(simulation, began, time.perf_counter() - started)
         if self.interrupted:
-            raise Interrupted
+            raise Interrupted(self.interrupted)
 
     def _loop(self, simulation: Simulation, first_step: int, first_time: float) -> None:
         hub, output = self.hub, self.hub.output
@@ -207,7 +211,10 @@ class Runner:
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
-        """Ctrl-C ends the run after the present chunk; a second one at once."""
+        """Ctrl-C ends the run after the present chunk; a second one at once.
+
+        So do the signals of batch systems and of terminals that are closed.
+        """
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -215,13 +222,20 @@ class Runner:
         def note(number: int, frame: Any) -> None:
             if self.interrupted:
                 raise KeyboardInterrupt
-            self.interrupted = True
+            self.interrupted = number
+            if number == getattr(signal, "SIGHUP", None):
+                self.hub.console.leave()
 
-        before = signal.signal(signal.SIGINT, note)
+        before = {number: signal.getsignal(number) for number in ENDING}
+        # Whoever started the program may have it go on when the terminal is closed (nohup).
+        heeded = [number for number, handler in before.items() if handler != signal.SIG_IGN]
+        for number in heeded:
+            signal.signal(number, note)
         try:
             yield
         finally:
-            signal.signal(signal.SIGINT, before)
+            for number in heeded:
+                signal.signal(number, before[number])
 
     @contextmanager
     def _telling_of_compilation(self) -> Iterator[None]:
