@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -14,7 +13,7 @@ from karamelo_py.language import registry, signature
 from karamelo_py.language.further_mistakes import further_errors
 from karamelo_py.language.replay import Record, Replay, spelled
 from karamelo_py.script import expressions
-from karamelo_py.script.errors import Place, Quit, ScriptError, nearest
+from karamelo_py.script.errors import Pause, Place, Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.other_programs import KARAMELO_COMMANDS, instead
@@ -119,6 +118,11 @@ class Interpreter:
         """Run a script that is in memory."""
         self._run(parse(text, name), None)
 
+    @property
+    def waits(self) -> bool:
+        """Whether a script is in the midst of its statements."""
+        return bool(self._frames)
+
     def include(self, name: str) -> None:
         """Run another script at this place; the name is relative to the script that asks."""
         path = self._included(name, self.folder)
@@ -196,22 +200,45 @@ class Interpreter:
         try:
             if self._presets:
                 self._refuse_unused_presets(statements)
-            with suppress(Quit):
+            self.go_on()
+        except ScriptError:
+            self._frames.clear()
+            raise
+
+    def go_on(self) -> None:
+        """Carry out what is left of all scripts in progress, such as one that waits (`Pause`)."""
+        try:
+            while self._frames:
                 self._go_on(self._frames[-1])
+                self._frames.pop()
             if self.replay is not None:
                 raise self.replay.other_script("this one ends before")
+        except Pause:
+            raise
+        except Quit:
+            self._frames.clear()
+            if self.replay is not None:
+                raise self.replay.other_script("this one ends before") from None
         except ScriptError as error:
             # Once a run has begun, the rest of the script has been tried.
             if isinstance(self.hub, Rehearsed) and not self.hub.rehearsed:
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
-            raise
-        finally:
             self._frames.clear()
+            raise
+        except BaseException:
+            self._frames.clear()
+            raise
 
     def _go_on(self, frame: _Frame) -> None:
         while frame.next < len(frame.statements):
             frame.next += 1
-            self.execute(frame.statements[frame.next - 1])
+            try:
+                self.execute(frame.statements[frame.next - 1])
+            except Pause:
+                # In the script that has the run; those that include it are at their next line.
+                if frame is self._frames[-1]:
+                    frame.next -= 1
+                raise
 
     def next_statement(self) -> Statement | None:
         """The statement that comes next, in whichever file; it counts as carried out."""
@@ -231,6 +258,9 @@ class Interpreter:
         done = len(self.record.statements)
         try:
             self._execute_recorded(statement)
+        except Pause:
+            del self.record.statements[done:]
+            raise
         except ScriptError as error:
             del self.record.statements[done:]
             error.place = error.place or statement.place

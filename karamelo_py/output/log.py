@@ -37,6 +37,8 @@ class Log(Rhythmic):
         self.columns: list[Quantity] = []
         self.last_step: int | None = None
         self._file: TextIO | None = None
+        # Names and numbers of the lines, where a program wants to have them.
+        self.rows: list[tuple[list[str], list[float]]] | None = None
         self._header: str | None = None
         self._end = 0  # bytes of the file so far
         self._widths: list[int] = []
@@ -80,8 +82,10 @@ class Log(Rhythmic):
     def write(self) -> None:
         """Write one line: the quantities now."""
         cells = []
-        for column in self.columns:
-            number = column.read()
+        numbers = [column.read() for column in self.columns]
+        if self.rows is not None:
+            self.rows.append(([column.heading for column in self.columns], numbers))
+        for number in numbers:
             if isinstance(number, int):
                 cells.append(str(number))
             else:
@@ -111,6 +115,8 @@ class Log(Rhythmic):
 
     def _open(self, end: int = 0) -> None:
         path = self.path
+        if not self.hub.output.writes:
+            return
         try:
             # Line buffering: each line is in the file at once, also when the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
@@ -128,6 +134,8 @@ class Log(Rhythmic):
             ) from error
 
     def _put(self, cells: list[str]) -> None:
+        if not self.hub.output.writes:
+            return
         assert self._file is not None
         if self.file.suffix == ".csv":
             line = ",".join(f'"{c}"' if "," in c else c.strip() for c in cells)

@@ -43,6 +43,8 @@ class Output:
         self.log = Log(hub)
         self.plots = Plots(hub)
         self.units: Units | None = None
+        # False where a program keeps the log and no file is asked for.
+        self.writes = True
         # Written after all others, which then have nothing to write of the same state.
         self.last: list[Periodic] = []
         # Which dump a file belongs to.
@@ -119,7 +121,7 @@ class Output:
 
     def write_last(self) -> None:
         """Write what comes after all others alone."""
-        for item in self.last:
+        for item in self.last if self.writes else ():
             if item.last_step != self.hub.update.step:
                 self._do(item, "write")
                 item.last_step = self.hub.update.step
@@ -151,7 +153,7 @@ class Output:
             self.log.close()
 
     def _to_finish(self) -> list:
-        return [self.plots, *self.hub.dumps.values()]
+        return [self.plots, *self.hub.dumps.values()] if self.writes else []
 
     def _finish(self, item: Any) -> None:
         try:
@@ -167,6 +169,8 @@ class Output:
             getattr(item, what)()
 
     def _items(self) -> list[Periodic]:
+        if not self.writes:
+            return [self.log, *self.plots]
         return [self.log, *self.hub.dumps.values(), *self.plots, *self.last]
 
 

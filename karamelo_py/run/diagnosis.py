@@ -78,9 +78,8 @@ def stop(
         message = f"step {step + 1}, time {time:.6g}: {message}"
         _write_last_good(hub)
     name = LAST_GOOD.replace("*", str(simulation.step))
-    hint += (
-        f". The last good state is in {name}: karamelo-py SCRIPT -restart {name} goes on from it"
-    )
+    if hub.output.writes:
+        hint += f". The last good state is in {name}; karamelo-py SCRIPT -restart {name} goes on"
     raise ScriptError(message, place=place, hint=hint)
 
 
@@ -198,5 +197,6 @@ def _place(x: np.ndarray) -> str:
 
 def _write_last_good(hub: Hub) -> None:
     """Write the present state: to a file to go on from, and to the outputs of the script."""
-    restart.write(hub, Path(LAST_GOOD), within=True)
+    if hub.output.writes:
+        restart.write(hub, Path(LAST_GOOD), within=True)
     hub.output.write(last=True)

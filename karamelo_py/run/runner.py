@@ -21,7 +21,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene import boundary
 from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Quit, ScriptError
+from karamelo_py.script.errors import Pause, Quit, ScriptError
 
 CHUNK = 100  # steps between two looks at the run, and between two snapshots, at most
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
@@ -73,6 +73,8 @@ class Runner:
         self._check_condition()
         if hub.rehearsing:
             return
+        if hub.pausing:
+            raise Pause
         hub.rehearse()
         if hub.checking:
             report(hub, self.end_time)

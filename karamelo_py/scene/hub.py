@@ -110,6 +110,10 @@ class Hub:
         Numbers that fixes and computes publish, and time, timestep, dt.
     place
         Place of the statement in progress.
+    functions
+        Functions in Python that a program has given, by name.
+    pausing
+        Whether a script stops in front of its runs: a program lets time go on.
     runs
         The published values at the end of each run so far.
     restart
@@ -128,6 +132,7 @@ class Hub:
         self.rehearsing = False
         self.rehearsed = False
         self.checking = False
+        self.pausing = False
         self.interpreter: Any = None
         self.restart: Any = None
         self.domain: Any = None
@@ -146,6 +151,7 @@ class Hub:
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
+        self.functions: dict[str, Any] = {}
         self.runs: list[dict[str, float]] = []
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,10 +45,7 @@ class Hdf5Dump(TableDump):
                 self._append(root, 0, ids, types)
             self._snapshots = 1
             return
-        with reported(path), h5py.File(path, "r+", libver="latest", locking=False) as root:
-            # Whatever happens to the program, what was written before stays readable (h5py's
-            # swmr=True also opens a file that a killed program has left).
-            root.swmr_mode = True
+        with reported(path), _opened_to_append(path) as root:
             try:
                 self._append(root, self._snapshots, ids, types)
             except BaseException:
@@ -134,6 +133,23 @@ class Hdf5Dump(TableDump):
             row[at] = self.field(name)
             root[name].resize((k + 1, count))
             root[name][k] = row
+
+
+def _opened_to_append(path: Path) -> Any:
+    """The file, such that whatever happens to the program what was written before stays readable.
+
+    h5py's swmr=True also opens a file that a killed program has left, if it was opened for that at
+    once (`h5py.File.swmr_mode` does it a moment later).
+    """
+    import h5py
+
+    access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+    access.set_fclose_degree(h5py.h5f.CLOSE_STRONG)
+    access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
+    if hasattr(access, "set_file_locking"):
+        access.set_file_locking(False, True)
+    mode = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
+    return h5py.File(h5py.h5f.open(os.fsencode(path), mode, fapl=access))
 
 
 class Hdf5(OfPoints, Hdf5Dump):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any
+from typing import Annotated, Any, BinaryIO
 
 import numpy as np
 
@@ -124,12 +124,18 @@ class PyPlot(Dump):
     def write(self) -> None:
         """Draw the present state."""
         with unwarned():
-            self._draw()
             if self.format == "png":
                 with whole(self.path()) as file:
-                    self._picture.save_png(file, PNG_COMPRESSION)
+                    self.draw(file)
             else:
+                self._draw()
                 savefig(self._picture.figure, self.path())
+
+    def draw(self, file: BinaryIO) -> None:
+        """Draw the present state as PNG into an open file."""
+        with unwarned():
+            self._draw()
+            self._picture.save_png(file, PNG_COMPRESSION)
 
     def _draw(self) -> None:
         fields, update = self.hub.fields, self.hub.update
