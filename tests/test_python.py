@@ -106,7 +106,6 @@ def test_commands_as_methods(interpreted, run_interpreted, tmp_path):
     text += "run(4)\nfix(g, body_force, all, NULL, -9.81)\nrun_time(0.01)\n"
     by_hand = run_interpreted(text, folder="run").folder
     files = {path.name: path.read_bytes() for path in by_hand.iterdir() if path.suffix != ".script"}
-    files.pop("in.script")
     assert len(files) > 3
     for name, content in files.items():
         assert (tmp_path / "files" / name).read_bytes() == content
