@@ -35,7 +35,7 @@ WORDS = {
     "method": "tlmpm ulmpm tlcpdi ulcpdi ulmpm/contacts",
     "scheme": "musl usl usf",
 }
-REFUSED = {"restart", "write_restart", "read_restart", "partition_domain", "quit"}
+REFUSED = {"partition_domain", "quit"}
 
 
 @pytest.mark.parametrize("family", WORDS)

@@ -12,11 +12,12 @@ from typing import Any, NoReturn
 
 from karamelo_py import __version__
 from karamelo_py.app.outputs import add_output_options, direct
+from karamelo_py.app.start import INTERRUPTED, leaving_at_once
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, nearest, render_message
 
 ERROR = 1
-INTERRUPTED = 130  # as a shell reports a program that SIGINT ended
+SIGNALLED = 128  # as a shell reports a program that a signal ended: this and its number
 
 RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
 CHECK = """\
@@ -119,7 +120,7 @@ def _parser(command: str) -> CommandLine:
     parser = CommandLine(
         prog="karamelo-py",
         usage="karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [-log FILE] [-out FOLDER]\n"
-        "                          [--quiet] [--debug]\n"
+        "                          [-restart FILE] [--quiet] [--debug]\n"
         "       karamelo-py COMMAND ...",
         description=f"karamelo-py {__version__}: the material point method",
         epilog="karamelo-py COMMAND -h explains a command. karamelo-py SCRIPT is short for\n"
@@ -147,6 +148,11 @@ def _parser(command: str) -> CommandLine:
             help="threads to use (default: all cores where the scene is large enough)",
         )  # fmt: skip
         add_output_options(script)
+        if name == "run":
+            script.add_argument(
+                "-restart", "--restart", type=Path, metavar="FILE",
+                help="go on from a file that restart(...) has written",
+            )  # fmt: skip
         script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
     styles = add("styles", _styles, "List commands and styles, and where they come from.")
     styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
@@ -181,23 +187,31 @@ def _run(options: argparse.Namespace) -> int:
     script = options.input or options.script
     if script is None:
         raise ScriptError("no script is named", expected="karamelo-py SCRIPT")
-    from karamelo_py.language.interpreter import Interpreter
-    from karamelo_py.output.console import Console
-    from karamelo_py.run.runner import Interrupted
-    from karamelo_py.scene.hub import Hub
+    with leaving_at_once():
+        from karamelo_py.language.interpreter import Interpreter
+        from karamelo_py.output.console import Console
+        from karamelo_py.run.runner import Interrupted
+        from karamelo_py.scene.hub import Hub
 
     hub = Hub(Console(quiet=options.quiet))
     hub.settings.threads = options.threads
     hub.settings.debug = options.debug
     hub.checking = options.checking
     direct(hub, options)
-    interpreter = Interpreter(hub, presets=dict(options.var))
-    hub.interpreter = interpreter
+    presets = dict(options.var)
+    if getattr(options, "restart", None) is not None:
+        from karamelo_py.run.restart import Restart
+
+        hub.restart = Restart(options.restart)
+        presets = hub.restart.presets(presets)
+    interpreter = Interpreter(hub, presets=presets)
+    if hub.restart is not None:
+        interpreter.replay = hub.restart.replay()
     try:
         interpreter.run_file(script)
-    except Interrupted:
+    except Interrupted as signal:
         _complain("interrupted: the log and the dumps are complete up to here")
-        return INTERRUPTED
+        return SIGNALLED + signal.args[0]
     if not hub.rehearsed:
         _tell_of_no_run(hub, script)
     return 0

@@ -309,3 +309,8 @@ def units(
     dump, plot
     """
     hub.output.units = Units(length, mass, time, temperature)
+
+
+for _command in (dump, delete_dump, set_output, log, log_modify, plot, save_plot, units):
+    # Another one does no harm where a run goes on from a file.
+    _command.may_differ = True

@@ -87,7 +87,7 @@ def _delete_later(hub: Hub, found: dict[Solid, np.ndarray]) -> None:
                 argument="solids",
                 hint=f"delete_fix({fix.id}) before",
             )
-    if hub.rehearsing:
+    if hub.rehearsing or hub.interpreter.replay is not None:
         return
     simulation = hub.simulation
     ids = np.concatenate([np.flatnonzero(i) + solid.first_id for solid, i in found.items()])

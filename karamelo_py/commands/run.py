@@ -150,3 +150,8 @@ def _refuse_constant(command: str, condition: Expression) -> None:
             expected="a formula of time, timestep, dt or values of fixes and computes",
             hint=f"{command}(time {compare} {number:g}), or run_time({number:g})",
         )
+
+
+for _command in (set_dt, dt_factor):
+    # Another one does no harm where a run goes on from a file.
+    _command.may_differ = True

@@ -11,8 +11,9 @@ from typing import Any, Protocol, runtime_checkable
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.further_mistakes import further_errors
+from karamelo_py.language.replay import Record, Replay, spelled
 from karamelo_py.script import expressions
-from karamelo_py.script.errors import Place, Quit, ScriptError, nearest
+from karamelo_py.script.errors import Pause, Place, Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.other_programs import KARAMELO_COMMANDS, instead
@@ -75,6 +76,10 @@ class Interpreter:
         Numbers, texts and formulas by name.
     files : list of Path
         Scripts that were read.
+    record
+        What was done so far, for files to go on from.
+    replay
+        What is gone through once more, until the script is where an earlier run of it left off.
     """
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
@@ -85,8 +90,15 @@ class Interpreter:
         self._presets: dict[str, str] = {}
         self._frames: list[_Frame] = []
         self.statement: Statement | None = None  # the last that was begun
+        self.record = Record()
+        self.replay: Replay | None = None
         for name, text in (presets or {}).items():
             self._set_preset(name, text)
+
+    @property
+    def presets(self) -> dict[str, str]:
+        """Variables from the command line, as text."""
+        return dict(self._presets)
 
     # -- running ----------------------------------------------------------------------------------
 
@@ -105,6 +117,11 @@ class Interpreter:
     def run_text(self, text: str, name: str = "<text>") -> None:
         """Run a script that is in memory."""
         self._run(parse(text, name), None)
+
+    @property
+    def waits(self) -> bool:
+        """Whether a script is in the midst of its statements."""
+        return bool(self._frames)
 
     def include(self, name: str) -> None:
         """Run another script at this place; the name is relative to the script that asks."""
@@ -183,21 +200,45 @@ class Interpreter:
         try:
             if self._presets:
                 self._refuse_unused_presets(statements)
-            self._go_on(self._frames[-1])
+            self.go_on()
+        except ScriptError:
+            self._frames.clear()
+            raise
+
+    def go_on(self) -> None:
+        """Carry out what is left of all scripts in progress, such as one that waits (`Pause`)."""
+        try:
+            while self._frames:
+                self._go_on(self._frames[-1])
+                self._frames.pop()
+            if self.replay is not None:
+                raise self.replay.other_script("this one ends before")
+        except Pause:
+            raise
         except Quit:
-            return
+            self._frames.clear()
+            if self.replay is not None:
+                raise self.replay.other_script("this one ends before") from None
         except ScriptError as error:
             # Once a run has begun, the rest of the script has been tried.
             if isinstance(self.hub, Rehearsed) and not self.hub.rehearsed:
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
-            raise
-        finally:
             self._frames.clear()
+            raise
+        except BaseException:
+            self._frames.clear()
+            raise
 
     def _go_on(self, frame: _Frame) -> None:
         while frame.next < len(frame.statements):
             frame.next += 1
-            self.execute(frame.statements[frame.next - 1])
+            try:
+                self.execute(frame.statements[frame.next - 1])
+            except Pause:
+                # In the script that has the run; those that include it are at their next line.
+                if frame is self._frames[-1]:
+                    frame.next -= 1
+                raise
 
     def next_statement(self) -> Statement | None:
         """The statement that comes next, in whichever file; it counts as carried out."""
@@ -214,9 +255,14 @@ class Interpreter:
         self.statement = statement
         self.hub.place = statement.place
         depth = len(self._frames)
+        done = len(self.record.statements)
         try:
-            self._execute(statement)
+            self._execute_recorded(statement)
+        except Pause:
+            del self.record.statements[done:]
+            raise
         except ScriptError as error:
+            del self.record.statements[done:]
             error.place = error.place or statement.place
             if not error.included:
                 error.included = self._including(depth - 1)
@@ -226,6 +272,24 @@ class Interpreter:
             raise ScriptError(
                 "this is nested too deeply", place=statement.place, hint="use more names"
             ) from None
+
+    def _execute_recorded(self, statement: Statement) -> None:
+        if isinstance(statement, Call) and registry.knows("command", statement.name):
+            command = registry.find("command", statement.name)
+            if getattr(command, "may_differ", False):
+                self._execute(statement)
+                return
+        text = spelled(statement)
+        self.record.statements.append(text)
+        replay = self.replay
+        if replay is None:
+            self._execute(statement)
+            return
+        replay.next(text, statement.place)
+        last = replay.at_end
+        self._execute(statement)
+        if last and self.replay is replay:
+            raise replay.other_script("there a run stood here", statement.place)
 
     def _including(self, depth: int) -> list[Place]:
         """The include statements of the first `depth` scripts in progress, the nearest first."""

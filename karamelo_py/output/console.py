@@ -80,7 +80,7 @@ class Console:
 
     def say(self, text: str = "", style: str | None = None) -> None:
         """Write a line (or several); on a terminal in a style of Rich."""
-        if self.quiet:
+        if self.quiet or self._broken:
             return
         self._release()
         if self._progress is not None:
@@ -136,6 +136,10 @@ class Console:
             for name, seconds in stages
         }
         self.banner(title, {**facts, **parts})
+
+    def leave(self) -> None:
+        """Nobody looks any more, and nothing can be written to the terminal."""
+        self._broken, self._progress = True, None
 
     # Progress
 

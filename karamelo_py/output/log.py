@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import errno
+import os
 from pathlib import Path
 from typing import TextIO
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.quantity import Quantity
-from karamelo_py.output.rhythm import ByTime
+from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.script.errors import ScriptError
 
 FILE = "log.mpm"
@@ -17,7 +18,7 @@ STEP_WIDTH = 10
 NUMBER_WIDTH = 16
 
 
-class Log:
+class Log(Rhythmic):
     """The table of logged quantities.
 
     The file has one header line and one row per output. Columns are separated by spaces and begin
@@ -27,6 +28,8 @@ class Log:
     comment line starting with ``#`` names the new ones.
     """
 
+    remembers = ("_header", "_end")
+
     def __init__(self, hub: Scene):
         self.hub = hub
         self.every: int | ByTime = 1
@@ -34,7 +37,10 @@ class Log:
         self.columns: list[Quantity] = []
         self.last_step: int | None = None
         self._file: TextIO | None = None
+        # Names and numbers of the lines, where a program wants to have them.
+        self.rows: list[tuple[list[str], list[float]]] | None = None
         self._header: str | None = None
+        self._end = 0  # bytes of the file so far
         self._widths: list[int] = []
 
     @property
@@ -61,6 +67,8 @@ class Log:
             for heading in headings
         ]
         header = _row(headings, self._widths)
+        if self._file is None and self._end:
+            self._go_on()
         if header != self._header:
             if self._file is None:
                 self._open()
@@ -74,8 +82,10 @@ class Log:
     def write(self) -> None:
         """Write one line: the quantities now."""
         cells = []
-        for column in self.columns:
-            number = column.read()
+        numbers = [column.read() for column in self.columns]
+        if self.rows is not None:
+            self.rows.append(([column.heading for column in self.columns], numbers))
+        for number in numbers:
             if isinstance(number, int):
                 cells.append(str(number))
             else:
@@ -91,13 +101,27 @@ class Log:
             self._file.close()
             self._file = None
 
-    def _open(self) -> None:
+    def _go_on(self) -> None:
+        """Go on in the file of an earlier run, behind the line that was its last then."""
+        there = self.path.stat().st_size if self.path.is_file() else 0
+        if there < self._end:
+            self.hub.warn(
+                f"{self.path} is not as the run left it that is gone on from: it begins anew",
+                hint="karamelo-py SCRIPT -restart FILE in the folder of that run",
+            )
+            self._header, self._end = None, 0
+            return
+        self._open(self._end)
+
+    def _open(self, end: int = 0) -> None:
         path = self.path
+        if not self.hub.output.writes:
+            return
         try:
             # Line buffering: each line is in the file at once, also when the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
             _claim(self._file)
-            self._file.truncate(0)
+            self._file.truncate(end)
         except BlockingIOError as error:
             raise ScriptError(
                 f"another run is writing to {path}",
@@ -110,6 +134,8 @@ class Log:
             ) from error
 
     def _put(self, cells: list[str]) -> None:
+        if not self.hub.output.writes:
+            return
         assert self._file is not None
         if self.file.suffix == ".csv":
             line = ",".join(f'"{c}"' if "," in c else c.strip() for c in cells)
@@ -117,6 +143,7 @@ class Log:
             line = _row(cells, self._widths)
         try:
             self._file.write(line + "\n")
+            self._end = os.fstat(self._file.fileno()).st_size
         except OSError as error:
             raise ScriptError(
                 f"cannot write the log file {self.path}: {error.strerror or error}"

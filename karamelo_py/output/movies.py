@@ -47,6 +47,8 @@ class Frames:
         Frames in a second.
     """
 
+    remembers = ("_frames",)
+
     def __init__(self, fps: float):
         self.fps = fps
         self._frames: list[bytes] = []

@@ -10,17 +10,20 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.output.files import FORMATS, savefig
 from karamelo_py.output.plot_style import blank_figure, tidy
 from karamelo_py.output.quantity import Quantity
+from karamelo_py.output.rhythm import Rhythmic
 from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import Place
 
 __all__ = ["FORMATS", "Curve", "Plots"]
 
 
-class Curve:
+class Curve(Rhythmic):
     """One curve: `y` against `x`, a point at every `every` steps.
 
     `side` is that of the axis of y, left or right; `scale` is linear or log.
     """
+
+    remembers = ("points",)
 
     def __init__(
         self, every: int, x: Quantity, y: Quantity, side: str = "left", scale: str = "linear"

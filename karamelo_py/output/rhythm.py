@@ -30,6 +30,24 @@ class ByTime:
         return floor(time / self.span * (1 + 1e-12) + 1e-9)
 
 
+class Rhythmic:
+    """Something written again and again: `every` says how often, `last_step` when last."""
+
+    remembers = ("last_step", "passed")
+    every: int | ByTime
+    last_step: int | None = None
+
+    @property
+    def passed(self) -> int | None:
+        """The multiples of a span of time that were written."""
+        return getattr(self.every, "passed", None)
+
+    @passed.setter
+    def passed(self, count: int | None) -> None:
+        if count is not None and isinstance(self.every, ByTime):
+            self.every.passed = count
+
+
 class Every:
     """For signatures: a number of steps, or ``time(T)``; gives an int or a `ByTime`."""
 

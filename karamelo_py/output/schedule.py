@@ -43,6 +43,10 @@ class Output:
         self.log = Log(hub)
         self.plots = Plots(hub)
         self.units: Units | None = None
+        # False where a program keeps the log and no file is asked for.
+        self.writes = True
+        # Written after all others, which then have nothing to write of the same state.
+        self.last: list[Periodic] = []
         # Which dump a file belongs to.
         self.files: dict[Path, str] = {}
 
@@ -68,8 +72,8 @@ class Output:
             return
         raise ScriptError(what, argument="file", expected="the name of another file")
 
-    def begin(self, run: Any = None) -> None:
-        """Write the headers and the first state of a run."""
+    def begin(self, *, within: bool = False) -> None:
+        """Write the headers and the first state of a run; not that of one gone on `within`."""
         if self.hub.rehearsing:
             return
         if self.plots.file is not None and not len(self.plots):
@@ -79,7 +83,8 @@ class Output:
                 hint="plot(ID, every, x, y) gives a curve",
             )
         self.log.begin()
-        self.write(last=True)
+        if not within:
+            self.write(last=True)
 
     def next_step(self, step: int) -> int:
         """The first step after `step` at which something is due."""
@@ -114,6 +119,13 @@ class Output:
             if isinstance(item.every, ByTime):
                 item.every.passed = item.every.now(time)
 
+    def write_last(self) -> None:
+        """Write what comes after all others alone."""
+        for item in self.last if self.writes else ():
+            if item.last_step != self.hub.update.step:
+                self._do(item, "write")
+                item.last_step = self.hub.update.step
+
     def end(self, last: bool = True) -> None:
         """Write the last state of a run (unless `last` is false), and complete plots and dumps."""
         if self.hub.rehearsing:
@@ -141,7 +153,7 @@ class Output:
             self.log.close()
 
     def _to_finish(self) -> list:
-        return [self.plots, *self.hub.dumps.values()]
+        return [self.plots, *self.hub.dumps.values()] if self.writes else []
 
     def _finish(self, item: Any) -> None:
         try:
@@ -157,7 +169,9 @@ class Output:
             getattr(item, what)()
 
     def _items(self) -> list[Periodic]:
-        return [self.log, *self.hub.dumps.values(), *self.plots]
+        if not self.writes:
+            return [self.log, *self.plots]
+        return [self.log, *self.hub.dumps.values(), *self.plots, *self.last]
 
 
 def _located(error: ScriptError, item: Any) -> ScriptError:

@@ -11,12 +11,13 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.step import ABOVE_LIMIT, SHRUNK
 from karamelo_py.points.basis import carried, extent
+from karamelo_py.run import restart
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError
 
-LAST_GOOD = "last_good.*.LAMMPS"
+LAST_GOOD = "last_good.*.h5"
 
 
 def warn_about_precision(hub: Hub, simulation: Simulation) -> None:
@@ -77,7 +78,9 @@ def stop(
         message = f"step {step + 1}, time {time:.6g}: {message}"
         _write_last_good(hub)
     name = LAST_GOOD.replace("*", str(simulation.step))
-    raise ScriptError(message, place=place, hint=f"{hint}. The last good state is in {name}")
+    if hub.output.writes:
+        hint += f". The last good state is in {name}; karamelo-py SCRIPT -restart {name} goes on"
+    raise ScriptError(message, place=place, hint=hint)
 
 
 def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
@@ -193,9 +196,7 @@ def _place(x: np.ndarray) -> str:
 
 
 def _write_last_good(hub: Hub) -> None:
-    """Write the present state: to the dumps of the script, and to a file of its own."""
-    from karamelo_py.styles.dumps.particle import Particle
-
+    """Write the present state: to a file to go on from, and to the outputs of the script."""
+    if hub.output.writes:
+        restart.write(hub, Path(LAST_GOOD), within=True)
     hub.output.write(last=True)
-    columns = ["x", "y", "z", "vx", "vy", "vz", "s11", "s22", "s33", "s12", "s13", "s23", "volume"]
-    Particle(hub, 1, Path(LAST_GOOD), *columns).write()

@@ -21,17 +21,20 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene import boundary
 from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Quit, ScriptError
+from karamelo_py.script.errors import Pause, Quit, ScriptError
 
 CHUNK = 100  # steps between two looks at the run, and between two snapshots, at most
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
 
 
+# Ctrl-C; batch systems, kill; a terminal that is closed (which Windows does not tell).
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
 
 
 class Interrupted(Exception):
-    """The user pressed Ctrl-C; everything is written."""
+    """The user pressed Ctrl-C, or another signal (its number) came; everything is written."""
 
 
 def _kind_of_scene(hub: Hub) -> str:
@@ -61,7 +64,7 @@ class Runner:
         self.until = until
         self.place = hub.place
         self.spent = {"compilation": 0.0, "steps": 0.0, "output": 0.0}
-        self.interrupted = False
+        self.interrupted = 0  # the signal
 
     def run(self) -> None:
         """Do it."""
@@ -70,12 +73,30 @@ class Runner:
         self._check_condition()
         if hub.rehearsing:
             return
+        if hub.pausing:
+            raise Pause
         hub.rehearse()
         if hub.checking:
             report(hub, self.end_time)
             raise Quit
+        replay = hub.interpreter.replay
+        if replay is not None and not replay.at_end:
+            self._pass_over()
+            return
         with self._telling_of_compilation(), blamed(hub):
             self._run(hub.simulation)
+        hub.runs.append(self._values())
+
+    def _values(self) -> dict[str, float]:
+        return {name: self.hub.values.get(name) for name in self.hub.values.names()}
+
+    def _pass_over(self) -> None:
+        """A run that was over when the state was written that the script goes on from."""
+        after = self.hub.restart.runs[len(self.hub.runs)]
+        for name, value in after.items():
+            if name in self.hub.values:
+                self.hub.values.set(name, value)
+        self.hub.runs.append(after)
 
     def _check_condition(self) -> None:
         names = self.condition.names if self.condition is not None else frozenset()
@@ -90,30 +111,39 @@ class Runner:
     def _run(self, simulation: Simulation) -> None:
         hub = self.hub
         started = time.perf_counter()
-        simulation.begin(self.end_time)
+        first_step, first_time = simulation.step, simulation.time
+        going_on = hub.restart is not None
+        if going_on:
+            hub.restart.take(hub, outputs=True)
+            hub.restart = hub.interpreter.replay = None
+            simulation.go_on(self.end_time)
+        else:
+            simulation.begin(self.end_time)
         diagnosis.warn_about_groups(hub)
         diagnosis.warn_about_step(hub, simulation)
         diagnosis.warn_about_precision(hub, simulation)
         simulation.compile()
-        first_step = simulation.step
-        first_time = simulation.time
-        self._banner(simulation)
+        began = simulation.step
+        self._banner(simulation, going_on)
         with self._timed("output"):
-            hub.output.begin(self)
+            hub.output.begin(within=going_on)
         hub.console.begin_run(simulation.step, 0.0)
         try:
             with self._interruptible():
                 self._loop(simulation, first_step, first_time)
             with self._timed("output"):
                 hub.console.end_run()
+                if self.interrupted:
+                    # Before the last state of this run is written, which a longer one has not.
+                    hub.output.write_last()
                 hub.output.end()
         except BaseException:
             hub.console.end_run()
             hub.output.abort()
             raise
-        self._summary(simulation, first_step, time.perf_counter() - started)
+        self._summary(simulation, began, time.perf_counter() - started)
         if self.interrupted:
-            raise Interrupted
+            raise Interrupted(self.interrupted)
 
     def _loop(self, simulation: Simulation, first_step: int, first_time: float) -> None:
         hub, output = self.hub, self.hub.output
@@ -183,7 +213,10 @@ class Runner:
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
-        """Ctrl-C ends the run after the present chunk; a second one at once."""
+        """Ctrl-C ends the run after the present chunk; a second one at once.
+
+        So do the signals of batch systems and of terminals that are closed.
+        """
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -191,13 +224,20 @@ class Runner:
         def note(number: int, frame: Any) -> None:
             if self.interrupted:
                 raise KeyboardInterrupt
-            self.interrupted = True
+            self.interrupted = number
+            if number == getattr(signal, "SIGHUP", None):
+                self.hub.console.leave()
 
-        before = signal.signal(signal.SIGINT, note)
+        before = {number: signal.getsignal(number) for number in ENDING}
+        # Whoever started the program may have it go on when the terminal is closed (nohup).
+        heeded = [number for number, handler in before.items() if handler != signal.SIG_IGN]
+        for number in heeded:
+            signal.signal(number, note)
         try:
             yield
         finally:
-            signal.signal(signal.SIGINT, before)
+            for number in heeded:
+                signal.signal(number, before[number])
 
     @contextmanager
     def _telling_of_compilation(self) -> Iterator[None]:
@@ -241,10 +281,10 @@ class Runner:
             if spent > 0.5 * (expected or 0.0):
                 cache.keep_time(scene, spent)
 
-    def _banner(self, simulation: Simulation) -> None:
+    def _banner(self, simulation: Simulation, going_on: bool) -> None:
         hub = self.hub
         hub.console.banner(
-            "Run",
+            f"Run, gone on with at step {simulation.step}" if going_on else "Run",
             {
                 "method": hub.update.words,
                 "points": int(simulation.present.sum()),

@@ -166,7 +166,7 @@ class Simulation:
         self.hooks: Hooks | NoHooks = NoHooks()
         self._first: PythonHooks | None = None
         self._first_fixes: list = []
-        self._mapped = False  # whether the nodes show a state of this simulation
+        self.mapped = False  # whether the nodes show a state of this simulation
 
     def fits(self, hub: Hub) -> bool:
         """Whether the arrays are still those of the scene."""
@@ -284,6 +284,25 @@ class Simulation:
         self._measured = self.version
 
     @property
+    def measured(self) -> bool:
+        """Whether the rate of the fastest point is that of the present state."""
+        return self._measured == self.version
+
+    @measured.setter
+    def measured(self, known: bool) -> None:
+        self.version += 1
+        self._measured = self.version if known else -1
+
+    @property
+    def begun(self) -> list[str]:
+        """IDs of the fixes of the first step that have acted."""
+        return [ID for ID, fix in self.hub.fixes.items() if fix in self._begun]
+
+    @begun.setter
+    def begun(self, IDs: list[str]) -> None:
+        self._begun = {self.hub.fixes[ID] for ID in IDs if ID in self.hub.fixes}
+
+    @property
     def bounces(self) -> int:
         """How often points were reflected at the edge of the domain."""
         counts = self.declared(Bounces)
@@ -326,6 +345,20 @@ class Simulation:
             clock.first_limit = self.limit
         clock.watch_limit = int(not self.above_limit())
         clock.over_limit = 0
+
+    def go_on(self, end_time: float) -> None:
+        """In place of `begin`: go on with a run whose state was put into the arrays."""
+        import numba
+
+        if self.threads > 1:
+            numba.set_num_threads(self.threads)
+        update, clock = self.hub.update, self.setup.control.clock[0]
+        self._prepare_hooks()
+        update.method.begin(self.hub, self.setup.contact)
+        said = update.fixed_dt or 0.0, update.dt_factor, end_time
+        if said != (clock.fixed_dt, clock.dt_factor, clock.end_time):
+            clock.fixed_dt, clock.dt_factor, clock.end_time = said
+            choose_dt(self.setup.control)
 
     def _choose_dt(self) -> None:
         if self._measured != self.version:
@@ -379,7 +412,7 @@ class Simulation:
         while True:
             self.sort_if_due()
             status = self._advance(target - self.step)
-            self._mapped = True
+            self.mapped = True
             ended = self.step >= target or control.values[TIME] >= control.clock[0].end_time
             if status != SORT:
                 return status
@@ -438,7 +471,7 @@ class Simulation:
 
     def show_on_nodes(self) -> None:
         """See that the nodes show the present state when no step has been taken yet."""
-        if not self._mapped:
+        if not self.mapped:
             s = self.setup
             self.sort_if_due()
             dt = step_size(s)
@@ -447,7 +480,7 @@ class Simulation:
             sweep(s, self.mode, visit, dt, False, True, False)
             sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
             show_heat(s.heat, s, self.mode)
-            self._mapped = True
+            self.mapped = True
 
     # --- state that can be returned to --------------------------------------------------------
 

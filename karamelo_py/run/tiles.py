@@ -56,9 +56,9 @@ class Tiles:
         self.cells = type(basis).cells
         self.per_cell = type(basis).nodes_per_cell
         self.sorts = 0
-        self._lay(tile_size(self.dimension, self.cells))
+        self.lay(tile_size(self.dimension, self.cells))
 
-    def _lay(self, size: int) -> None:
+    def lay(self, size: int) -> None:
         """Cut the grids into tiles of `size` cells."""
         self.size = size
         nodes = size * self.per_cell
@@ -117,7 +117,7 @@ class Tiles:
             cells = max(cells, 2 * far + 2) if 0 < far < np.inf else cells
         size = max(self.size, tile_size(self.dimension, cells))
         if size != self.size:
-            self._lay(size)
+            self.lay(size)
         s.control.clock[0].drift_limit = drift_limit(size, cells)
 
     def _sort_block(self, s: Setup, block: Block) -> None:

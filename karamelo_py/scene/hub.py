@@ -110,6 +110,14 @@ class Hub:
         Numbers that fixes and computes publish, and time, timestep, dt.
     place
         Place of the statement in progress.
+    functions
+        Functions in Python that a program has given, by name.
+    pausing
+        Whether a script stops in front of its runs: a program lets time go on.
+    runs
+        The published values at the end of each run so far.
+    restart
+        What the script goes on from, until it is where that was written.
     rehearsing
         True while the rest of a script is tried before the first step: nothing runs or is written.
     checking
@@ -124,7 +132,9 @@ class Hub:
         self.rehearsing = False
         self.rehearsed = False
         self.checking = False
+        self.pausing = False
         self.interpreter: Any = None
+        self.restart: Any = None
         self.domain: Any = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
@@ -141,6 +151,8 @@ class Hub:
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
+        self.functions: dict[str, Any] = {}
+        self.runs: list[dict[str, float]] = []
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None
 

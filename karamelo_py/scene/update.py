@@ -41,6 +41,8 @@ class Update:
         Whether the user knows that points were reflected.
     """
 
+    remembers = ("warned_of_bounces",)
+
     def __init__(self, values: Values):
         self.values = values
         self.method: Any = None

@@ -25,6 +25,10 @@ class Quit(Exception):
     """The statement quit: the script ends here, and that is fine."""
 
 
+class Pause(Exception):
+    """The script waits in front of a run."""
+
+
 class ScriptError(Exception):
     """Something in a script (or on the command line) that the user has to change.
 

@@ -9,7 +9,6 @@ _DOMAIN = "dimension(2, xlo, xhi, ylo, yhi, h) makes the domain and its grid"
 _VELOCITY = "fix(ID, initial_velocity_particles, group, vx, vy, vz) sets velocities"
 _NEEDLESS = "leave it out"
 _FILLED = "region(box, {}, ...) and solid(ID, region, box, ppc, material, h, 0): a region is filled"
-_RESTART = f"{_NEEDLESS}: a run goes on only within its script, by a further run(n)"
 
 # Commands of Karamelo, whose names its scripts cannot use for variables. Others are free.
 KARAMELO_COMMANDS = frozenset((
@@ -26,9 +25,6 @@ KARAMELO_COMMANDS = frozenset((
 INSTEAD = {
     "command": {
         "method_modify": "method(ulmpm, FLIP, linear, 0.99) says all of it in one line",
-        "restart": _RESTART,
-        "write_restart": _RESTART,
-        "read_restart": _RESTART,
         "partition_domain": "method(ulmpm, FLIP, linear, 1): with linear weights no point acts "
         "across a line of nodes",
         "delete_atoms": "delete_particles(solid, region, regionID)",

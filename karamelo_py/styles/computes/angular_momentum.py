@@ -37,6 +37,7 @@ class AngularMomentum(Compute):
     """
 
     published = ("x", "y", "z", "drift")
+    remembers = ("_drift",)
 
     def __init__(
         self, hub: Hub, group: ParticleGroup, cx: float = 0.0, cy: float = 0.0, cz: float = 0.0

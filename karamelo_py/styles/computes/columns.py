@@ -98,6 +98,8 @@ class Norm:
     depend on how often it is looked at.
     """
 
+    remembers = ("_sums", "_duration", "_time", "history", "largest")
+
     def __init__(self, words: tuple[str, ...] = ()):
         kinds = [word for word in words if word in ("L1", "L2", "max")]
         scales = [word for word in words if word in ("absolute", "relative")]

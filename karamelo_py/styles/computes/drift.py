@@ -8,6 +8,8 @@ import numpy as np
 class Drift:
     """|value - first value|, relative to the largest scale there has been so far."""
 
+    remembers = ("_first", "_scale")
+
     def __init__(self) -> None:
         self._first: np.ndarray | None = None
         self._scale = 0.0

@@ -39,6 +39,7 @@ class EnergyBalance(Compute):
     """
 
     published = ("", "total", "drift")
+    remembers = ("_drift",)
 
     def __init__(self, hub: Hub, group: ParticleGroup, work: Expression | None = None):
         super().__init__(hub, group)

@@ -54,6 +54,7 @@ class Error(Compute):
 
     syntax = "group, field, expression[, expression ...][, L1|L2|max][, absolute|relative]"
     published = ("", "max", "history")
+    remembers = ("norm",)
 
     def __init__(
         self,

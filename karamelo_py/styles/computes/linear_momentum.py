@@ -34,6 +34,7 @@ class LinearMomentum(Compute):
     """
 
     published = ("x", "y", "z", "drift")
+    remembers = ("_drift",)
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)

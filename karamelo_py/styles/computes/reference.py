@@ -73,6 +73,7 @@ class Reference(Compute):
 
     syntax = "group|value, file, column[, L1|L2|max][, absolute|relative]"
     published = ("", "now", "curve")
+    remembers = ("norm",)
 
     def __init__(
         self,

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from karamelo_py.language.signature import OutputFile
-from karamelo_py.output.rhythm import Every
+from karamelo_py.output.rhythm import Every, Rhythmic
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import Place, ScriptError, nearest
 
 
-class Dump:
+class Dump(Rhythmic):
     """Base of the dump styles: override `write`, which is called when the dump is due.
 
     Parameters
@@ -27,6 +27,7 @@ class Dump:
     """
 
     style = ""
+    place: Place | None = None
 
     def __init__(
         self,
@@ -57,6 +58,13 @@ class Dump:
 
     def finish(self) -> None:
         """Complete what is written; called at the end of each run, also of one that breaks off."""
+
+    def warn_of_absence(self) -> None:
+        """Tell that a file to go on in is not as the run left it that is gone on from."""
+        self.hub.warn(
+            f"{self.path()} is not as the run left it that is gone on from: it begins anew",
+            place=self.place,
+        )
 
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
         """Warn of columns that are 0 because no point or node (`what`) keeps them."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.output.files import reported, whole
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.table import OfPoints, TableDump
 
 # The least compression: with the bytes of like order together, more takes twice the time for a few
@@ -24,6 +27,7 @@ class Hdf5Dump(TableDump):
         File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
     """
 
+    remembers = ("_snapshots",)
     _snapshots = 0
 
     def write(self) -> None:
@@ -41,10 +45,7 @@ class Hdf5Dump(TableDump):
                 self._append(root, 0, ids, types)
             self._snapshots = 1
             return
-        with reported(path), h5py.File(path, "r+", libver="latest", locking=False) as root:
-            # Whatever happens to the program, what was written before stays readable (h5py's
-            # swmr=True also opens a file that a killed program has left).
-            root.swmr_mode = True
+        with reported(path), _opened_to_append(path) as root:
             try:
                 self._append(root, self._snapshots, ids, types)
             except BaseException:
@@ -52,6 +53,36 @@ class Hdf5Dump(TableDump):
                     root[name].resize(self._snapshots, axis=0)
                 raise
         self._snapshots += 1
+
+    def resumed(self) -> None:
+        """Go on in the file of an earlier run, with the snapshots that it had then.
+
+        They are copied: a file that a killed program was writing can be read, not written to.
+        """
+        import h5py
+
+        path, count = self.path(), self._snapshots
+        if count == 0 or self.one_file_per_step:
+            return
+        try:
+            with (
+                h5py.File(path, "r", libver="latest", swmr=True, locking=False) as old,
+                whole(path) as file,
+                h5py.File(file.name, "w", libver="latest", locking=False) as root,
+            ):
+                if len(old["step"]) < count:
+                    raise OSError
+                self._prepare(root, old["id"][:])
+                for name in ("id", "type"):
+                    root[name].resize(old[name].shape)
+                    root[name][:] = old[name][:]
+                for name in ("time", "step", *self.columns):
+                    root[name].resize((count, *old[name].shape[1:]))
+                    for k in range(count):
+                        root[name][k] = old[name][k]
+        except (OSError, KeyError, ScriptError):
+            self.warn_of_absence()
+            self._snapshots = 0
 
     def _prepare(self, root: Any, ids: np.ndarray) -> None:
         """Make the empty arrays, with names of their axes, as xarray reads them."""
@@ -102,6 +133,23 @@ class Hdf5Dump(TableDump):
             row[at] = self.field(name)
             root[name].resize((k + 1, count))
             root[name][k] = row
+
+
+def _opened_to_append(path: Path) -> Any:
+    """The file, such that whatever happens to the program what was written before stays readable.
+
+    h5py's swmr=True also opens a file that a killed program has left, if it was opened for that at
+    once (`h5py.File.swmr_mode` does it a moment later).
+    """
+    import h5py
+
+    access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+    access.set_fclose_degree(h5py.h5f.CLOSE_STRONG)
+    access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
+    if hasattr(access, "set_file_locking"):
+        access.set_file_locking(False, True)
+    mode = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
+    return h5py.File(h5py.h5f.open(os.fsencode(path), mode, fapl=access))
 
 
 class Hdf5(OfPoints, Hdf5Dump):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
 import zlib
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from pathlib import Path
+from typing import BinaryIO, Protocol
 
 from karamelo_py.kernels.text import rows
 from karamelo_py.output.files import continued, whole
@@ -13,6 +15,7 @@ from karamelo_py.styles.dumps.table import TableDump
 
 # A third of the time of level 6 for 4 % more bytes.
 COMPRESSION = 4
+PIECE = 1 << 20  # bytes
 
 
 class Encoder(Protocol):
@@ -47,8 +50,11 @@ class Plain:
 class LammpsDump(TableDump):
     """A dump in LAMMPS text format."""
 
-    # Of a file with all snapshots: where the next one goes, and the encoder's state there.
+    # Of a file with all snapshots: where the next one goes, how much text there is up to there, and
+    # the encoder's state.
+    remembers = ("_end", "_length")
     _end = 0
+    _length = 0
     _encoder: Encoder | None = None
 
     def encoder(self) -> Encoder:
@@ -70,12 +76,38 @@ class LammpsDump(TableDump):
         start, before = self._end, self._encoder or self.encoder()
         encoder = before.copy()
         tail = before.copy().flush() if start else b""
+        length = self._length
         with continued(self.path(), start, tail) as file:
             for text in self._snapshot():
+                length += len(text)
                 file.write(encoder.compress(text))
             end = file.tell()
             file.write(encoder.copy().flush())
-        self._end, self._encoder = end, encoder
+        self._end, self._length, self._encoder = end, length, encoder
+
+    def resumed(self) -> None:
+        """Go on in the file of an earlier run, behind what was its last snapshot then."""
+        if self._end == 0:
+            return
+        path = self.path()
+        if not path.is_file() or path.stat().st_size < self._end:
+            self.begin_anew()
+            return
+        # What an encoder has kept for the bytes to come is not in the file, but follows from it.
+        self._encoder = self.encoder()
+        with self.opened(path) as file:
+            for begin in range(0, self._length, PIECE):
+                self._encoder.compress(file.read(min(PIECE, self._length - begin)))
+
+    def begin_anew(self) -> None:
+        """The file of the earlier run is not there."""
+        self.warn_of_absence()
+        self._end = self._length = 0
+
+    @staticmethod
+    def opened(path: Path) -> BinaryIO:
+        """The text of a file."""
+        return path.open("rb")
 
     def _snapshot(self) -> Iterator[bytes]:
         """The text of the present state, piece by piece."""
@@ -97,6 +129,11 @@ class Gzipped:
     def encoder(self) -> Encoder:
         """A gzip stream without name and date, so that the same run gives the same bytes."""
         return zlib.compressobj(COMPRESSION, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
+
+    @staticmethod
+    def opened(path: Path) -> BinaryIO:
+        """The text of a file."""
+        return gzip.open(path)
 
 
 def header(hub: Hub, count: int, names: Sequence[str]) -> bytes:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from karamelo_py.output.files import unwarned
 from karamelo_py.output.movies import Frames, movie_format
-from karamelo_py.styles.dumps.pyplot import PNG_COMPRESSION, PyPlot
+from karamelo_py.styles.dumps.pyplot import PyPlot
 
 FRAMES_PER_SECOND = 25
 
@@ -35,6 +34,8 @@ class Movie(PyPlot):
     dump pyplot
     """
 
+    remembers = ("frames",)
+
     @cached_property
     def frames(self) -> Frames:
         """The pictures so far."""
@@ -46,9 +47,7 @@ class Movie(PyPlot):
 
     def write(self) -> None:
         """Draw the present state as the next frame."""
-        with unwarned():
-            self._draw()
-        self.frames.add(lambda file: self._picture.save_png(file, PNG_COMPRESSION))
+        self.frames.add(self.draw)
 
     def finish(self) -> None:
         """Write the movie of all frames so far."""

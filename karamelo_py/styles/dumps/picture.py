@@ -131,6 +131,13 @@ class Picture:
         self.title.set_text(title)
         self._place(x, values, size)
 
+    def begin_with(self, limits: tuple[float, float] | None) -> None:
+        """Let limits that grow begin with those that a picture had before."""
+        if limits is not None:
+            self._lay_out()
+            self.limits = limits
+            self._apply_limits(*limits)
+
     def _limits(self, values: np.ndarray) -> tuple[float, float]:
         grown_to = grown(self.limits, values)
         if self.options.symmetric:

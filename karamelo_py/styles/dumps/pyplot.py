@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any
+from typing import Annotated, Any, BinaryIO
 
 import numpy as np
 
@@ -104,6 +104,18 @@ class PyPlot(Dump):
         self.look = {"azimuth": azimuth, "elevation": elevation, "axes": axes}
         self.symmetric, self.cmap = colours_of(field or "vx", self.limits, cmap)
         self._picture: Any = None
+        self._limits: tuple[float, float] | None = None
+
+    remembers = ("seen",)
+
+    @property
+    def seen(self) -> tuple[float, float] | None:
+        """The limits of the field so far."""
+        return self._picture.limits if self._picture is not None else self._limits
+
+    @seen.setter
+    def seen(self, limits: tuple[float, float] | None) -> None:
+        self._limits = limits
 
     def check_format(self) -> str:
         """The format that the file name asks for."""
@@ -112,12 +124,18 @@ class PyPlot(Dump):
     def write(self) -> None:
         """Draw the present state."""
         with unwarned():
-            self._draw()
             if self.format == "png":
                 with whole(self.path()) as file:
-                    self._picture.save_png(file, PNG_COMPRESSION)
+                    self.draw(file)
             else:
+                self._draw()
                 savefig(self._picture.figure, self.path())
+
+    def draw(self, file: BinaryIO) -> None:
+        """Draw the present state as PNG into an open file."""
+        with unwarned():
+            self._draw()
+            self._picture.save_png(file, PNG_COMPRESSION)
 
     def _draw(self) -> None:
         fields, update = self.hub.fields, self.hub.update
@@ -147,7 +165,9 @@ class PyPlot(Dump):
             lengths=f" [{units.length}]" if units else "",
             **self.look,
         )
-        return picture.make(self.hub.domain, self.size, DPI, options)
+        made = picture.make(self.hub.domain, self.size, DPI, options)
+        made.begin_with(self._limits)
+        return made
 
     def _side(self, x: np.ndarray) -> float:
         """Side length of a typical point."""

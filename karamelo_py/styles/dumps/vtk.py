@@ -25,6 +25,8 @@ class VtkDump(TableDump):
         File name with a ``*``, which becomes the step number, and the ending ``.vtu``.
     """
 
+    remembers = ("_series",)
+
     def __init__(
         self,
         hub: Hub,

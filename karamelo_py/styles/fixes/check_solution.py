@@ -34,6 +34,7 @@ class CheckSolution(Fix):
 
     syntax = "group, ux[, uy[, uz]]"
     published = ("x", "y", "z", "s")
+    remembers = ("_step",)
 
     def __init__(self, hub: Hub, group: ParticleGroup, *displacement: Expression | None):
         super().__init__(hub, group)

@@ -133,6 +133,7 @@ class OwnGrids(Method):
     """A grid of its own for every solid."""
 
     own_grids = True
+    remembers = ("warned",)
     warned = False
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:

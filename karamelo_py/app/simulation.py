@@ -1,0 +1,411 @@
+"""A scene in Python: the commands of scripts as methods, what points carry as arrays."""
+
+from __future__ import annotations
+
+import gc
+import io
+import itertools
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any, NoReturn
+from weakref import WeakValueDictionary
+
+import numpy as np
+
+from karamelo_py.language import registry, signature
+from karamelo_py.language.interpreter import Interpreter, shown
+from karamelo_py.output.console import Console
+from karamelo_py.run.runner import Interrupted
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import Pause, Quit, ScriptError, nearest
+from karamelo_py.script.expressions import Formula
+from karamelo_py.script.parser import parse, parse_text
+
+_folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
+
+
+class SimulationError(ScriptError):
+    """What a script or a command is told that is wrong: the whole message, with its place.
+
+    Attributes
+    ----------
+    message, place, expected, hint
+        The parts of the message; `place` has file, line, column and the line itself.
+    """
+
+    def __str__(self) -> str:
+        return self.render()
+
+
+class KarameloWarning(UserWarning):
+    """What the command line would say as a warning."""
+
+
+class _Quiet(Console):
+    """Shows nothing; warnings are those of Python."""
+
+    def __init__(self) -> None:
+        super().__init__(quiet=True)
+
+    def warn(self, text: str) -> None:
+        warnings.warn(text, KarameloWarning, stacklevel=2)
+
+
+class Table(Mapping):
+    """Columns by name: arrays of numbers."""
+
+    def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
+        self._names = names
+        self._column = column
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        names = self._names()
+        if name not in names:
+            close = nearest(name, names)
+            hint = f"; did you mean '{close}'?" if close else ""
+            raise KeyError(f"there is no '{name}'{hint}")
+        return self._column(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names())
+
+    def __len__(self) -> int:
+        return len(self._names())
+
+    def __repr__(self) -> str:
+        return f"<columns {', '.join(self)}>"
+
+    def to_pandas(self) -> Any:
+        """The columns as a DataFrame."""
+        import pandas
+
+        return pandas.DataFrame(dict(self))
+
+
+class Picture:
+    """A picture of the points, which a notebook shows."""
+
+    def __init__(self, png: bytes):
+        self.png = png
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+    def save(self, file: str | PathLike) -> None:
+        """Write it to a file (PNG)."""
+        Path(file).write_bytes(self.png)
+
+
+class Simulation:
+    """A scene, made by a script, by commands, or by both.
+
+    Parameters
+    ----------
+    script
+        Name of a script, or the text of one (several lines). It is carried out up to its first run
+        command; ``run()`` without a number goes on from there.
+    out
+        Folder for log, dumps, plots and files to go on from. Without it none is written: the log
+        is kept in memory, and what a script says of dumps and plots has no effect.
+    threads
+        Threads to use; all cores where the scene is large enough by default.
+    verbose
+        Show on the terminal what the command line shows.
+    variables
+        Take the place of what the script assigns to them, as ``-var`` does.
+
+    Raises
+    ------
+    SimulationError
+        For a wrong script; it carries the message and the place that the command line shows.
+
+    Notes
+    -----
+    Every command of scripts is a method with the same arguments: ``sim.solid("body", "region",
+    "box", 2, "rubber", 0.1, 0)`` is the line ``solid(body, region, box, 2, rubber, 0.1, 0)``. Texts
+    stand for what a script would say, names and formulas; numbers, True and False, and None (NULL)
+    are what they are; ``sim.fix(ID, "python", group, function)`` takes a function.
+
+    Several simulations may live side by side and take turns; they do not run at the same time.
+
+    Examples
+    --------
+    >>> sim = Simulation("in.two_disks", N=40)
+    >>> sim.run(100)
+    >>> sim.points["x"].max(), sim.values["Ek_s"], sim.log["Time"]
+    """
+
+    def __init__(
+        self,
+        script: str | PathLike | None = None,
+        *,
+        out: str | PathLike | None = None,
+        threads: int | None = None,
+        verbose: bool = False,
+        **variables: Any,
+    ):
+        self.hub = hub = Hub(Console() if verbose else _Quiet())
+        hub.settings.threads = threads
+        hub.pausing = True
+        hub.output.log.rows = []
+        hub.output.writes = out is not None
+        if out is not None:
+            hub.folder = self._claimed(Path(out).absolute())
+        self._numbers = itertools.count(1)
+        self._name = "a scene"
+        try:
+            presets = {name: _said(value) for name, value in variables.items()}
+            self._interpreter = Interpreter(hub, presets)
+            if script is not None:
+                self._read(script)
+        except ScriptError as error:
+            _tell(error)
+
+    def _claimed(self, folder: Path) -> Path:
+        folder.mkdir(parents=True, exist_ok=True)
+        if folder in _folders:
+            gc.collect()  # one that is not in use any more
+        if folder in _folders:
+            raise SimulationError(
+                f"another simulation writes to {folder}",
+                expected="a folder of its own for each, or close() for the other",
+            )
+        _folders[folder] = self
+        return folder
+
+    def _read(self, script: str | PathLike) -> None:
+        is_text = isinstance(script, str) and "\n" in script
+        self._name = "a script" if is_text else str(script)
+        try:
+            if is_text:
+                self._interpreter.run_text(script, "script")
+            else:
+                self._interpreter.run_file(script)
+        except Pause:
+            pass
+
+    # -- commands ---------------------------------------------------------------------------------
+
+    def command(self, text: str) -> float | None:
+        """Carry out a line of script (or several); the value of a line that is an expression.
+
+        Raises
+        ------
+        SimulationError
+            As on the command line.
+        """
+        return self._do(text, "command")
+
+    def _do(self, text: str, name: str) -> Any:
+        hub, interpreter = self.hub, self._interpreter
+        pausing, hub.pausing = hub.pausing, False
+        try:
+            for statement in parse(text, name):
+                interpreter.execute(statement)
+        except ScriptError as error:
+            _tell(error)
+        except Quit:
+            pass
+        except Interrupted:
+            raise KeyboardInterrupt from None
+        finally:
+            hub.pausing = pausing
+
+    def evaluate(self, expression: str) -> float | str:
+        """The present value of an expression of the language."""
+        try:
+            raw, node = parse_text(expression, "evaluate")
+            found = self._interpreter.evaluate(node, raw)
+            if isinstance(found, Formula):
+                self.hub.refresh_values()
+                return found.evaluate(self.hub.values)
+            return found
+        except ScriptError as error:
+            _tell(error)
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        if name.startswith("_") or not registry.knows("command", name):
+            close = nearest(name, [*registry.names("command"), *dir(type(self))])
+            hint = f"; did you mean '{close}'?" if close else ""
+            raise AttributeError(f"there is no command '{name}'{hint}")
+
+        def call(*arguments: Any, **named: Any) -> Any:
+            words = [self._word(argument) for argument in arguments]
+            words += [f"{key}={self._word(value)}" for key, value in named.items()]
+            return self._do(f"{name}({', '.join(words)})", f"Simulation.{name}")
+
+        call.__name__ = name
+        call.__doc__ = registry.find("command", name).__doc__
+        return call
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *registry.names("command")]
+
+    def _word(self, value: Any) -> str:
+        """What a script would say for `value`."""
+        if callable(value) and not isinstance(value, type):
+            name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
+            self.hub.functions[name] = value
+            return name
+        return _said(value)
+
+    # -- time -------------------------------------------------------------------------------------
+
+    def run(self, steps: int | None = None) -> None:
+        """Take a number of steps; without one, carry out the rest of the script, with its runs."""
+        if steps is not None:
+            self._do(f"run({_said(steps)})", "Simulation.run")
+            return
+        if not self._interpreter.waits:
+            raise SimulationError(
+                "there is no rest of a script to carry out", hint="run(100), run_time(0.5) ..."
+            )
+        self.hub.pausing = False
+        try:
+            self._interpreter.go_on()
+        except ScriptError as error:
+            _tell(error)
+        except Interrupted:
+            raise KeyboardInterrupt from None
+        finally:
+            self.hub.pausing = True
+
+    @property
+    def time(self) -> float:
+        """Present time."""
+        return self.hub.update.time
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken."""
+        return self.hub.update.step
+
+    @property
+    def dt(self) -> float:
+        """The next step."""
+        return self.hub.update.dt
+
+    # -- what there is to see ---------------------------------------------------------------------
+
+    @property
+    def points(self) -> Table:
+        """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) in the order of ids."""
+        fields = self.hub.fields
+        return Table(fields.particle_names, _telling(fields.particle))
+
+    @property
+    def nodes(self) -> Table:
+        """Columns of the nodes by name (x, vx, mass ...): arrays (n,)."""
+        fields = self.hub.fields
+        return Table(fields.node_names, _telling(fields.node))
+
+    @property
+    def log(self) -> Table:
+        """Columns of the log by name: arrays with a number for each line.
+
+        Where the columns have changed, those of the last lines that have the same.
+        """
+        rows = self.hub.output.log.rows
+        names = rows[-1][0] if rows else []
+        last = np.array([numbers for at, numbers in rows if at == names])
+        return Table(lambda: list(names), lambda name: last[:, names.index(name)])
+
+    @property
+    def values(self) -> Table:
+        """What fixes and computes publish, now: numbers by name."""
+
+        def read(name: str) -> float:
+            if self.hub.solids and self.hub.update.method is not None:
+                self.hub.refresh_values()
+            return self.hub.values.get(name)
+
+        return Table(self.hub.values.names, _telling(read))
+
+    @property
+    def variables(self) -> dict[str, Any]:
+        """The variables of the script: numbers, and texts of formulas."""
+        found = self._interpreter.variables
+        return {n: v if isinstance(v, (float, str)) else shown(v) for n, v in found.items()}
+
+    def show(self, field: str | None = None, width: float = 6, height: float = 4.5, **look: Any):
+        """A picture of the points, coloured by a column (or by solid), which a notebook shows.
+
+        Parameters
+        ----------
+        field
+            Column of the points, such as seq.
+        width, height
+            Size in inches.
+        look
+            As dump pyplot: vmin, vmax, cmap, azimuth, elevation, axes, title.
+        """
+        from karamelo_py.styles.dumps.pyplot import PyPlot
+
+        try:
+            given = [] if field is None else [field]
+            words = ["1", "shown.png", *(self._word(v) for v in (width, height, *given))]
+            words += [f"{key}={self._word(value)}" for key, value in look.items()]
+            (call,) = parse(f"show({', '.join(words)})", "Simulation.show")
+            arguments = [signature.Argument(raw, self._interpreter) for raw in call.arguments]
+            dump = signature.call(PyPlot, self.hub, arguments, "dump pyplot")
+            file = io.BytesIO()
+            dump.draw(file)
+        except ScriptError as error:
+            _tell(error)
+        return Picture(file.getvalue())
+
+    def close(self) -> None:
+        """Close its files; a further run would begin the log anew."""
+        self.hub.output.log.close()
+        _folders.pop(self.hub.folder, None)
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        count = sum(solid.count for solid in self.hub.solids.values())
+        return f"<{self._name}: {count} points, step {self.step}, time {self.time:.6g}>"
+
+
+def _said(value: Any) -> str:
+    """What a script says for a value in Python."""
+    if value is None:
+        return "NULL"
+    if isinstance(value, (bool, np.bool_)):
+        return str(bool(value)).lower()
+    if isinstance(value, PathLike):
+        return f'"{value}"'
+    if isinstance(value, (int, np.integer)):
+        return str(int(value))
+    if isinstance(value, (float, np.floating)):
+        return repr(float(value))
+    if isinstance(value, str):
+        words = value.split()
+        texts = len(words) > 1 and all(re.fullmatch(r"[\w.:'-]+", word) for word in words)
+        # Words with nothing but blanks between them are no formula.
+        return f'"{value}"' if texts and not {"and", "or", "not"} & set(words) else value
+    raise TypeError(f"{value!r} is no number, text, True, False, None or function")
+
+
+def _tell(error: ScriptError) -> NoReturn:
+    """Raise the error as one whose text is the whole message."""
+    told = SimulationError.__new__(SimulationError)
+    told.__dict__.update(vars(error))
+    told.args = error.args
+    raise told from error.__cause__
+
+
+def _telling(function: Callable[[str], Any]) -> Callable[[str], Any]:
+    def call(name: str) -> Any:
+        try:
+            return function(name)
+        except ScriptError as error:
+            _tell(error)
+
+    return call

@@ -1,0 +1,96 @@
+"""A script gone through once more, up to the place where an earlier run of it left off."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from math import nan
+
+from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.syntax import Statement
+
+_BLANKS = re.compile(r'"[^"\n]*"|\s+')
+
+
+def spelled(statement: Statement) -> str:
+    """The text of a statement without what means nothing: blanks, comments, line ends."""
+    return _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
+
+
+class Record:
+    """What a script has done so far.
+
+    Commands that only say how a run goes on or what it writes (``may_differ``) are not in it.
+
+    Attributes
+    ----------
+    statements
+        The statements, in the order in which they were begun.
+    values
+        By the number of a statement: what its calls of value(...) gave.
+    """
+
+    def __init__(
+        self, statements: Sequence[str] = (), values: dict[int, list[float]] | None = None
+    ):
+        self.statements = list(statements)
+        self.values = dict(values or {})
+
+    def note(self, value: float) -> None:
+        """A call of value(...) in the last statement gave `value`."""
+        self.values.setdefault(len(self.statements) - 1, []).append(value)
+
+
+class Replay:
+    """Compares a script that is gone through once more with the record of the first time.
+
+    Parameters
+    ----------
+    record
+        What was done up to the state that is gone on from.
+    within
+        Whether its last statement was in progress then, a run.
+    file
+        Where the record comes from, for messages.
+    """
+
+    def __init__(self, record: Record, within: bool, file: str):
+        self.record = record
+        self.within = within
+        self.file = file
+        self.number = -1  # of the present statement
+        self._values: list[float] = []
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the present statement is the last of the record."""
+        return self.number == len(self.record.statements) - 1
+
+    def next(self, text: str, place: Place | None) -> None:
+        """The next statement is `text`.
+
+        Raises
+        ------
+        ScriptError
+            If it was another one the first time.
+        """
+        self.number += 1
+        self._values = list(self.record.values.get(self.number, ()))
+        before = self.record.statements[self.number]
+        # A run that was in progress may become longer or shorter.
+        if text != before and not (self.at_end and self.within):
+            raise self.other_script(f"there this statement was {before}", place)
+
+    def value(self) -> float:
+        """What the next value(...) of the present statement gave."""
+        return self._values.pop(0) if self._values else nan
+
+    def other_script(self, message: str, place: Place | None = None) -> ScriptError:
+        """The error for a script that is not the one that wrote the file."""
+        return ScriptError(
+            f"{self.file} was written by another script: {message}",
+            place=place,
+            expected="the script that wrote it; what it says about steps and output, and how long "
+            "the last run is, may change",
+            hint=f"read_restart({self.file}) in a script of its own takes the state alone",
+        )

@@ -1,0 +1,292 @@
+"""Files to go on from: the whole scene at one moment, in HDF5.
+
+Everything in them follows from what the parts of a scene declare: the arrays from their fields, the
+rest from what they remember (:mod:`karamelo_py.run.memory`). The set-up is not in them: the script
+makes it once more, and a file knows which statements had been carried out.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from karamelo_py import __version__
+from karamelo_py.language.replay import Record, Replay
+from karamelo_py.output.files import whole
+from karamelo_py.output.rhythm import ByTime, Rhythmic
+from karamelo_py.run.memory import memory_of, remember, remembered
+from karamelo_py.run.state import arrays_by_name, take_arrays
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+
+FORMAT, VERSION = "karamelo-py restart", 1
+FLAT = {"track_times": False}
+
+
+class Restarts(Rhythmic):
+    """Writes a file to go on from, again and again while the scene runs.
+
+    Parameters
+    ----------
+    every
+        How often.
+    file
+        File name. The first ``*`` becomes the step number; without ``*`` each file takes the place
+        of the one before.
+    """
+
+    place: Any = None
+    style = ""
+
+    def __init__(self, hub: Hub, every: int | ByTime, file: Path):
+        self.hub = hub
+        self.every = every
+        self.file = file
+        # What a run begins with can be had from the script.
+        self.last_step = hub.update.step
+
+    def write(self) -> None:
+        """Write the present state."""
+        self.last_step = self.hub.update.step  # goes into the file
+        write(self.hub, self.file, within=True)
+
+
+def path_of(hub: Hub, file: Path) -> Path:
+    """The file of the present state."""
+    return hub.folder / str(file).replace("*", str(hub.update.step), 1)
+
+
+def write(hub: Hub, file: Path, *, within: bool) -> Path:
+    """Write the present state of a scene; `within` a run or between two.
+
+    The file appears under its name when all of it is written.
+    """
+    import h5py
+
+    path = path_of(hub, file)
+    arrays: list[np.ndarray] = []
+    interpreter = hub.interpreter
+    content = {
+        "within": within,
+        "statements": interpreter.record.statements,
+        "values of statements": list(interpreter.record.values.items()),
+        "presets": interpreter.presets,
+        "variables": {name: str(value) for name, value in interpreter.variables.items()},
+        "runs": hub.runs,
+        "scene": described(hub),
+        "values": {name: hub.values.get(name) for name in hub.values.names()},
+        "begun": hub.simulation.begun,
+        "parts": [[*key, memory_of(part, arrays)] for key, part in _parts(hub)],
+    }
+    with whole(path) as out, h5py.File(out, "w") as root:
+        root.attrs["format"], root.attrs["version"] = FORMAT, VERSION
+        root.attrs["program"] = __version__
+        root.attrs["step"], root.attrs["time"] = hub.update.step, hub.update.time
+        text = np.frombuffer(json.dumps(content).encode(), np.uint8)
+        root.create_dataset("content", data=text, **FLAT)
+        for k, array in enumerate(arrays):
+            root.create_dataset(f"memory/{k}", data=array, **FLAT)
+        for name, array in arrays_by_name(hub.simulation).items():
+            root.create_dataset(f"state/{name}", data=array, **FLAT)
+    return path
+
+
+def is_restart(path: Path) -> bool:
+    """Whether a file is one to go on from."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r", locking=False) as root:
+            return root.attrs.get("format") == FORMAT
+    except OSError:
+        return False
+
+
+class Restart:
+    """The content of a file.
+
+    Parameters
+    ----------
+    path
+        Its name. With a ``*`` it is the one with the largest number in that place.
+
+    Raises
+    ------
+    ScriptError
+        If there is none, or it is no file to go on from.
+    """
+
+    def __init__(self, path: Path):
+        import h5py
+
+        self.path = path = _latest(path)
+        what = f"{path} is no file that this program can go on from"
+        expected = "a file that restart or write_restart of karamelo-py has written"
+        try:
+            with h5py.File(path, "r", locking=False) as root:
+                if root.attrs.get("format") != FORMAT:
+                    raise ScriptError(what, argument="file", expected=expected)
+                version = int(root.attrs["version"])
+                if version != VERSION:
+                    raise ScriptError(
+                        f"{path} has version {version} of the format of karamelo-py "
+                        f"{root.attrs['program']}, and this program reads version {VERSION}",
+                        argument="file",
+                        expected="the version of karamelo-py that wrote it",
+                    )
+                self.content = json.loads(root["content"][()].tobytes())
+                memory = root.get("memory", ())
+                self._memory = [memory[str(k)][()] for k in range(len(memory))]
+                self._state: dict[str, np.ndarray] = {}
+                root["state"].visititems(self._keep)
+        except (OSError, KeyError) as error:
+            raise ScriptError(f"{what}: {error}", argument="file", expected=expected) from None
+
+    def _keep(self, name: str, item: Any) -> None:
+        if hasattr(item, "shape"):
+            self._state[name] = item[()]
+
+    @property
+    def runs(self) -> list[dict[str, float]]:
+        """The values at the end of each run that was over."""
+        return self.content["runs"]
+
+    def presets(self, given: dict[str, str]) -> dict[str, str]:
+        """Variables from the command line of the run that wrote the file; `given` ones are those.
+
+        Raises
+        ------
+        ScriptError
+            If one that is given is another.
+        """
+        before = self.content["presets"]
+        for name, text in given.items():
+            if before.get(name) != text:
+                was = f"-var {name} {before[name]}" if name in before else f"without -var {name}"
+                raise ScriptError(
+                    f"{self.path} was written {'with ' * (name in before)}{was}, not {text}",
+                    expected="the same variables; those of the file are taken where none are given",
+                )
+        return before
+
+    def replay(self) -> Replay:
+        """What the script has to be, up to the state of the file."""
+        values = {int(k): found for k, found in self.content["values of statements"]}
+        record = Record(self.content["statements"], values)
+        return Replay(record, self.content["within"], str(self.path))
+
+    def take(self, hub: Hub, *, outputs: bool) -> None:
+        """Put the scene into the state of the file; with `outputs` they go on in their files.
+
+        Raises
+        ------
+        ScriptError
+            If the file was written by another scene.
+        """
+        check(hub, self)
+        simulation = hub.simulation
+        try:
+            take_arrays(simulation, self._state)
+        except ScriptError as error:
+            error.message = f"{self.path}: {error.message}"
+            raise
+        for name, value in self.content["values"].items():
+            if name in hub.values:
+                hub.values.set(name, value)
+        simulation.begun = self.content["begun"]
+        kept = {tuple(key): memory for *key, memory in self.content["parts"]}
+        for key, part in _parts(hub):
+            if key in kept and (outputs or key[0] not in OUTPUTS):
+                remember(part, kept[key], self._memory)
+                if hasattr(part, "resumed"):
+                    part.resumed()
+
+
+OUTPUTS = ("dump", "log", "curve", "restart")
+
+
+def _parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
+    """All that remembers something: family, ID and style of each, and the part."""
+    return ((key, part) for key, part in _all_parts(hub) if remembered(part))
+
+
+def _all_parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
+    yield ("update", "", ""), hub.update
+    yield ("method", "", ""), hub.update.method
+    for catalogue in hub.catalogues:
+        for ID, part in catalogue.items():
+            kind = getattr(part, "style", "") or type(part).__name__
+            yield (catalogue.kind, ID, kind), part
+    for curve in hub.output.plots:
+        yield ("curve", curve.id, ""), curve
+    for item in hub.output.last:
+        yield ("restart", str(item.file), ""), item
+    # The last one: what it shows is what the others remember.
+    yield ("log", "", ""), hub.output.log
+
+
+def _latest(path: Path) -> Path:
+    if "*" not in path.name or path.exists():
+        return path
+    pattern = re.compile(re.escape(path.name).replace(r"\*", r"(\d+)", 1))
+    there = path.parent.iterdir() if path.parent.is_dir() else ()
+    found = [(int(match[1]), one) for one in there if (match := pattern.fullmatch(one.name))]
+    if not found:
+        raise ScriptError(f"there is no file {path}", argument="file")
+    return max(found)[1]
+
+
+# ---- whether a scene is the one that wrote a file ----------------------------------------------
+
+
+def described(hub: Hub) -> dict[str, str]:
+    """What has to be the same for a state to fit, in words."""
+    update, domain = hub.update, hub.domain
+    box = zip(domain.lo, domain.hi, strict=True)
+    words = {
+        "method": update.words,
+        "domain": f"{domain.dimension}, {', '.join(f'{a!r}, {b!r}' for a, b in box)}, {domain.h!r}",
+        "axisymmetric": str(domain.axisymmetric),
+        "precision": hub.settings.precision,
+        "anti_volumetric_locking": str(update.anti_locking),
+        "boundary": update.boundary,
+    }
+    for solid in hub.solids.values():
+        where = zlib.crc32(np.ascontiguousarray(solid.x0).tobytes())
+        kind = "-".join(type(part).__name__ for part in _parts_of(solid.material.law))
+        words[f"solid '{solid.id}'"] = f"{solid.count} points of {kind}, {where:08x}"
+    return words
+
+
+def _parts_of(law: Any) -> Iterator[Any]:
+    yield law
+    if isinstance(law, tuple):
+        for part in law:
+            if isinstance(part, tuple) and hasattr(part, "_fields"):
+                yield part
+
+
+def check(hub: Hub, restart: Restart) -> None:
+    """Refuse a state of another scene, with the first difference."""
+    here, there = described(hub), restart.content["scene"]
+    for name in dict.fromkeys([*there, *here]):
+        mine, theirs = here.get(name), there.get(name)
+        if mine == theirs:
+            continue
+        if mine is None or theirs is None:
+            what = f"{name}, which {'is not here' if mine is None else 'it does not have'}"
+        elif name.startswith("solid") and mine.rsplit(",")[0] == theirs.rsplit(",")[0]:
+            what = f"other points in {name}"
+        else:
+            what = f"{name} {theirs}; here it is {mine}"
+        raise ScriptError(
+            f"{restart.path} was written by another scene: {what}",
+            argument="file",
+            expected="the same domain, method and solids as in the script that wrote it",
+        )

@@ -1,0 +1,153 @@
+"""All arrays of a simulation that a step changes, by name: to be written, and to go on from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.compiler.fields import name_of
+from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
+from karamelo_py.script.errors import ScriptError
+
+
+def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
+    """Views and copies of them; of nodes, the rows of those that are in use."""
+    s = simulation.setup
+    spans = _used(s.spans)
+    found = {
+        "clock": s.control.clock.view(np.ndarray),
+        "present": simulation.present,
+        "spans": spans,
+        "tile size": np.array([simulation.tiles.size]),
+        "shown": np.array([simulation.measured, simulation.mapped]),
+    }
+    for k, block in enumerate(s.blocks):
+        found |= {f"points/{k}/{name}": array for name, array in arrays_of(block.points)}
+        found |= {f"tiling/{k}/{name}": array for name, array in _tiles_in_use(block.tiling)}
+    nodes = _numbers(spans)
+    found |= {name: array[nodes] for name, array in _of_nodes(s)}
+    for k, rows in enumerate(_remembered(simulation, spans)):
+        found[f"contact/{k}"] = rows
+    return found
+
+
+def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
+    """Put a simulation into the state that `arrays_by_name` has given.
+
+    Raises
+    ------
+    ScriptError
+        If arrays are missing, or of another kind than those of this scene.
+    """
+    s = simulation.setup
+    if simulation.tiles.size != int(found["tile size"][0]):
+        simulation.tiles.lay(int(found["tile size"][0]))
+    blocks = tuple(
+        Block(
+            _points(block.points, found, f"points/{k}/"),
+            block.laws,
+            _tiling(simulation.tiles.empty_tiling(), found, f"tiling/{k}/"),
+        )
+        for k, block in enumerate(s.blocks)
+    )
+    spans = simulation.tiles.empty_spans()
+    _fill(spans, found, "spans")
+    s = simulation.setup = s._replace(blocks=blocks, spans=spans)
+    clock, before = s.control.clock, found["clock"]
+    if set(clock.dtype.names) != set(before.dtype.names):
+        raise _misfit("clock")
+    for name in clock.dtype.names:
+        clock[name] = before[name]
+    nodes = _numbers(_used(spans))
+    for name, array in _of_nodes(s):
+        array[nodes] = _checked(found, name, array[nodes])
+    for k, rows in enumerate(_remembered(simulation, _used(spans))):
+        rows[...] = _checked(found, f"contact/{k}", rows)
+    simulation.present[:] = _checked(found, "present", simulation.present)
+    simulation.measured, simulation.mapped = (bool(one) for one in found["shown"])
+
+
+def _used(spans: np.ndarray) -> np.ndarray:
+    return spans[: 1 + spans[0, 0]]
+
+
+def _numbers(spans: np.ndarray) -> np.ndarray:
+    """The numbers of the nodes in spans, of which the first row is the count."""
+    ranges = [np.arange(begin, end) for begin, end in spans[1:]]
+    return np.concatenate([np.empty(0, np.int64), *ranges])
+
+
+def _of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
+    for kind, nodes in (("nodes", s.nodes), ("heat", getattr(s.heat, "nodes", None))):
+        if nodes is None:
+            continue
+        for name in Nodes._fields[:-1]:
+            yield f"{kind}/{name}", getattr(nodes, name)
+        for one in nodes.fields:
+            yield f"{kind}/{name_of(type(one))}", one.array
+
+
+def _tiles_in_use(tiling: Tiling) -> Iterator[tuple[str, np.ndarray]]:
+    used = tiling.colour[-1]
+    yield "colour", tiling.colour
+    yield "range", tiling.range[:used]
+    yield "grid", tiling.grid[:used]
+
+
+def _tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:
+    for name in ("colour", "range", "grid"):
+        _fill(getattr(tiling, name), found, stem + name)
+    return tiling
+
+
+def _fill(array: np.ndarray, found: Mapping[str, np.ndarray], name: str) -> None:
+    """The first rows of `array` become those of the file."""
+    if name not in found or len(found[name]) > len(array):
+        raise _misfit(name)
+    array[: len(found[name])] = found[name]
+
+
+def _points(points: Points, found: Mapping[str, np.ndarray], stem: str) -> Points:
+    """Points in the order and number of the file, with arrays of their own."""
+    count = found.get(stem + "id", np.empty(0)).size
+
+    def take(name: str, like: np.ndarray) -> np.ndarray:
+        there = found.get(stem + name)
+        if there is None or there.dtype != like.dtype or there.shape[:-1] != like.shape[:-1]:
+            raise _misfit(f"{name} of points")
+        if there.shape[-1] != count:
+            raise _misfit(f"{name} of points")
+        return np.ascontiguousarray(there)
+
+    names = {name for name, _ in arrays_of(points)}
+    extra = [n for n in found if n.startswith(stem) and n.removeprefix(stem) not in names]
+    if extra:
+        raise _misfit(f"{extra[0].removeprefix(stem)} of points")
+    own = {
+        name: None if array is None else take(name, array)
+        for name, array in points._asdict().items()
+        if name != "fields"
+    }
+    declared = (type(one)(take(name_of(type(one)), one.array)) for one in points.fields)
+    return Points(**own, fields=tuple(declared))
+
+
+def _remembered(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:
+    method = simulation.hub.update.method
+    return method.remembered(simulation.setup.contact, spans[1:])
+
+
+def _checked(found: Mapping[str, np.ndarray], name: str, like: np.ndarray) -> np.ndarray:
+    there = found.get(name)
+    if there is None or there.shape != like.shape or there.dtype != like.dtype:
+        raise _misfit(name)
+    return there
+
+
+def _misfit(what: str) -> ScriptError:
+    return ScriptError(
+        f"its state is not one of this scene: {what}",
+        expected="a file that the same scene has written: the same solids, materials and method",
+    )

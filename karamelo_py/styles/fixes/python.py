@@ -1,0 +1,132 @@
+"""fix python: a function in Python acts on points or nodes."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, Literal
+
+import numpy as np
+
+from karamelo_py.kernels.hooks import ACTS_ON, STAGES
+from karamelo_py.kernels.p2g import Force
+from karamelo_py.language.faults import cause_of, told
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene.group import AnyGroup, NodeGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
+from karamelo_py.script.errors import ScriptError, nearest
+
+MOMENTS = tuple(STAGES)
+
+
+class PythonFunction:
+    """For signatures: a function of a module, or one that a program has given the scene."""
+
+    script_kind = "the name of a function: module.function"
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Callable:
+        """The function that `argument` names; modules beside the script come first."""
+        name = argument.words()
+        if name in hub.functions:
+            return hub.functions[name]
+        module, _, function = name.rpartition(".")
+        if not module:
+            raise ScriptError(
+                f"'{name}' names no module",
+                place=argument.place,
+                expected="module.function, of a module beside the script or an installed one",
+            )
+        sys.path.insert(0, str(hub.interpreter.folder.absolute()))
+        try:
+            found = import_module(module)
+        except Exception as error:  # a module may fail in any way
+            raise ScriptError(
+                f"the module {module} cannot be imported: {cause_of(error)}", place=argument.place
+            ) from error
+        finally:
+            sys.path.pop(0)
+        if not callable(getattr(found, function, None)):
+            known = [key for key, value in vars(found).items() if callable(value)]
+            close = nearest(function, known)
+            raise ScriptError(
+                f"the module {module} has no function '{function}'",
+                place=argument.place,
+                hint=f"did you mean '{module}.{close}'?" if close else None,
+            )
+        return getattr(found, function)
+
+
+class Python(Fix):
+    """Let a function in Python act on points or nodes in every step.
+
+    Parameters
+    ----------
+    group
+        Group of points or of nodes, or ``all``.
+    function
+        ``module.function``; the module lies beside the script or is installed.
+    moment
+        When in a step it is called: without a word ``initial_integrate`` for points, where
+        ``points.force`` takes forces, and ``post_update_grid_state`` for nodes, where
+        ``nodes.velocity_update`` takes velocities.
+
+    Notes
+    -----
+    The function is called with a view of the group: arrays with a row for each member (position,
+    velocity, mass, force ... of points; position, velocity, velocity_update, mass, force ... of
+    nodes), and dt and time. What it changes in them is taken over. What it returns is published: a
+    number as ID, up to three as ID_x, ID_y, ID_z. ``fix python`` of the page on plug-ins says more.
+
+    Every step comes back to Python for it, which takes some ten microseconds and the time of the
+    function. What the function itself remembers is not in files to go on from.
+
+    Example
+    -------
+    fix(spring, python, all, springs.pull)
+    fix(wall, python, nodes, walls.hold, post_update_grid_state)
+
+    See Also
+    --------
+    body_force, force_nodes, velocity_nodes
+    """
+
+    published = ("x", "y", "z", "")
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: AnyGroup,
+        function: PythonFunction,
+        moment: Literal[MOMENTS] | None = None,
+    ):
+        on_nodes = isinstance(group, NodeGroup)
+        if moment is None:
+            moment = "post_update_grid_state" if on_nodes else "initial_integrate"
+        if group.all and ACTS_ON[moment] == "nodes":
+            group, on_nodes = NodeGroup(hub, everything=True), True
+        if (ACTS_ON[moment] == "nodes") != on_nodes:
+            raise ScriptError(
+                f"{moment} is a moment of {ACTS_ON[moment]}, and '{group.id}' is a group of "
+                f"{group.kind}",
+                argument="moment",
+                expected="one of "
+                + ", ".join(m for m in MOMENTS if (ACTS_ON[m] == "nodes") == on_nodes),
+            )
+        super().__init__(hub, group)
+        self.function = function
+        self.point_fields = () if on_nodes else (Force,)
+        setattr(self, moment, self._act)
+
+    def _act(self, view: Any) -> None:
+        with told(f"fix {self.style}", self.function.__name__, self.function, self.place):
+            given = self.function(view)
+        if given is None:
+            return
+        numbers = np.asarray(given, float)
+        if numbers.ndim == 0:
+            self.publish("", numbers)
+        else:
+            self.publish_components(numbers)

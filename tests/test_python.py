@@ -1,0 +1,236 @@
+"""Scenes made in Python: the same numbers, messages and files as those of the command line."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from textwrap import dedent
+
+import numpy as np
+import pytest
+from scenes import block
+
+from comparisons.results import read_dump, read_log
+from karamelo_py import KarameloWarning, Simulation, SimulationError
+
+FLY = "fix(v, initial_velocity_particles, all, sin(9*x0), 0.1)"
+SET_UP = block(2, FLY, "compute(Ek, kinetic_energy, all)", "log_modify(custom, step, time, Ek)",
+               "N = 4", law="neo-hookean")  # fmt: skip
+HANGING = """
+fix(g, body_force, all, 0, -1)
+fix(pull, python, all, {module}.{function})
+compute(v, average_velocity, all)
+log_modify(custom, step, time, v_x, v_y, pull_x, pull_y)
+set_dt(0.001)
+run(4)
+"""
+
+
+@pytest.fixture
+def interpreted(tmp_path):
+    """Run Python code that compiles nothing, in a folder; returns what it prints."""
+
+    def run(code: str) -> str:
+        head = f"SCENE = {SET_UP!r}\nfrom karamelo_py import Simulation, SimulationError\n"
+        path = os.pathsep.join([str(Path(__file__).parent), os.environ["PYTHONPATH"]])
+        done = subprocess.run(
+            [sys.executable, "-W", "ignore:divide", "-W", "ignore:invalid", "-c",
+             head + dedent(code)],
+            cwd=tmp_path, capture_output=True, text=True, timeout=300,
+            env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
+
+
+def test_it_waits_in_front_of_a_run(interpreted, run_interpreted, tmp_path):
+    """In pieces, by the rest of the script, and two at the same time: the same bits."""
+    said = interpreted("""
+        import numpy as np
+        script = SCENE + "run(N)\\nprint(Ek)\\nrun(3)\\n"
+        one, other = Simulation(script), Simulation(script, out="files")
+        print(one.step, other.step, one.variables["N"])
+        one.run(2)
+        other.run()
+        one.run(5)
+        assert one.step == other.step == 7
+        for name in ("x", "vy", "s11"):
+            assert one.points[name].tobytes() == other.points[name].tobytes()
+        assert list(one.log) == ["Step", "Time", "Ek"]
+        assert (one.log["Step"] == np.arange(8)).all()
+        assert one.log.to_pandas()["Ek"].tolist() == one.log["Ek"].tolist()
+        assert one.values["Ek"] == one.evaluate("Ek") == one.log["Ek"][-1]
+        assert one.time == one.log["Time"][-1] == one.evaluate("time")
+        assert repr(one).startswith("<a script: 24 points, step 7")
+        long = Simulation(script, N=6)
+        long.run()
+        assert long.step == 9
+    """)
+    assert said == "0 0 4.0\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["files"]
+    by_hand = run_interpreted(SET_UP + "run(N)\nrun(3)\n", folder="run").folder
+    assert (by_hand / "log.mpm").read_bytes() == (tmp_path / "files/log.mpm").read_bytes()
+
+
+def test_commands_as_methods(interpreted, run_interpreted, tmp_path):
+    """Word for word the scene of a script; dumps and pictures go where `out` says."""
+    interpreted("""
+        sim = Simulation(out="files")
+        sim.method("ulmpm", "FLIP", "linear", 1)
+        sim.dimension(2, 0, 1.2, 0, 1.2, 0.1)
+        sim.region("box", "block", 0.3, 0.6, 0.3, 0.5)
+        sim.material("rubber", "neo-hookean", 2, 100, 0.3)
+        sim.solid("body", "region", "box", 2, "rubber", 0.1, 0)
+        sim.command("fix(v, initial_velocity_particles, all, sin(9*x0), 0.1)")
+        sim.compute("Ek", "kinetic_energy", "all")
+        sim.log_modify("custom", "step", "time", "Ek")
+        sim.dump("d", "all", "particle", 2, "d.*.txt", "x", "vy")
+        sim.run(4)
+        sim.fix("g", "body_force", "all", None, -9.81)
+        sim.run_time(0.01)
+        sim.write_restart("state.h5")
+        again = Simulation(SCENE)
+        again.read_restart("files/state.h5")
+        assert again.points["x"].tobytes() == sim.points["x"].tobytes()
+        assert again.step == sim.step and again.time == sim.time
+        picture = sim.show("vx", vmin=0, title="a block")
+        assert picture.png == picture._repr_png_() and picture.png[1:4] == b"PNG"
+        picture.save("shown.png")
+        assert sim.show().png != picture.png
+    """)
+    text = SET_UP.replace("N = 4", "dump(d, all, particle, 2, d.*.txt, x, vy)")
+    text += "run(4)\nfix(g, body_force, all, NULL, -9.81)\nrun_time(0.01)\n"
+    by_hand = run_interpreted(text, folder="run").folder
+    files = {path.name: path.read_bytes() for path in by_hand.iterdir() if path.suffix != ".script"}
+    assert len(files) > 3
+    for name, content in files.items():
+        assert (tmp_path / "files" / name).read_bytes() == content
+
+
+def test_functions_in_python(interpreted):
+    """A force of the weight is the weight; a velocity that nodes are given is kept."""
+    interpreted("""
+        import numpy as np
+        text = SCENE.replace("initial_velocity_particles, all, sin(9*x0), 0.1",
+                             "body_force, all, 0, -2")
+        weight, ours = Simulation(text), Simulation(text.replace("fix(v", "#"))
+
+        def pull(points):
+            points.force[:, 1] -= 2*points.mass
+            return points.force.sum(axis=0)
+
+        ours.fix("pull", "python", "all", pull)
+        for sim in (weight, ours):
+            sim.set_dt(0.001)
+            sim.run(5)
+        assert np.allclose(weight.points["vy"], ours.points["vy"], rtol=1e-12, atol=1e-15)
+        # rho 2, 0.3 by 0.2, g 2
+        assert abs(ours.values["pull_y"] + 0.24) < 1e-14
+
+        def hold(nodes):
+            nodes.velocity_update[:] = [0.5, 0.0]
+            return 3.0
+
+        ours.fix("hold", "python", "all", hold, "post_update_grid_state")
+        ours.run(1)
+        nodes = ours.nodes["mass"] > 0
+        assert (ours.nodes["vx_update"][nodes] == 0.5).all() and ours.values["hold"] == 3
+    """)
+
+
+def test_a_function_of_a_module(run_interpreted, tmp_path):
+    """fix python in a script, whose module lies beside it."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "ropes.py").write_text(
+        "def pull(points):\n    points.force[:, 1] += points.mass\n    return points.force.sum(0)\n"
+    )
+    script = block(2, HANGING.format(module="ropes", function="pull"))
+    log = run_interpreted(script).log
+    assert log.v_y == pytest.approx(np.zeros(5), abs=1e-15)
+    assert log.pull_y[1:] == pytest.approx(np.full(4, 0.12), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("ropes.pul", "did you mean 'ropes.pull'?"),
+        ("rops.pull", "the module rops cannot be imported"),
+        ("pull", "'pull' names no module"),
+        ("ropes.pull, final", "one of post_particles_to_grid"),
+        ("ropes.broken", "ZeroDivisionError: division by zero (ropes.py:4)"),
+        ("ropes.pull", "the method has to be thermo-mechanical"),
+    ],
+)
+def test_functions_with_faults(run_interpreted, tmp_path, line, says):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "ropes.py").write_text(
+        "def pull(points):\n    return points.heat_supply\n\ndef broken(points): return 1/0\n"
+    )
+    result = run_interpreted(block(2, f"fix(p, python, all, {line})", "run(1)"), status=1)
+    assert says in result.err
+
+
+def test_errors_carry_message_and_place(tmp_path, capsys):
+    """The same text as on the command line, and its parts."""
+    from karamelo_py.app.cli import main
+
+    text = "dimension(2, 0, 1, 0, 1, 0.1)\nregion(box, blok, 0, 1, 0, 1)\n"
+    path = tmp_path / "in.wrong"
+    path.write_text(text)
+    assert main([str(path)]) == 1
+    said = capsys.readouterr().err.strip()
+    with pytest.raises(SimulationError) as caught:
+        Simulation(path)
+    assert str(caught.value) == said
+    assert (caught.value.place.line, caught.value.place.column) == (2, 13)
+    sim = Simulation("method(ulmpm, PIC, linear)\ndimension(2, 0, 1, 0, 1, 0.1)\n")
+    with pytest.raises(SimulationError, match="unknown region 'box'") as caught:
+        sim.solid("s", "region", "box", 2, "m", 0.1)
+    assert caught.value.place.text == "solid(s, region, box, 2, m, 0.1)"
+    with pytest.raises(SimulationError, match="there is no solid to move"):
+        sim.run(3)
+    with pytest.raises(SimulationError, match="there is no rest of a script"):
+        sim.run()
+    with pytest.raises(SimulationError, match=r"there is no file .*in\.wrnog.*\n.*\n.*in\.wrong"):
+        Simulation(tmp_path / "in.wrnog")
+    with pytest.raises(AttributeError, match="did you mean 'solid'"):
+        sim.solidd()
+    with pytest.raises(KeyError, match="did you mean 's1"):
+        sim.points["s1"]
+    with pytest.raises(TypeError, match="is no number"):
+        sim.region("box", "block", [0, 1])
+    with pytest.warns(KarameloWarning, match="has no effect"):
+        sim.command("dt_factor(0.5)\nset_dt(0.1)")
+
+
+def test_two_in_one_folder(tmp_path):
+    """They are told; when the first is closed, or gone, the second may."""
+    first = Simulation(out=tmp_path / "files")
+    with pytest.raises(SimulationError, match="another simulation writes to"):
+        Simulation(out=tmp_path / "files")
+    first.close()
+    with Simulation(out=tmp_path / "files"):
+        pass
+    Simulation(out=tmp_path / "files")
+    Simulation(out=tmp_path / "files")
+
+
+@pytest.mark.xdist_group("neo-hookean")
+def test_compiled(tmp_path, monkeypatch, capsys):
+    """As by the command line, with the loops that other tests compile."""
+    from karamelo_py.app.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    text = SET_UP + "dump(d, all, particle, 20, d.*.txt, x, vy)\nrun(20)\n"
+    Path("in.block").write_text(text)
+    assert main(["in.block"]) == 0
+    sim = Simulation("in.block")
+    sim.run()
+    assert sim.log["Ek"] == pytest.approx(read_log(Path("log.mpm")).Ek, rel=1e-9)
+    [last] = read_dump(Path("d.20.txt"))
+    assert sim.points["vy"] == pytest.approx(last.vy, rel=1e-5)
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,488 @@
+"""A run that goes on from a file is the one that was never interrupted: the same bits.
+
+Nothing here compares with a formula; the other tests do.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from itertools import product
+from pathlib import Path
+from textwrap import dedent
+
+import h5py
+import numpy as np
+import pytest
+from combinations import BASES, MESHED, SCHEMES, TRANSFERS, fits, refused, scene, write_mesh
+from scenes import block
+from test_boundary import thrown
+from test_contact_grid import bars
+from test_contact_points import bodies
+from test_heat import HOT, slab
+from test_laws_scripts import ALL, pulled
+
+EVERY = "restart(2, r.*.h5)\n"
+
+
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    """All that a file in HDF5 holds, by name."""
+    found = {}
+
+    def keep(name, item):
+        if isinstance(item, h5py.Dataset):
+            found[name] = item[()]
+
+    with h5py.File(path, swmr=True) as root:
+        root.visititems(keep)
+    return found
+
+
+def same_files(one: Path, other: Path) -> None:
+    """Two folders hold the same: files of HDF5 the same numbers, others the same bytes."""
+    names = {path.name for path in one.iterdir()} - {"out"}
+    assert names == {path.name for path in other.iterdir()} - {"out"}
+    for name in names:
+        a, b = one / name, other / name
+        if a.suffix != ".h5":
+            assert a.read_bytes() == b.read_bytes(), name
+            continue
+        mine, theirs = arrays(a), arrays(b)
+        assert mine.keys() == theirs.keys()
+        for key in mine:
+            assert mine[key].tobytes() == theirs[key].tobytes(), (name, key)
+
+
+def with_files(script: str, line: str = EVERY) -> str:
+    """A script that writes files to go on from, from its first run on."""
+    text, count = re.subn("^run", f"{line}run", dedent(script), count=1, flags=re.M)
+    assert count
+    return text
+
+
+def goes_on(run, script: str, *, files: int = 1) -> Path:
+    """Run a script, and once more from some of the files that it wrote; all is the same."""
+    whole = run(script, folder="whole").folder
+    written = sorted(whole.glob("r.*.h5"), key=lambda path: int(path.name.split(".")[1]))
+    assert len(written) > 1
+    for file in written[: -1 : max(1, (len(written) - 1) // files)][:files]:
+        again = whole.with_name("again")
+        shutil.rmtree(again, ignore_errors=True)
+        shutil.copytree(whole, again)
+        said = run(script, "-restart", file.name, folder="again")
+        assert "gone on with at step" in said.out
+        same_files(whole, again)
+    return whole
+
+
+# --- every way to compute -----------------------------------------------------------------------
+
+WAYS = list(product(TRANSFERS, SCHEMES))
+
+
+def ways() -> list[tuple]:
+    """Every base, transfer and scheme, each of them in some scene."""
+    found = []
+    for k, base in enumerate(BASES):
+        possible = [way for way in WAYS if not refused(*base, *way)]
+        kinematics = ("line", "plane", "axisymmetric", "space")
+        those = [one for one in kinematics if fits(one, base[2])]
+        found.append((those[k % len(those)], *base, *possible[5 * k % len(possible)]))
+    return found
+
+
+def test_the_ways_are_all_there():
+    for place, names in ((4, TRANSFERS), (5, SCHEMES)):
+        assert {way[place] for way in ways()} == set(names)
+
+
+@pytest.mark.parametrize("way", ways(), ids=lambda way: " ".join(filter(None, way)))
+def test_every_way(run_interpreted, tmp_path, way):
+    """Methods, bases, transfers, schemes and kinematics."""
+    option = way[3]
+    mesh = write_mesh(tmp_path / "m.vtk", MESHED[option]) if option in MESHED else None
+    goes_on(run_interpreted, with_files(scene(*way, mesh=mesh, steps=4)))
+
+
+RUBBING = bars(
+    0.0, "fix(rub, contact/friction, a, b, 0.3)", "log_modify(custom, step, rub_x, va_x)",
+    "fix(slide, initial_velocity_particles, b, -0.1, 0.3)", "run(6)", d=2, scheme="usavg", v=2,
+)  # fmt: skip
+TOOLS = (
+    "fix(F, indent/minimize_penetration, all, sphere, 0.1, 0.45, 0.55, 0, 3, 0, 0, 0.2)",
+    "fix(W, contact/minimize_penetration/plane, body, 0.32, 0, 0, 1, 0, 0, 0.3)",
+    "fix(I, indent, all, sphere, 500, 0.13, 0.45, 0.55, 0)",
+    "log_modify(custom, step, F_x, W_x, I_y)", "set_dt(0.001)", "run(6)",
+)  # fmt: skip
+GROUPS = """\
+region(low, block, 0.3, 0.3, 0.3, 0.5)
+group(low, nodes, region, low, all)
+group(half, particles, region, box, solid, body)
+fix(hold, velocity_nodes, low, 0.1*time, 0)
+fix(g, body_force, all, 0, -1)
+fix(push, force_nodes, low, 1, 0)
+fix(check, check_solution, all, 0.1*time*x0, 0)
+fix(v, initial_velocity_particles, all, sin(9*x0), 0)
+compute(R, reaction, low)
+compute(L, angular_momentum, all)
+compute(P, linear_momentum, all)
+compute(E, energy_balance, all)
+compute(err, error, all, ux, 0.1*time*x0, L2)
+compute(p, probe, all, x, point=3)
+pull = internal_force(half, x) + external_force(low, x)
+log_modify(custom, step, dt, R_x, L_drift, P_drift, E_drift, err_history, err_max, p, check_z, pull)
+set_output(time(0.004))
+plot(e, 2, time, E)
+save_plot(e.svg)
+"""
+SCENES = {
+    "friction": RUBBING,
+    "points that touch": bodies(
+        -0.01, "contact/minimize_penetration, a, b, 0.2", "log_modify(custom, step, c_x)", "run(6)",
+        d=2, n=2,
+    ),
+    "Hertz": bodies(
+        -0.01, "contact/hertz, a, b", "log_modify(custom, step, c_x)", "run(6)", d=2, n=2
+    ),
+    "heat": slab(HOT.format("301 + time"), ", hot_s", "run(6)"),
+    "heat in the total frame": slab(HOT.format(301), ", hot_s", "run(6)").replace(
+        'kind = "ulmpm"', 'kind = "tlmpm"'
+    ),
+    "metal": pulled(ALL).replace("run(50)", "run(6)"),
+    "anti locking": block(
+        2, "anti_volumetric_locking(true)", "fix(v, initial_velocity_particles, all, sin(9*x0), 0)",
+        "run(6)",
+    ),
+    "single": "precision(single)\n" + block(
+        2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "run(6)"
+    ),
+    "deleted": thrown(2, "delete", "run(8)", "run(22)"),
+    "reflected": thrown(2, "reflect", "run(8)", "run(22)"),
+    "tools": block(2, *TOOLS),
+    "groups": block(2, GROUPS, "run(7)"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_part(run_interpreted, name):
+    """Contact, heat, damage, edges, tools, computes that look back."""
+    goes_on(run_interpreted, with_files(SCENES[name]), files=3)
+
+
+OUTPUTS = """\
+dump(d1, all, particle, 2, all.txt, x, y, s11)
+dump(d2, all, particle/gz, 2, all.gz, x, y, s11)
+dump(d3, all, particle/bin, 3, all.bin, x, y)
+dump(d4, all, hdf5, time(0.01), points.h5, x, y, s11)
+dump(d5, all, grid/hdf5, 3, nodes.h5, vx, mass, occupied=true)
+dump(d6, all, vtk, 4, p.*.vtu, vx)
+dump(d7, all, movie, 3, m.gif, 300, 300, vx)
+dump(d8, all, grid, 3, g.*.txt, vx, fx, mass)
+"""
+
+
+def test_outputs_go_on_in_their_files(run_interpreted):
+    """Also from a file of a run that was over, or between two runs; values are those read then."""
+    fly = "fix(v, initial_velocity_particles, all, sin(9*x0), 0)"
+    lines = ["compute(E, energy_balance, all)", "log_modify(custom, step, time, E)", "run(5)",
+             "E0 = value(E_total)", "run_time(0.03*E0/E0)", "write_restart(w.h5)",
+             "fix(g, body_force, all, E0, 0)", "run_while(time < 0.12)"]  # fmt: skip
+    script = with_files(block(2, fly, OUTPUTS, *lines, size=(0.2, 0.1)))
+    whole = goes_on(run_interpreted, script, files=9)
+    again = whole.with_name("between")
+    shutil.copytree(whole, again)
+    run_interpreted(script, "-restart", "w.h5", folder="between")
+    same_files(whole, again)
+
+
+def test_another_number_of_threads(tmp_path):
+    """One thread writes, two go on; compiled, with the loops of test_identical.py."""
+    from test_identical import crossing
+
+    script = tmp_path / "in.script"
+    script.write_text(with_files(crossing(2, "run(60)"), "restart(25, r.*.h5)\n"))
+    folders = []
+    for threads in (1, 2):
+        folder = tmp_path / f"with{threads}"
+        if folders:
+            shutil.copytree(folders[0], folder)
+        else:
+            folder.mkdir()
+        folders.append(folder)
+        restart = ["-restart", "r.25.h5"] if threads == 2 else []
+        subprocess.run(
+            [sys.executable, "-m", "karamelo_py.app.cli", "../in.script", "--threads",
+             str(threads), *restart], cwd=folder, check=True, capture_output=True,
+        )  # fmt: skip
+    same_files(*folders)
+
+
+test_another_number_of_threads = pytest.mark.xdist_group("identical")(
+    test_another_number_of_threads
+)
+
+
+# --- scripts ------------------------------------------------------------------------------------
+
+FLY = block(2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "set_dt(0.001)", "run(4)",
+            size=(0.2, 0.1))  # fmt: skip
+
+
+def test_a_longer_run_with_other_steps(run_interpreted):
+    """What may be another: the length of the last run, the step, outputs."""
+    folder = run_interpreted(with_files(FLY)).folder
+    text = FLY.replace("run(4)", "dump(d, all, particle, 1, d.*.txt, x)\nrun(6)")
+    text = text.replace("set_dt(0.001)", "set_dt(0.0005)")
+    result = run_interpreted(text, "-restart", "r.*.h5")
+    assert result.log.Step.tolist() == [0, 1, 2, 3, 4, 5, 6]
+    assert result.log.dt[-1] == 0.0005
+    assert result.log.Time[-1] == pytest.approx(0.005, rel=1e-12)
+    assert [path.name for path in sorted(folder.glob("d.*"))] == ["d.5.txt", "d.6.txt"]
+
+
+def test_variables_of_the_command_line(run_interpreted):
+    """They are those of the file; others are an error."""
+    text = with_files("n = 4\n" + FLY.replace("run(4)", "run(n)"))
+    run_interpreted(text, "-var", "n", "6")
+    assert run_interpreted(text, "-restart", "r.2.h5").log.Step[-1] == 6
+    result = run_interpreted(text, "-restart", "r.2.h5", "-var", "n", "5", status=1)
+    assert "was written with -var n 6, not 5" in result.err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("100, 0.3", "100, 0.2", "there this statement was material(rubber,linear,2,100,0.3)"),
+        ("run(4)", "", "this one ends before"),
+        ("run(4)", "region(r, block, 0, 1, 0, 1)", "there a run stood here"),
+        ("FLIP, linear, 1", "FLIP, linear, 0.9", "there this statement was method("),
+    ],
+)
+def test_another_script(run_interpreted, old, new, says):
+    run_interpreted(with_files(FLY))
+    text = FLY.replace(old, new)
+    result = run_interpreted(text, "-restart", "r.2.h5", status=1)
+    assert "r.2.h5 was written by another script" in result.err
+    assert says in result.err
+    assert result.err.count("error:") == 1
+
+
+def test_the_state_alone(run_interpreted):
+    """read_restart in a script of its own: the same bits as a run in two pieces."""
+    set_up, _, _ = FLY.partition("run(4)")
+    run_interpreted(set_up + "run(2)\nwrite_restart(w.h5)\nrun(2)\nwrite_restart(end.h5)\n")
+    text = set_up + "read_restart(w.h5)\nrun(2)\nwrite_restart(again.h5)\n"
+    result = run_interpreted(text)
+    assert result.log.Step.tolist() == [2, 3, 4]
+    one, other = arrays(result.folder / "end.h5"), arrays(result.folder / "again.h5")
+    for name, array in one.items():
+        if name.startswith("state/"):
+            assert array.tobytes() == other[name].tobytes(), name
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("method(ulmpm", "method(tlmpm", "FLIP (alpha 1) linear musl; here it is tlmpm"),
+        ("box, 2, rubber", "box, 1, rubber", "solid 'body' 8 points of LinearElastic"),
+        ("0, 1.2, 0.1)", "0, 1.3, 0.1)", "domain 2"),
+        ("block, 0.3, 0.5,", "block, 0.35, 0.55,", "other points in solid 'body'"),
+        ("solid(body", "solid(other", "solid 'body', which is not here"),
+        ("rubber, linear, 2, 100", "rubber, neo-hookean, 2, 100", "points of LinearElastic"),
+    ],
+)  # fmt: skip
+def test_another_scene(run_interpreted, old, new, says):
+    set_up, _, _ = FLY.partition("run(4)")
+    run_interpreted(set_up + "run(2)\nwrite_restart(w.h5)\n")
+    assert old in set_up
+    text = set_up.replace(old, new) + "read_restart(w.h5)\nrun(2)\n"
+    result = run_interpreted(text, status=1)
+    assert "w.h5 was written by another scene" in result.err
+    assert says in result.err
+    assert "read_restart(w.h5)" in result.err
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no HDF5", "other HDF5", "version 2", "half"])
+def test_no_file_to_go_on_from(run_interpreted, content):
+    folder = run_interpreted(with_files(FLY)).folder
+    path = folder / "bad.h5"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content == "other HDF5":
+        h5py.File(path, "w").close()
+    elif content == "half":
+        whole = (folder / "r.2.h5").read_bytes()
+        path.write_bytes(whole[: len(whole) // 2])
+    elif content:
+        shutil.copy(folder / "r.2.h5", path)
+        with h5py.File(path, "r+") as file:
+            file.attrs["version"] = 2
+    result = run_interpreted(FLY, "-restart", "bad.h5", status=1)
+    says = "has version 2" if content == "version 2" else "is no file that this program can go on"
+    assert says in result.err
+    assert result.err.count("error:") == 1
+    assert (folder / "log.mpm").read_text().count("\n") == 6  # nothing was begun anew
+
+
+def test_files_that_are_gone_begin_anew(run_interpreted):
+    """Where the files of the run before are not, those of this one begin, and it is said."""
+    text = FLY.replace("run(4)", OUTPUTS + "run(4)")
+    folder = run_interpreted(with_files(text)).folder
+    (folder.parent / "elsewhere").mkdir()
+    shutil.copy(folder / "r.2.h5", folder.parent / "elsewhere")
+    result = run_interpreted(text, "-restart", "r.2.h5", folder="elsewhere")
+    assert result.err.count("it begins anew") == 6
+    assert result.log.Step.tolist() == [3, 4]
+    assert h5py.File(result.folder / "nodes.h5")["step"][:].tolist() == [3, 4]
+
+
+def test_what_cannot_be_written_is_told(run_interpreted):
+    says = "there is nothing to write yet"
+    assert says in run_interpreted("write_restart(w.h5)\n", status=1).err
+    assert "a file is missing" in run_interpreted("restart(5)\n", status=1).err
+    assert "there is no scene yet" in run_interpreted("read_restart(w.h5)\n", status=1).err
+    assert not list(run_interpreted(FLY.replace("run", "restart(0)\nrun")).folder.glob("*.h5"))
+
+
+# --- parts of other packages --------------------------------------------------------------------
+
+
+# Prints what is forgotten: in an interpreter of its own, which compiles nothing.
+WATCH = """
+import numpy as np
+from test_restart import OUTPUTS, SCENES, block
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.run.memory import remembered
+from karamelo_py.scene.hub import Hub
+
+PLAIN = (int, float, str, bool, list, dict, np.ndarray, type(None))
+fly = "fix(v, initial_velocity_particles, all, sin(9*x0), 0)"
+scenes = {**SCENES, "outputs": block(2, fly, OUTPUTS, "run(5)", size=(0.2, 0.1))}
+for name, script in scenes.items():
+    hub = Hub(Console(quiet=True))
+    Interpreter(hub)
+    before = []
+    rehearse = hub.rehearse
+
+    def look():
+        if not hub.rehearsed:
+            parts = [*hub.fixes.values(), *hub.computes.values(), *hub.dumps.values()]
+            before.extend((part, {k: repr(v) for k, v in vars(part).items()}) for part in parts)
+        rehearse()
+
+    hub.rehearse = look
+    hub.interpreter.run_text(script)
+    assert before
+    for part, old in before:
+        for key, value in vars(part).items():
+            if isinstance(value, PLAIN) and key not in remembered(part):
+                if repr(value) != old.get(key):
+                    print("forgotten", name, type(part).__name__, key)
+print("done")
+"""
+
+
+def test_all_that_changes_is_remembered(tmp_path):
+    """What parts keep in plain attributes, and a run changes, they name in `remembers`."""
+    path = os.pathsep.join([str(Path(__file__).parent), os.environ["PYTHONPATH"]])
+    said = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", WATCH], cwd=tmp_path, capture_output=True, text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path},
+    )  # fmt: skip
+    *found, last = said.stdout.splitlines() or [""]
+    assert last == "done", said.stderr
+    forgotten = {tuple(line.split()[-2:]) for line in found}
+    # What is made anew whenever it is needed.
+    assert forgotten <= {("GridHdf5", "_rows"), ("ContactHertz", "_total")}, found
+
+
+# --- killed -------------------------------------------------------------------------------------
+
+LONG = block(
+    2, "fix(v, initial_velocity_particles, all, 0.1*sin(9*x0), 0)", "set_output(20)",
+    "compute(E, energy_balance, all)", "log_modify(custom, step, time, E, E_drift)",
+    "dump(d1, all, particle, 50, all.txt, x, y, s11)", "dump(d2, all, hdf5, 50, p.h5, x, s11)",
+    "dump(d3, all, particle/gz, 100, d.*.gz, x)", "set_dt(0.0001)", "restart(40, r.h5)", "run({})",
+    law="neo-hookean", size=(0.2, 0.1),
+)  # fmt: skip
+STEPS = 6000
+
+
+def started(folder: Path, *options: str) -> subprocess.Popen:
+    folder.mkdir(exist_ok=True)
+    (folder / "in.script").write_text(LONG.format(STEPS), encoding="utf-8")
+    return subprocess.Popen(
+        [sys.executable, "-m", "karamelo_py.app.cli", "in.script", *options],
+        cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows ends processes otherwise")
+@pytest.mark.xdist_group("neo-hookean")
+@pytest.mark.parametrize("kills", [3, pytest.param(100, marks=pytest.mark.full)])
+def test_killed_at_any_moment(tmp_path, kills):
+    """SIGKILL: every file is readable, and what goes on is as if nothing had happened."""
+    whole = tmp_path / "whole"
+    assert started(whole).wait(timeout=300) == 0
+    folder = tmp_path / "killed"
+    restart: list[str] = []
+    chance = random.Random(kills)
+    killed = 0
+    while True:
+        process = started(folder, *restart)
+        if killed < kills:
+            begun = (folder / "log.mpm").stat().st_mtime_ns if (folder / "log.mpm").exists() else 0
+            for _ in range(3000):
+                log = folder / "log.mpm"
+                if (log.exists() and log.stat().st_mtime_ns != begun) or process.poll() is not None:
+                    break
+                time.sleep(0.01)
+            time.sleep(chance.uniform(0, 0.6))
+            process.kill()
+            killed += 1
+        process.wait(timeout=300)
+        process.communicate()
+        if (folder / "r.h5").exists():
+            restart = ["-restart", "r.h5"]
+            json.loads(arrays(folder / "r.h5")["content"].tobytes())
+        if (folder / "log.mpm").exists():
+            lines = (folder / "log.mpm").read_text().splitlines()
+            assert all(len(line.split()) == 4 for line in lines)
+        if (folder / "p.h5").exists():
+            assert len(arrays(folder / "p.h5")["step"]) > 0
+        if process.returncode == 0:
+            break
+        assert process.returncode == -signal.SIGKILL
+    for rest in folder.glob("*.part"):
+        rest.unlink()
+    same_files(whole, folder)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+@pytest.mark.xdist_group("neo-hookean")
+def test_signals_of_batch_systems(tmp_path, name):
+    """As Ctrl-C: the last state, whole files, 128 + the number; and the run can go on."""
+    number = getattr(signal, name)
+    process = started(tmp_path / "run")
+    for _ in range(3000):
+        if (tmp_path / "run" / "d.100.gz").exists() or process.poll() is not None:
+            break
+        time.sleep(0.02)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=120)
+    assert process.returncode == 128 + number, err
+    assert "Traceback" not in err
+    assert "interrupted: the log and the dumps are complete" in err
+    folder = tmp_path / "run"
+    last = h5py.File(folder / "r.h5").attrs["step"]
+    assert (folder / "log.mpm").read_text().splitlines()[-1].split()[0] == str(last)
+    assert (folder / f"d.{last}.gz").exists()
