@@ -161,7 +161,7 @@ def test_a_stretched_bar_breaks_without_reason(run):
     cell, which is pulled, drags its neighbour less than it should), and distances grow alike.
     """
     broken = run("numerical_fracture")
-    assert np.abs(broken.log.stress[-1]) < 0.05 * broken.log.exact[-1]
+    assert np.abs(broken.log.stress[-1]) < 0.2 * broken.log.exact[-1]
     assert gaps(broken).max() > 3 * np.median(gaps(broken))
     whole = run("numerical_fracture", cure=1)
     assert whole.log.stress[5:] == pytest.approx(whole.log.exact[5:], rel=0.15)
