@@ -169,7 +169,7 @@ def _tried(lines, dimension, folder):
                 interpreter.run_text(f"solid({solid}, region, disk, 2, steel, {h}, 0)")
             interpreter.run_text(line)
             continue
-        kind = "nodes" if words[2] in ("body_force",) or "_nodes" in words[2] else "particles"
+        kind = "nodes" if words[2] in ("body_force",) or "_nodes" in line else "particles"
         if words[0] in ("fix", "compute") and words[3] not in ("all", "v_x"):
             interpreter.run_text(f"group({words[3]}, {kind}, region, wall, all)")
         if words[2] in ("union", "intersection", "difference"):

@@ -86,7 +86,7 @@ class Python(Fix):
     Example
     -------
     fix(spring, python, all, springs.pull)
-    fix(wall, python, nodes, walls.hold, post_update_grid_state)
+    fix(wall, python, wall_nodes, walls.hold, post_update_grid_state)
 
     See Also
     --------
