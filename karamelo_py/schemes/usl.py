@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.nodes import UpdateToVelocity
 from karamelo_py.kernels.step import ACCELERATE, MOVE, SERIES, SUMS, light_node
 from karamelo_py.kernels.table import AtPoints, Gather, Nodes
 
@@ -39,3 +41,27 @@ class USL(NamedTuple):
         Gather(Strain()),
         AtPoints(FINAL_INTEGRATE, 1),
     )
+
+
+@shared
+def any_node(s):
+    """The nodal mass below which this form limits the gradient: none."""
+    return UpdateToVelocity(real(0, s.nodes.sums[0, MASS]))
+
+
+any_node.goes_through = UpdateToVelocity.goes_through
+
+
+class USLUnlimited(NamedTuple):
+    """As usl, without the limit at nodes with next to no mass: as first published.
+
+    A point that has just entered a cell gives the node ahead little mass and much force, and gets
+    the strain of f dt / m from there. To show what the limit is for.
+
+    Example
+    -------
+    scheme(usl/unlimited)
+    """
+
+    courant = USL.courant
+    rows = tuple(Nodes(any_node) if row == Nodes(light_node) else row for row in USL.rows)
