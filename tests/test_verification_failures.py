@@ -70,9 +70,7 @@ def test_boxes_that_tile_the_bar_have_no_false_forces(run, basis):
     assert np.abs(crossing_forces(run, basis=basis)).max() < 1e-9
 
 
-@pytest.mark.parametrize(
-    ("cure", "most"), [({"cure": 1}, 0.1), ({"basis": "cubic-spline"}, 0.02)]
-)
+@pytest.mark.parametrize(("cure", "most"), [({"cure": 1}, 0.1), ({"basis": "cubic-spline"}, 0.02)])
 def test_splines_have_small_false_forces_without_jumps(run, cure, most):
     """The gradient is continuous: from place to place, 0.02 cells on, it changes by little.
 
@@ -166,7 +164,7 @@ def test_a_stretched_bar_breaks_without_reason(run):
     assert np.abs(broken.log.stress[-1]) < 0.05 * broken.log.exact[-1]
     assert gaps(broken).max() > 3 * np.median(gaps(broken))
     whole = run("numerical_fracture", cure=1)
-    assert whole.log.stress[1:] == pytest.approx(whole.log.exact[1:], rel=0.13)
+    assert whole.log.stress[5:] == pytest.approx(whole.log.exact[5:], rel=0.15)
     assert gaps(whole)[:-2] == pytest.approx(np.full(5, 3.0), rel=0.15)
 
 
@@ -434,12 +432,12 @@ def test_hoop_strain_is_the_radial_one_up_to_the_axis(run_interpreted, basis):
 
 
 def test_the_jaumann_rate_swings_in_shear(run):
-    """Dienes 1979: mu sin(gamma), and mu gamma for neo-Hookean, to first order in steps of 0.01."""
+    """Dienes 1979: mu sin(gamma), and mu gamma for neo-Hookean, to first order in steps of 0.02."""
     log = run("jaumann").log
-    assert log.stress == pytest.approx(np.sin(log.strain), abs=0.02)
+    assert log.stress == pytest.approx(np.sin(log.strain), abs=0.03)
     assert log.stress.min() < -0.9
     log = run("jaumann", cure=1).log
-    assert log.stress == pytest.approx(log.strain, rel=5e-3)
+    assert log.stress == pytest.approx(log.strain, rel=0.01)
 
 
 def test_water_does_not_hold_unless_it_is_told_to(run):

@@ -254,12 +254,12 @@ def reason_in(complaint: str) -> str:
     return lines[-1].strip() if lines else "ended without a message"
 
 
-def read_log(folder: Path) -> dict[str, np.ndarray]:
-    """The columns of log.mpm in a folder; where they change between runs, all rows of a column."""
+def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
+    """The columns of a log in a folder; where they change between runs, all rows of a column."""
     columns: dict[str, list[float]] = {}
     names: list[str] = []
     try:
-        lines = (folder / "log.mpm").read_text(encoding="utf-8").splitlines()
+        lines = (folder / name).read_text(encoding="utf-8").splitlines()
     except OSError:
         return {}
     for k, line in enumerate(lines):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies import pictures, records
+from karamelo_py.app.studies import histories, pictures, records
 from karamelo_py.app.studies.curves import Family, missing, order
 from karamelo_py.app.studies.options import new_parser, out_file
 from karamelo_py.app.studies.study import shown, terminal
@@ -21,7 +21,8 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
   karamelo-py chart sweep.csv -accuracy err -cost seconds -by basis,transfer -o chart.png
   karamelo-py chart sweep.csv -accuracy err -x N -o orders.svg       errors over a variable
   karamelo-py chart sweep.csv -accuracy err -heat N,ppc -o heat.pdf  over two variables
-  karamelo-py chart sweep.csv -accuracy err -o chart.html            a page of runs"""
+  karamelo-py chart sweep.csv -accuracy err -o chart.html            a page of runs
+  karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs"""
 SUFFIXES = (".png", ".svg", ".pdf", ".html")
 
 
@@ -29,12 +30,21 @@ def add_parser(subparsers: Any) -> None:
     """The subcommand for the command line."""
     parser = new_parser(subparsers, "chart", "draw a table of runs", DESCRIPTION, run)
     parser.add_argument("table", type=Path, help="what karamelo-py sweep has written")
-    parser.add_argument("-accuracy", required=True, metavar="COLUMN", help="the error")
+    wanted = parser.add_mutually_exclusive_group(required=True)
+    wanted.add_argument("-accuracy", metavar="COLUMN", help="the error")
+    wanted.add_argument(
+        "-curve",
+        metavar="COLUMN",
+        help="a log column, a curve for each run, over -x (Time)",
+    )
     parser.add_argument("-cost", default="seconds", metavar="COLUMN", help="the cost (seconds)")
     parser.add_argument("-by", default="", metavar="A,B", help="variables that tell lines apart")
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("-x", metavar="NAME", help="errors over this variable, not over cost")
     kinds.add_argument("-heat", metavar="A,B", help="errors over two variables, as colours")
+    parser.add_argument("-exact", metavar="COLUMN", help="of -curve: the exact log column")
+    parser.add_argument("-names", default="", help="of -curve: what to call the runs, with commas")
+    parser.add_argument("-log", default="log.mpm", metavar="FILE", help="of -curve: another log")
     parser.add_argument("-where", action="append", default=[], help="rows that fulfil a condition")
     parser.add_argument("-title", help="heads the chart (the name of the script)")
     parser.add_argument("-o", type=Path, help="the picture or page: " + ", ".join(SUFFIXES))
@@ -57,6 +67,8 @@ def run(options: Any) -> int:
     if not rows:
         raise ScriptError("no row fulfils -where " + " and ".join(options.where))
     by = [name.strip() for name in options.by.split(",") if name.strip()]
+    if options.curve:
+        return curves(options, rows, by or variables, made)
     family = Family(rows, variables, options.accuracy, options.cost, by, options.x)
     if len(family.without) == len(rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
@@ -83,6 +95,31 @@ def run(options: Any) -> int:
         pictures.heat(family, rows, *axes, out, title)
     else:
         pictures.lines(family, out, convergence=bool(options.x), title=title)
+    print(f"drawn: {out}")
+    return 0
+
+
+def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
+    """Draw a column of the logs, a curve for each run."""
+    out = out_file(options.o or Path("curves.png"), *SUFFIXES[:-1])
+    differing = [name for name in by if len({row[name] for row in rows}) > 1]
+    over = options.x or "Time"
+    names = [name.strip() for name in options.names.split(",") if name.strip()]
+
+    def read(column: str) -> list[histories.History]:
+        return histories.histories(
+            rows, differing, options.table.parent, options.log, over, column, names
+        )
+
+    exact = None
+    if options.exact:
+        whole = max(read(options.exact), key=lambda each: len(each.x))
+        exact = whole._replace(label=options.exact)
+    title = options.title if options.title is not None else Path(made.get("script", "")).name
+    found = read(options.curve)
+    histories.draw(found, out, x=over, y=options.curve, title=title, exact=exact)
+    for each in found:
+        print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")
     return 0
 
