@@ -80,6 +80,7 @@ ELSEWHERE = {
     "chart": ("karamelo_py.app.studies.chart", "Draw a table of runs: what accuracy costs."),
     "advise": ("karamelo_py.app.studies.advise", "Find the cheapest variant that is good enough."),
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
+    "atlas": ("karamelo_py.app.studies.atlas", "Make the pictures of a page again."),
 }
 COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
 

@@ -1,0 +1,248 @@
+"""karamelo-py atlas: makes again what a page shows, each picture by commands for everybody."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import karamelo_py
+from karamelo_py.app.studies.case import environment
+from karamelo_py.app.studies.options import new_parser
+from karamelo_py.output.console import duration
+from karamelo_py.script.errors import ScriptError, nearest
+
+DESCRIPTION = """\
+Makes the pictures and tables of an atlas again: a file (TOML) that lists them with the commands of
+karamelo-py that make each. What is done is not done again; an interrupted atlas goes on where it
+stopped when the same command is given again.
+
+  karamelo-py atlas docs/atlas.toml -list
+  karamelo-py atlas docs/atlas.toml -only failures
+  karamelo-py atlas docs/atlas.toml -page docs/atlas.md
+
+An entry has a name, a text, and commands that run in a folder of its own; {inputs} is the folder
+`inputs` of the atlas, and other words in braces are values of the entry, or its smaller values:
+
+  [[entry]]
+  name = "orders/bar"
+  text = "How errors of the vibrating bar fall."
+  commands = [
+    "sweep {inputs}/in.vibrating_bar -var refine={sizes} -record err_history -o bar.csv",
+    "chart bar.csv -accuracy err_history -x refine -o bar.png",
+  ]
+  whole = {sizes = "0.5,1,2,4"}
+  small = {sizes = "0.2,0.4"}"""
+KEPT = "entry.json"
+SAID = "said.txt"
+PICTURES = (".png", ".svg")
+
+
+@dataclass
+class Entry:
+    """A picture or a table, and the commands that make it.
+
+    Attributes
+    ----------
+    name
+        Its folder; a part before a slash is what ``-only`` can name as well.
+    text
+        What it shows.
+    commands
+        Command lines of karamelo-py, without that word.
+    whole, small
+        Values of the words in braces.
+    interpreted
+        Whether its scenes are so small that to interpret them takes less time than to compile.
+    page
+        Whether it has a part of the page.
+    """
+
+    name: str
+    text: str = ""
+    commands: list[str] = field(default_factory=list)
+    whole: dict[str, str] = field(default_factory=dict)
+    small: dict[str, str] = field(default_factory=dict)
+    interpreted: bool = False
+    page: bool = True
+
+    def lines(self, inputs: str, *, small: bool) -> list[str]:
+        """The commands with their values.
+
+        Raises
+        ------
+        ScriptError
+            For a word in braces that has no value.
+        """
+        words = {"inputs": inputs, **self.whole, **(self.small if small else {})}
+        try:
+            return [command.format(**words) for command in self.commands]
+        except (KeyError, IndexError, ValueError) as error:
+            raise ScriptError(
+                f"entry '{self.name}': no value for {error}",
+                expected="whole = {" + str(error).strip("'") + ' = "..."}',
+            ) from None
+
+
+def read(path: Path) -> tuple[list[Entry], Path]:
+    """The entries of an atlas, and its folder of scripts.
+
+    Raises
+    ------
+    ScriptError
+        If it cannot be read, or an entry is not one.
+    """
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScriptError(f"cannot read {path}: {error.strerror or error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ScriptError(f"{path} is not TOML: {error}") from None
+    entries = []
+    for each in found.get("entry", []):
+        try:
+            entries.append(Entry(**each))
+        except TypeError as error:
+            raise ScriptError(
+                f"{path}: an entry with {str(error).split(') ')[-1]}",
+                expected="name, text, commands, whole, small, interpreted, page",
+            ) from None
+    if not entries:
+        raise ScriptError(f"{path} has no entries", expected="[[entry]] with name and commands")
+    return entries, (path.parent / found.get("inputs", "inputs")).resolve()
+
+
+def add_parser(subparsers: Any) -> None:
+    """The subcommand for the command line."""
+    parser = new_parser(subparsers, "atlas", "make pictures of a page again", DESCRIPTION, run)
+    parser.add_argument("atlas", type=Path, help="the list of entries, such as docs/atlas.toml")
+    parser.add_argument("-only", default="", metavar="NAMES", help="entries or groups, with commas")
+    parser.add_argument("-small", action="store_true", help="at the smaller values of the entries")
+    parser.add_argument("-again", action="store_true", help="also what is done")
+    parser.add_argument("-list", action="store_true", help="only say what there is")
+    parser.add_argument(
+        "-o", type=Path, default=Path("atlas"), metavar="FOLDER", help="the folder of work (atlas)"
+    )
+    parser.add_argument(
+        "-page", type=Path, help="write this page, its pictures to _static/atlas beside it"
+    )
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+
+
+def run(options: Any) -> int:
+    """Do what the command line says; returns the exit status."""
+    entries, inputs = read(options.atlas)
+    asked = [name.strip() for name in options.only.split(",") if name.strip()]
+    groups = {entry.name.partition("/")[0] for entry in entries}
+    for name in asked:
+        if name not in groups and name not in {entry.name for entry in entries}:
+            known = [*groups, *(entry.name for entry in entries)]
+            close = nearest(name, known)
+            raise ScriptError(
+                f"-only {name}: no such entry",
+                expected="one of " + ", ".join(sorted(groups)) + " (-list shows all)",
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+    chosen = [
+        entry for entry in entries
+        if not asked or entry.name in asked or entry.name.partition("/")[0] in asked
+    ]  # fmt: skip
+    if options.list:
+        for entry in chosen:
+            print(f"{entry.name:<32} {entry.text.splitlines()[0] if entry.text else ''}")
+        return 0
+    folder = options.o / "small" if options.small else options.o
+    failed = []
+    for k, entry in enumerate(chosen, 1):
+        said = f"{k} of {len(chosen)}: {entry.name}"
+        begun = time.perf_counter()
+        state = make(entry, folder / entry.name, inputs, small=options.small, again=options.again)
+        if state == "failed":
+            failed.append(entry.name)
+        print(f"{said} {state} ({duration(time.perf_counter() - begun)})", flush=True)
+    if options.page and not options.small:
+        write_page(options.page, entries, folder, inputs)
+    if failed:
+        print(f"failed: {', '.join(failed)}; the messages are above, the other entries are done")
+    return 1 if failed else 0
+
+
+def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -> str:
+    """Run the commands of an entry in its folder; ``done``, ``known`` or ``failed``."""
+    lines = entry.lines(str(inputs), small=small)
+    key = key_of(lines)
+    record = place / KEPT
+    if not again and record.exists():
+        kept = json.loads(record.read_text(encoding="utf-8"))
+        if kept.get("key") == key:
+            return "known"
+    place.mkdir(parents=True, exist_ok=True)
+    record.unlink(missing_ok=True)
+    more = {"NUMBA_DISABLE_JIT": "1"} if entry.interpreted else {}
+    told = []
+    for line in lines:
+        done = subprocess.run(
+            [sys.executable, "-m", "karamelo_py.app.cli", *shlex.split(line)],
+            cwd=place, env={**environment(), **more}, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, text=True, encoding="utf-8", check=False,
+        )  # fmt: skip
+        told.append(f"$ karamelo-py {line}\n{done.stdout}")
+        (place / SAID).write_text("\n".join(told), encoding="utf-8")
+        if done.returncode:
+            print(done.stdout, end="")
+            return "failed"
+    part = record.with_name(KEPT + ".part")
+    part.write_text(json.dumps({"key": key, "commands": lines}, indent=1), encoding="utf-8")
+    part.replace(record)
+    return "done"
+
+
+def key_of(lines: list[str]) -> str:
+    """What a result belongs to: the commands, the scripts they name, the version."""
+    said = [karamelo_py.__version__, *lines]
+    for word in {word for line in lines for word in shlex.split(line)}:
+        if os.path.isabs(word) and Path(word).is_file():
+            said.append(Path(word).read_text(encoding="utf-8", errors="replace"))
+    return hashlib.sha256("\0".join(said).encode()).hexdigest()
+
+
+def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> None:
+    """Write a page of the entries that are done, with their pictures, commands and tables."""
+    shown = page.parent / "_static" / "atlas"
+    parts = [
+        "# Atlas\n\nWritten by `karamelo-py atlas`, by the commands that stand below pictures.\n"
+    ]
+    group = ""
+    for entry in entries:
+        place = folder / entry.name
+        if not (place / KEPT).exists():
+            continue
+        pictures = [path for path in sorted(place.iterdir()) if path.suffix in PICTURES]
+        for path in pictures:
+            target = shown / entry.name / path.name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, target)
+        if not entry.page:
+            continue
+        head = entry.name.partition("/")[0]
+        if head != group:
+            parts.append(f"## {head.replace('_', ' ').capitalize()}\n")
+            group = head
+        parts.append(f"### {entry.name}\n\n{entry.text}\n")
+        for path in pictures:
+            title = entry.text.splitlines()[0] if entry.text else entry.name
+            parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})\n")
+        said = (place / SAID).read_text(encoding="utf-8")
+        plain = said.replace(str(inputs), "inputs").rstrip()
+        parts.append(f"```text\n{plain}\n```\n")
+    page.write_text("\n".join(parts), encoding="utf-8")
+    print(f"written: {page}; pictures are in {shown}")

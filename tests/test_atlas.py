@@ -1,0 +1,149 @@
+"""The atlas: entries run by their commands, go on where they stopped, and become a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from karamelo_py.app.cli import main
+from karamelo_py.app.studies import atlas
+
+ROOT = Path(__file__).parent.parent
+SCRIPT = """
+N = 4
+law = 2
+exact = time
+err = time^law
+method(ulmpm, FLIP, linear, 1)
+dimension(1, 0, 10, 1)
+region(line, block, 1, 2)
+material(rubber, linear, 2, 100, 0)
+solid(body, region, line, 1, rubber, 1, 0)
+set_dt(1)
+set_output(1)
+log_modify(custom, step, time, err, exact)
+run(N)
+"""
+ATLAS = """
+inputs = "."
+[[entry]]
+name = "laws/power"
+text = "A law of time."
+interpreted = true
+commands = [
+  "sweep {inputs}/in.law -var N={steps} -var law=1,2 -o runs.csv",
+  "chart runs.csv -curve err -exact exact -o power.png",
+]
+whole = {steps = "6"}
+small = {steps = "2"}
+[[entry]]
+name = "broken"
+commands = ["sweep {inputs}/in.law -var M=1"]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    (tmp_path / "in.law").write_text(SCRIPT, encoding="utf-8")
+    (tmp_path / "a.toml").write_text(ATLAS, encoding="utf-8")
+    return tmp_path
+
+
+def test_an_atlas_runs_its_commands_once_and_writes_a_page(folder, capsys):
+    words = ["atlas", "a.toml", "-only", "laws", "-page", "page.md"]
+    assert main([*words, "-small"]) == 0
+    assert not (folder / "page.md").exists()
+    assert len((folder / "atlas/small/laws/power/runs.csv").read_text().splitlines()) == 3
+    assert main(words) == 0
+    assert "1 of 1: laws/power done" in capsys.readouterr().out
+    place = folder / "atlas/laws/power"
+    # t^1 and t^2 after 6 steps of 1, as the chart says of each run.
+    said = (place / "said.txt").read_text(encoding="utf-8")
+    assert "law = 1: err 6 at the end" in said and "law = 2: err 36 at the end" in said
+    page = (folder / "page.md").read_text(encoding="utf-8")
+    assert "## Laws" in page and "![A law of time.](_static/atlas/laws/power/power.png)" in page
+    assert "$ karamelo-py chart runs.csv -curve err" in page
+    assert str(folder) not in page
+    assert (folder / "_static/atlas/laws/power/power.png").read_bytes()[1:4] == b"PNG"
+    assert main(words) == 0
+    assert "laws/power known" in capsys.readouterr().out
+    (folder / "in.law").write_text(SCRIPT + "# changed\n", encoding="utf-8")
+    assert main(words) == 0
+    assert "laws/power done" in capsys.readouterr().out
+
+
+def test_an_entry_that_fails_stops_no_other(folder, capsys):
+    (folder / "a.toml").write_text(
+        ATLAS.replace('whole = {steps = "6"}', 'whole = {steps = "1"}'), encoding="utf-8"
+    )
+    assert main(["atlas", "a.toml"]) == 1
+    out = capsys.readouterr().out
+    assert "laws/power done" in out and "broken failed" in out and "failed: broken" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["none.toml"], "cannot read"),
+        (["a.toml", "-only", "law"], "did you mean 'laws'?"),
+    ],
+)
+def test_mistakes(folder, capsys, words, said):
+    assert main(["atlas", *words]) == 1
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x", "is not TOML"),
+        ("a = 1", "has no entries"),
+        ("[[entry]]\nname = 'a'\ncolour = 1", "colour"),
+        ("[[entry]]\nname = 'a'\ncommands = ['sweep {way}']", "no value for 'way'"),
+    ],
+)
+def test_mistakes_in_the_list(folder, capsys, text, said):
+    (folder / "b.toml").write_text(text, encoding="utf-8")
+    assert main(["atlas", "b.toml"]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
+    """Every entry: its words have values, its scripts are there, its command lines can be read."""
+    import argparse
+    import importlib
+    import shlex
+
+    from karamelo_py.app.cli import ELSEWHERE
+
+    entries, inputs = atlas.read(ROOT / "docs" / "atlas.toml")
+    assert len({entry.name for entry in entries}) == len(entries)
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers()
+    for name in ("sweep", "chart", "stability", "bench", "advise"):
+        importlib.import_module(ELSEWHERE[name][0]).add_parser(commands)
+    for entry in entries:
+        for small in (False, True):
+            for line in entry.lines(str(inputs), small=small):
+                options = parser.parse_args(shlex.split(line))
+                script = getattr(options, "script", None)
+                assert script is None or script.is_file(), line
+
+
+def test_curves_of_a_sweep(folder, capsys):
+    words = ["sweep", "in.law", "-var", "law=1,2", "-o", "s.csv", "-jobs", "1"]
+    assert main(words) == 0
+    assert main(["chart", "s.csv", "-curve", "err", "-names", "line,parabola", "-o", "c.svg"]) == 0
+    out = capsys.readouterr().out
+    assert "line: err 4 at the end" in out and "parabola: err 16 at the end" in out
+    text = (folder / "c.svg").read_text(encoding="utf-8")
+    assert text.startswith("<?xml")
+    assert main(["chart", "s.csv", "-curve", "er"]) == 1
+    assert "did you mean 'err'?" in capsys.readouterr().err
+    (folder / "s/law=1/log.mpm").unlink()
+    (folder / "s/law=2/log.mpm").unlink()
+    assert main(["chart", "s.csv", "-curve", "err"]) == 1
+    assert "no run has left a log.mpm" in capsys.readouterr().err
