@@ -14,9 +14,13 @@ from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import Fused, Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
+from karamelo_py.run.savings import savings
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
+
+# Bytes of each point beside its fields: first place, solid, whether it is there.
+ALONE = 8 * 3 + 4 + 1
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
@@ -58,11 +62,20 @@ def report(hub: Hub, end_time: float = inf) -> None:
         size = array.itemsize * array.shape[1]
         per_node += size
         say(f"  {name:<30}  {array.shape[1]!s:<10} {size:>6}")
-    say(f"memory         {(total + per_node * nodes) / 2**20:.3g} MiB touched")
+    touched = total + ALONE * simulation.count + per_node * nodes
+    say(f"memory         {touched / 2**20:.3g} MiB touched, and in a run")
+    say(f"               {total / 2**20:.3g} MiB for a copy of the last good state")
     say("")
     say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")
     for stage in stages(hub, simulation):
         say(f"  {stage}")
+    found = savings(hub, simulation)
+    if found:
+        say("")
+        say("could be left out")
+    for saving in found:
+        say(f"  {saving.cost}")
+        say(f"    instead: {saving.instead}")
 
 
 def bytes_per_point(simulation: Simulation) -> int:

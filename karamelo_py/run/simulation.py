@@ -55,8 +55,10 @@ from karamelo_py.run.lowering import (
 )
 from karamelo_py.run.trial import try_parts
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.views import NodesView, PointsView
+from karamelo_py.scene.views import NodesView, PieceView, PointsView
 from karamelo_py.script.errors import ScriptError
+
+PIECE = 1 << 18  # points that a fix looks at together before the first step
 
 
 def scene_key(hub: Hub) -> tuple:
@@ -152,7 +154,8 @@ class Simulation:
         self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
         if state is not None:
             self.present[: state.count] = state.present
-        self.x0 = np.concatenate([s.x0 for s in hub.solids.values()])
+        places = [s.x0 for s in hub.solids.values()]
+        self.x0 = places[0] if len(places) == 1 else np.concatenate(places)
         self.solid_of = np.concatenate(
             [np.full(len(s.x0), k, np.int32) for k, s in enumerate(hub.solids.values())]
         )
@@ -457,10 +460,10 @@ class Simulation:
         at_once = [fix for fix in new if _sets_initial_state(fix)]
         for fix in at_once:
             # Nothing happens in a step before this hook: the state shows it from the start.
-            view = PointsView(self, fix.group, then=False)
-            fix.hooks()["initial_integrate"](view)
-            if view.moved:
-                self.setup.control.clock[0].drift = np.inf
+            for view in self._views(fix):
+                fix.hooks()["initial_integrate"](view)
+                if view.moved:
+                    self.setup.control.clock[0].drift = np.inf
             self.version += 1
         self._begun |= set(at_once)
         self._first_fixes = [fix for fix in new if fix not in at_once]
@@ -468,6 +471,23 @@ class Simulation:
         if self._first_fixes:
             together = [fix for fix in fixes if fix in lasting or fix in self._first_fixes]
             self._first = PythonHooks(self, together)
+
+    def _views(self, fix: Any) -> Iterator[PointsView]:
+        """The points of a fix, in pieces where it looks at each on its own."""
+        if not fix.point_by_point:
+            yield PointsView(self, fix.group, then=False)
+            return
+        chosen = None if fix.group.all else np.zeros(self.count, np.bool_)
+        if chosen is not None:
+            chosen[fix.group.ids] = True
+        for block in self.setup.blocks:
+            ids = block.points.id
+            for first in range(0, len(ids), PIECE):
+                rows = np.arange(first, min(first + PIECE, len(ids)))
+                if chosen is not None:
+                    rows = rows[chosen[ids[rows]]]
+                if len(rows):
+                    yield PieceView(self, block, rows)
 
     def show_on_nodes(self) -> None:
         """See that the nodes show the present state when no step has been taken yet."""

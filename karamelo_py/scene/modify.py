@@ -55,6 +55,9 @@ class Fix:
         "s" and "" when a style does not say.
     first_step_only
         Whether it acts in the first step after its definition and is idle thereafter.
+    point_by_point
+        Whether its hooks look at each point on its own, and move none: before the first step they
+        are then called for some points after the others, whose fields need no copies.
     for_method
         Whether it has no hooks because the method reads it.
     holds_nodes
@@ -78,6 +81,7 @@ class Fix:
     formulas: tuple = ()
     published: tuple[str, ...] = SUFFIXES
     first_step_only = False
+    point_by_point = False
     for_method = False
     holds_nodes = False
     point_fields: tuple[type, ...] = ()

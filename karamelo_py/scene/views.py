@@ -54,7 +54,7 @@ class Shown:
         if self.name not in view._handed_out:
             array = np.array(self.read(view))
             array.flags.writeable = self.write is not None
-            view._handed_out[self.name] = array, array.copy()
+            view._handed_out[self.name] = array, array.copy() if self.write else array
         return view._handed_out[self.name][0]
 
     def __set__(self, view: _View, value: Any) -> None:
@@ -225,7 +225,8 @@ class PointsView(_View):
         self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
 
     def _gather(self, of: Callable) -> np.ndarray:
-        return self._simulation.by_id(of)[..., self.ids].T
+        full = self._simulation.by_id(of)
+        return full.T if len(self.ids) == full.shape[-1] else full[..., self.ids].T
 
     def _scatter(self, of: Callable, value: np.ndarray) -> None:
         full = self._simulation.by_id(of)
@@ -382,3 +383,33 @@ class PointsView(_View):
     def reference_position(self) -> np.ndarray:
         """(n, d) positions before the first step; read only."""
         return self._simulation.x0[self.ids]
+
+
+class PieceView(PointsView):
+    """Some points of a group, in the order in which they are stored: takes next to no memory.
+
+    For hooks that look at each point on its own (`Fix.point_by_point`). Positions are read-only.
+    """
+
+    def __init__(self, simulation: Any, block: Any, rows: np.ndarray):
+        _View.__init__(self)
+        self._simulation = simulation
+        self._then = False
+        self._block, self._rows = block, rows
+        control = simulation.setup.control
+        self.dt = float(control.values[DT])
+        self.time = float(control.values[TIME])
+        self.ids = block.points.id[rows]
+        self.moved = False
+        self._declared = {}
+
+    def _gather(self, of: Callable) -> np.ndarray:
+        return of(self._block.points)[..., self._rows].T
+
+    def _scatter(self, of: Callable, value: np.ndarray) -> None:
+        of(self._block.points)[..., self._rows] = value.T
+
+    @Shown
+    def position(self) -> np.ndarray:
+        """(n, d) positions; read only."""
+        return self._gather(self._place)

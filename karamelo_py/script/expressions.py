@@ -23,6 +23,8 @@ POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
 GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 
+CHUNK = 1 << 18  # points at which a formula is evaluated together
+
 # Number of operations in all; of those that messages show.
 _MAX_SIZE = 20000
 _MAX_SHOWN = 1000
@@ -230,11 +232,15 @@ class Formula:
             return np.full(len(x), self.evaluate(values))
         from karamelo_py.compiler import formula as kernels
 
-        x = _three_columns(x)
-        x0 = x if x0 is None else _three_columns(x0)
         out = np.empty(len(x))
         scratch = np.empty((6 + kernels.ROWS, kernels.BLOCK))
-        kernels.evaluate_all(self.program(values), values.array, x, x0, out, scratch)
+        program = self.program(values)
+        # Some at a time: copies with three columns of millions of points would take much memory.
+        for first in range(0, len(x), CHUNK):
+            some = slice(first, first + CHUNK)
+            here = _three_columns(x[some])
+            before = here if x0 is None else _three_columns(x0[some])
+            kernels.evaluate_all(program, values.array, here, before, out[some], scratch)
         return out
 
 

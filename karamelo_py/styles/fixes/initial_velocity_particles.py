@@ -41,6 +41,7 @@ class InitialVelocityParticles(Fix):
     published = ()
 
     first_step_only = True
+    point_by_point = True
 
     def __init__(self, hub: Hub, group: ParticleGroup, *velocity: Expression | None):
         super().__init__(hub, group)

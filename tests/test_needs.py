@@ -1,0 +1,340 @@
+"""No more than a scene needs: fields, memory, and what check says could be left out."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tracemalloc
+from contextlib import suppress
+from types import SimpleNamespace
+
+import pytest
+from conftest import INPUTS, ROOT
+
+from karamelo_py.app.cli import main
+from karamelo_py.compiler.fields import name_of
+from karamelo_py.kernels.g2p import NodalMean
+from karamelo_py.kernels.heat import Conducting
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.run.report import bytes_per_point, node_fields, point_fields
+from karamelo_py.run.savings import savings
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import Quit
+
+DOCS = ROOT / "docs" / "needs.md"
+
+
+@pytest.fixture
+def lowered(tmp_path, monkeypatch):
+    """``lowered(script or path, **variables)``: the hub at its first run, nothing compiled."""
+    monkeypatch.chdir(tmp_path)
+
+    def build(script, **variables) -> Hub:
+        path = script
+        if isinstance(script, str):
+            path = tmp_path / "in.script"
+            path.write_text(script, encoding="utf-8")
+        found = []
+        monkeypatch.setattr(
+            "karamelo_py.run.runner.report", lambda hub, end_time=0: found.append(hub)
+        )
+        hub = Hub(Console(quiet=True))
+        hub.checking = True
+        hub.interpreter = Interpreter(hub, presets={k: str(v) for k, v in variables.items()})
+        with suppress(Quit):  # the check ends the script
+            hub.interpreter.run_file(str(path))
+        return found[0]
+
+    return build
+
+
+PLANE = """
+method({method})
+dimension(2, 0, {side}, 0, {side}, 1)
+region(box, block, 2, 2 + {n}, 2, 2 + {n})
+material(rubber, {law})
+solid(body, region, box, 2, rubber, 1)
+{more}
+run(1)
+"""
+
+
+def plane(
+    method="ulmpm, FLIP, linear, 1", law="neo-hookean, 1, 100, 0.3", more="", side=12, n=4
+) -> str:
+    return PLANE.format(method=method, law=law, more=more, side=side, n=n)
+
+
+# --- Fields --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("law", "numbers"), [("neo-hookean, 1, 100, 0.3", 4), ("linear, 1, 100, 0.3", 5)]
+)
+def test_an_elastic_plane_has_two_coordinates_and_nothing_else(lowered, law, numbers):
+    """F has four components in plane strain; a stress four (s33 is not zero there), and det F.
+
+    No temperature, damage, third coordinate, nor hoop component; nodes have mass, momentum, force
+    (five numbers of the eight of a record), two velocities and what changed.
+    """
+    s = lowered(plane(law=law)).simulation.setup
+    [block] = s.blocks
+    found = {name: (int(size), size_of) for name, size, size_of in point_fields(block)}
+    assert found == {
+        "x": (2, 16), "x moved": (2, 16), "v": (2, 16), "mass": (1, 8),
+        "state": (numbers, 8 * numbers), "material": (1, 4), "grid": (1, 4), "id": (1, 8),
+    }  # fmt: skip
+    assert block.points.home is None and block.points.fields == ()
+    assert [(name, array.shape[1]) for name, array in node_fields(s)] == [
+        ("sums", 8), ("update", 4), ("velocity", 2)
+    ]  # fmt: skip
+    assert not isinstance(s.heat, Conducting)
+
+
+MORE = {
+    "thermo-mechanical": (
+        {"method": "ulmpm, FLIP, linear, 1, thermo-mechanical",
+         "law": "neo-hookean, 1, 100, 0.3, 2, 3"}, {"temperature", "heat gradient"}),
+    "affine": ({"method": "ulmpm, APIC, quadratic-spline"}, {"moment"}),
+    "averaged": ({"method": "ulmpm, FLIP, linear, 1",
+                  "more": "anti_volumetric_locking(true)"}, {"volume ratio"}),
+    "pushed": ({"more": "fix(p, indent, all, sphere, 1e3, 3, 9, 1, 0)"}, {"force"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MORE)
+def test_fields_come_with_what_needs_them(lowered, name):
+    """What is absent above is there where somebody asks for it."""
+    words, wanted = MORE[name]
+    [block] = lowered(plane(**words)).simulation.setup.blocks
+    fields = {name_of(type(one)) for one in block.points.fields}
+    assert wanted <= fields
+    plain = lowered(plane()).simulation.setup.blocks[0].points.fields
+    assert plain == ()
+
+
+def test_only_what_averages_has_a_nodal_mean(lowered):
+    kinds = [type(one) for one in lowered(plane()).simulation.setup.nodes.fields]
+    assert NodalMean not in kinds
+
+
+# --- Bytes of every script -----------------------------------------------------------------------
+
+SCRIPTS = sorted(
+    path.name for path in INPUTS.glob("in.*")
+    if path.name not in ("in.element", "in.cantilever_tets")
+)  # fmt: skip
+# Sizes do not matter for bytes a point; large scenes are made small here.
+SMALL = {"in.taylor_bar": "1/3", "in.vertical_bar": "1/2", "in.taylor_bar_227": "1/2"}
+
+
+def listed() -> dict[str, int]:
+    """Bytes of a point by script, as docs/needs.md says."""
+    found = {}
+    for line in DOCS.read_text(encoding="utf-8").splitlines():
+        match = re.match(r"\| `(in\.\w+)` \|.*\| (\d+) \|$", line)
+        if match:
+            found[match[1]] = int(match[2])
+    return found
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_bytes_of_a_point_are_those_that_are_listed(lowered, script):
+    """Guards against growth: who adds a number a point has to say so in docs/needs.md."""
+    small = {"refine": SMALL[script]} if script in SMALL else {}
+    hub = lowered(INPUTS / script, **small)
+    found = bytes_per_point(hub.simulation)
+    assert found == listed()[script], (
+        f"docs/needs.md says {listed()[script]}: if it must be, {found}"
+    )
+
+
+# --- Memory --------------------------------------------------------------------------------------
+
+
+def peak_of_check(path, **variables) -> float:
+    """MiB that `karamelo-py check` takes at most, interpreted, in a process of its own."""
+    words = [word for k, v in variables.items() for word in ("-var", k, str(v))]
+    code = (
+        "import resource, sys; from karamelo_py.app.cli import main; "
+        "status = main(sys.argv[1:]); "
+        "print('peak', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); sys.exit(status)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "check", str(path), *words], text=True, check=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True,
+    )  # fmt: skip
+    scale = 2**20 if sys.platform == "darwin" else 2**10
+    return int(done.stdout.rsplit("peak ", 1)[1]) / scale
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no resident memory to ask for")
+def test_a_domain_100_times_larger_takes_no_more_memory(tmp_path):
+    """The same body; a million nodes more would be 112 MB if they were touched."""
+    path = tmp_path / "in.script"
+    path.write_text("side = 100\n" + plane(side="side"), encoding="utf-8")
+    near, far = (peak_of_check(path, side=side) for side in (100, 1000))
+    # Two processes differ by a MiB or so; 16 000 tiles have 60 bytes each.
+    assert far - near < 4
+
+
+@pytest.mark.xdist_group("disks")
+def test_a_scene_is_made_in_twice_its_memory(tmp_path, monkeypatch, capsys):
+    """Peak of all arrays while check builds half a million points, over what it says of them."""
+    monkeypatch.chdir(tmp_path)
+    text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
+    (tmp_path / "in.disks").write_text(text, encoding="utf-8")
+    main(["check", "in.disks"])  # compiled before anything is counted
+    capsys.readouterr()
+    tracemalloc.start()
+    assert main(["check", "in.disks", "-var", "N", "700"]) == 0
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    said = float(re.search(r"memory +([\d.]+) MiB touched", capsys.readouterr().out)[1])
+    assert said > 60
+    assert peak / 2**20 < 2 * said
+
+
+# --- What could be left out ----------------------------------------------------------------------
+
+
+@pytest.fixture
+def advice(lowered):
+    """``advice(script, dt=1, limit=1)``: what check says could be left out, as one text."""
+
+    def say(script, dt=1.0, limit=1.0, **variables) -> str:
+        hub = lowered(script, **variables)
+        found = savings(hub, SimpleNamespace(dt=dt, limit=limit))
+        return "\n".join(f"{saving.cost} / {saving.instead}" for saving in found)
+
+    return say
+
+
+def test_scenes_without_waste_hear_nothing(advice):
+    assert advice(plane()) == ""
+    for script in ("in.vibrating_bar", "in.lame", "in.vortex", "in.two_disks", "in.dam_break"):
+        assert advice(INPUTS / script) == "", script
+
+
+def test_a_small_step(advice):
+    said = advice(plane(more="set_dt(0.001)"), dt=0.001, limit=0.04)
+    assert "set_dt(0.001): 36 times as many steps" in said
+    assert "leave set_dt out, or set_dt(0.036)" in said
+    said = advice(plane(more="dt_factor(0.1)"), dt=0.1, limit=1)
+    assert (
+        said == "dt_factor(0.1): 9 times as many steps as the stable step asks for / dt_factor(0.9)"
+    )
+    assert advice(plane(), dt=0.5, limit=1) == ""
+
+
+def test_what_is_measured_and_shown_nowhere(advice):
+    text = plane(more="compute(Ek, kinetic_energy, all)\ncompute(Es, strain_energy, all)\n"
+                      "# Ek is not shown\nlog_modify(custom, step, Es)")  # fmt: skip
+    said = advice(text)
+    assert "compute Ek (kinetic_energy) is measured at each output and shown nowhere" in said
+    assert "name Ek in log_modify" in said and "Es" not in said
+
+
+METAL = """
+eos(bulk, linear, 1, 100)
+strength(hard, {strength})
+{more}
+material(metal, eos-strength, bulk, hard{parts})
+"""
+
+
+@pytest.mark.parametrize(
+    ("strength", "more", "parts", "said"),
+    [
+        ("johnson_cook, 50, 3, 0, 0.3, 1, 0, 0, 0, 100", "", "",
+         "strength(..., plastic, 50, 3)"),
+        ("johnson_cook, 50, 3, 1, 0.3, 1, 0, 1, 0, 100", "", "", ""),
+        ("plastic, 50, 3", "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", warm",
+         "leave the temperature out"),
+        ("johnson_cook, 50, 3, 1, 0.3, 1, 0, 1, 0, 100",
+         "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", warm", ""),
+    ],
+)  # fmt: skip
+def test_parts_of_a_law_that_never_act(advice, strength, more, parts, said):
+    metal = METAL.format(strength=strength, more=more, parts=parts)
+    text = plane().replace("material(rubber, neo-hookean, 1, 100, 0.3)", metal)
+    found = advice(text.replace(", 2, rubber, 1)", ", 2, metal, 1, 5)"))
+    assert said in found if said else found == ""
+
+
+def test_heat_that_does_not_flow_and_averages_that_change_nothing(advice):
+    warm = "neo-hookean, 1, 100, 0.3, 2, 3"
+    assert "leave cp, kappa and alpha out" in advice(plane(law=warm))
+    assert advice(plane(law=warm, method="ulmpm, FLIP, linear, 1, thermo-mechanical")) == ""
+    for nu, said in ((0.3, "anti_volumetric_locking(true): a visit"), (0.49, "")):
+        text = plane(law=f"neo-hookean, 1, 100, {nu}")
+        found = advice(text.replace("dimension(", "anti_volumetric_locking(true)\ndimension("))
+        assert found.startswith(said) and bool(found) == bool(said)
+
+
+SPACE = """
+method(ulmpm, FLIP, linear, 1)
+dimension(3, 0, 6, 0, 5, 0, 2, 1)
+region(box, {region})
+material(rubber, neo-hookean, 1, 100, 0.3)
+solid(body, region, box, 2, rubber, 1)
+fix(v, initial_velocity_particles, all, {v})
+{held}
+run(1)
+"""
+HELD = "fix(walls, velocity_nodes, all, NULL, NULL, 0)"
+
+
+def test_space_for_what_is_plane(advice):
+    slab = SPACE.format(region="block, 1, 4, 1, 3, 0, 2", v="0.1*x0, 0.2, 0", held=HELD)
+    said = advice(slab)
+    assert "the same along z" in said and "4 times the points of plane strain" in said
+    assert "dimension(2, 0, 6, 0, 5, 1)" in said
+    # Free to move along z, moved by a formula of z, or another shape in each layer: no.
+    assert advice(slab.replace(HELD, "")) == ""
+    assert advice(slab.replace("0.1*x0", "0.1*z0")) == ""
+    assert advice(slab.replace("block, 1, 4, 1, 3, 0, 2", "sphere, 2, 2, 1, 1")) == ""
+
+
+def test_a_plane_for_what_is_a_line(advice):
+    text = plane(more="fix(walls, velocity_nodes, all, 0, NULL)", side=8)
+    said = advice(text)
+    assert "the same along x" in said and "8 times the points of a line" in said
+    assert "dimension(1, 0, 8, 1), with y called x" in said
+
+
+def test_space_for_what_is_round(advice):
+    rod = SPACE.format(region="cylinder, z, 3, 2.5, 2, 0, 2", v="0, 0, -1",
+                       held="fix(f, body_force, all, 0, 0, sin(z))")  # fmt: skip
+    said = advice(rod)
+    assert "cylinders about one axis" in said and "6.28 times the points" in said
+    assert "axisymmetric(true)" in said
+    assert advice(rod.replace("sin(z)", "sin(x)")) == ""
+    assert advice(rod.replace("0, 0, -1", "0.1, 0, -1")) == ""
+
+
+def test_wide_functions_where_no_point_crosses(advice):
+    said = advice(plane(method="tlmpm, FLIP, cubic-spline, 1"))
+    assert "cubic-spline sees 16 nodes a point" in said and "which see 4" in said
+    assert advice(plane(method="ulmpm, FLIP, cubic-spline, 1")) == ""
+
+
+def test_many_points_a_cell(advice):
+    said = advice(plane().replace("box, 2, rubber", "box, 5, rubber"))
+    assert "25 points a cell" in said
+
+
+def test_check_prints_what_could_be_left_out(tmp_path, monkeypatch, capsys):
+    """By the command itself, in words that can be written into the script."""
+    monkeypatch.chdir(tmp_path)
+    text = plane(more="set_dt(1e-4)").replace("run(1)", "")
+    (tmp_path / "in.script").write_text(text + "run(1)\n", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "karamelo_py.app.cli", "check", "in.script"], text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, check=True,
+    )  # fmt: skip
+    part = done.stdout[done.stdout.index("could be left out") :]
+    assert "set_dt(0.0001): " in part and "instead: leave set_dt out, or set_dt(" in part
