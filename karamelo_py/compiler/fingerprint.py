@@ -178,7 +178,7 @@ def contents(library: Any) -> Contents:
         if one in _contents:
             choices |= _contents[one].choices
             codes |= _contents[one].codes
-        ahead += one._linking_libraries
+        ahead += [*one._linking_libraries, *one.needs]
     return Contents(frozenset(choices), frozenset(codes))
 
 
