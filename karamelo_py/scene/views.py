@@ -24,9 +24,11 @@ from karamelo_py.kernels.arrays import (
     of_force,
     of_momentum,
 )
+from karamelo_py.kernels.export import export_velocity_moment
 from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.step import corners_that_move
+from karamelo_py.points.transfers import Moment
 from karamelo_py.script.errors import nearest
 
 
@@ -291,6 +293,43 @@ class PointsView(_View):
     @velocity.writer
     def _(self, value: np.ndarray) -> None:
         self._scatter(lambda points: points.v, value)
+
+    def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
+        """Let points whose transfer keeps it (APIC, TPIC ...) know how their velocity changes.
+
+        Parameters
+        ----------
+        component
+            The component of velocity whose gradient this is.
+        gradient
+            ``gradient(moves, step)`` -> (n, d), its derivatives by the coordinates that the grid
+            has (positions, or reference positions where `moves` is False); `step` is a length that
+            is small beside a cell. It is not called where no point keeps such a thing.
+        """
+        simulation = self._simulation
+        s, d = simulation.setup, simulation.setup.kin.dimension
+        if simulation.declared(Moment) is None:
+            return
+        step = simulation.hub.domain.h / 16
+        rows = np.zeros((d * d, simulation.count))
+        first = component * d
+        rows[first : first + d, self.ids] = np.nan_to_num(gradient(s.frame.moves, step)).T
+        chosen = np.zeros(simulation.count, np.bool_)
+        chosen[self.ids] = True
+        for block in s.blocks:
+            points = block.points
+            kept = field(points.fields, Moment)
+            if kept is None:
+                continue
+            given = np.ascontiguousarray(rows[:, points.id], kept.dtype)
+            if not s.transfer.keeps_gradient:
+                # B = D grad v, as the nodes would show it
+                where = points.x[simulation.now] if points.home is None else points.home
+                moment = np.zeros_like(kept)
+                export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, given, moment)
+                given = moment
+            here = chosen[points.id]
+            kept[first : first + d, here] = given[first : first + d, here]
 
     @Shown
     def mass(self) -> np.ndarray:

@@ -51,16 +51,8 @@ class XPIC(NamedTuple):
 
     order: Annotated[int, In(1, 20)]
 
-    @property
-    def point_fields(self) -> tuple[type, ...]:
-        """Fields of the points, beyond the first order."""
-        return (TermOfSeries,) if self.order > 1 else ()
-
-    @property
-    def node_fields(self) -> tuple[type, ...]:
-        """Fields of the nodes, beyond the first order."""
-        return (Series,) if self.order > 1 else ()
-
+    point_fields = (TermOfSeries,)
+    node_fields = (Series,)
     inverts_spread = False
     in_lanes = True
 

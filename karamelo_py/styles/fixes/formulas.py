@@ -38,3 +38,25 @@ def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
 def evaluated(formula: Any, hub: Hub, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
     """Values (n,) of a formula at the positions `x` and reference positions `x0`, (n, d) each."""
     return formula.evaluate_points(hub.values, x, x0)
+
+
+def gradient(
+    formula: Any, hub: Hub, x: np.ndarray, x0: np.ndarray, moves: bool, step: float
+) -> np.ndarray:
+    """Derivatives (n, d) of a formula by x (`moves`) or x0, by central differences over `step`.
+
+    Where a point is still at its reference position, x and x0 are the same coordinate.
+    """
+    out = np.zeros_like(x, float)
+    if formula.is_constant:
+        return out
+    unmoved = (x == x0).all(axis=1)
+    for k in range(x.shape[1]):
+        shift = np.zeros_like(out)
+        shift[:, k] = step
+        here = shift if moves else shift * unmoved[:, None]
+        there = shift * unmoved[:, None] if moves else shift
+        ahead = evaluated(formula, hub, x + here, x0 + there)
+        behind = evaluated(formula, hub, x - here, x0 - there)
+        out[:, k] = (ahead - behind) / (2 * step)
+    return out

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import evaluated, per_direction
+from karamelo_py.styles.fixes.formulas import evaluated, gradient, per_direction
 
 
 class InitialVelocityParticles(Fix):
@@ -24,6 +26,11 @@ class InitialVelocityParticles(Fix):
     -------
     fix(v1, initial_velocity_particles, ball, 0.1, 0.1, NULL)
     fix(mode, initial_velocity_particles, all, 0.1*sin(PI*x0/50))
+
+    Notes
+    -----
+    Points of transfers that keep a gradient or moment of velocity (APIC, TPIC and their kin) get
+    that of the formulas, too, so that the first step changes nothing in an affine motion.
 
     See Also
     --------
@@ -46,4 +53,5 @@ class InitialVelocityParticles(Fix):
         for k, formula in enumerate(self.formulas):
             if formula is not None:
                 v[:, k] = evaluated(formula, self.hub, x, x0)
+                points.set_velocity_gradient(k, partial(gradient, formula, self.hub, x, x0))
         points.velocity = v
