@@ -142,6 +142,23 @@ def _clear_optional(array, i):
     return clear
 
 
+def clear_first(array, i):
+    """Set the first number of row `i` of an array that may be absent (None) to zero."""
+    if array is not None:
+        array[i, 0] = 0
+
+
+@by_type(clear_first)
+def _clear_first(array, i):
+    if isinstance(array, types.NoneType):
+        return lambda array, i: None
+
+    def clear(array, i):
+        array[i, 0] = 0
+
+    return clear
+
+
 def add_row(a, first, b):
     """`a` with b[k] added to a[first + k]."""
     return tuple(x + (b[k - first] if first <= k < first + len(b) else 0) for k, x in enumerate(a))

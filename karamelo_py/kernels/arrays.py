@@ -183,7 +183,6 @@ CLOCK = np.dtype(
         ("drift", np.float64),  # since the points were sorted, in cells
         ("drift_limit", np.float64),
         ("spacing", np.float64),  # smallest cell size
-        ("lightest", np.float64),  # mass of the lightest point, where the basis has a steep edge
         ("courant", np.float64),  # stable step over cell size / rate
         ("heat_limit", np.float64),  # stable step of conduction, infinite where there is none
         ("heat_reference", np.float64),  # the same in undeformed bodies

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from numba import types
+
+from karamelo_py.compiler.compile import by_type, point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_optional
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.g2p import NodalMean
-from karamelo_py.kernels.p2g import Normal
+from karamelo_py.kernels.p2g import Normal, SeenMass
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
 
@@ -80,7 +82,8 @@ class UpdateToVelocity(NamedTuple):
 
     A point of mass m that gives a node the share N of it gets back the strain of f dt / (N m) from
     there: an oscillation that grows when (c dt / h)^2 > N, in d directions at once. Nodes lighter
-    than `light` = d (c dt / h)^2 m count as such; the limit vanishes with the step.
+    than `light` = d (c dt / h)^2 times the mean mass of the points that they see, weighted with
+    what these give, count as such; the limit vanishes with the step.
     """
 
     light: float
@@ -105,6 +108,7 @@ def _(task, kin, nodes, n, dt):
     for k in range(nodes.sums.shape[1]):
         nodes.sums[n, k] = 0
     clear_optional(field(nodes.fields, Normal), n)
+    clear_optional(field(nodes.fields, SeenMass), n)
 
 
 @at_node.on(ClearVelocity)
@@ -136,13 +140,28 @@ def _(task, kin, nodes, n, dt):
         nodes.velocity[n, k] = nodes.sums[n, of_momentum(kin) + k] * factor
 
 
+def unlimited(seen, n, mass, light):
+    """The share of its change of velocity that a node shows: all where it is not light."""
+    if seen is None:
+        return real(1, mass)
+    square = mass * mass
+    least = light * seen[n, 0]
+    return square / least if square < least else real(1, mass)
+
+
+@by_type(unlimited)
+def _unlimited(seen, n, mass, light):
+    if isinstance(seen, types.NoneType):
+        return lambda seen, n, mass, light: real(1, mass)
+    return unlimited
+
+
 @at_node.on(UpdateToVelocity)
 def _(task, kin, nodes, n, dt):
     # See UpdateToVelocity.light: the change of a light node's velocity enters the gradient by the
     # share of its mass. Points take the whole change: momentum is kept.
     one = real(1, dt)
-    mass = nodes.sums[n, MASS]
-    share = mass / task.light if mass < task.light else one
+    share = unlimited(field(nodes.fields, SeenMass), n, nodes.sums[n, MASS], task.light)
     for k in range(dimension(kin)):
         dv = nodes.update[n, of_change(kin) + k]
         nodes.velocity[n, k] = nodes.update[n, k] - (one - share) * dv

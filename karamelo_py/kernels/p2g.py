@@ -14,7 +14,7 @@ from karamelo_py.compiler.compile import (
     real,
     shared,
 )
-from karamelo_py.compiler.fields import field, load, load_vector, vector
+from karamelo_py.compiler.fields import field, load, load_vector, scalar, vector
 from karamelo_py.compiler.tuples import (
     add_optional,
     leading,
@@ -90,6 +90,20 @@ class Normal(NamedTuple):
     kept = False
 
 
+class SeenMass(NamedTuple):
+    """Sum of N m^2 at a node: over that of N m it is the mean mass of the points it sees (USL)."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+
+    @staticmethod
+    def needed(basis: Any) -> bool:
+        """Whether a basis makes light nodes that the gradient feels."""
+        return basis.steep_edge
+
+
 @point_function()
 def load_of(quantity, w, p, like):
     """What a point brings to the nodes."""
@@ -131,6 +145,7 @@ def _(quantity, w, stencil, k, load):
     part = momentum_part(w, stencil, k, weight, mass, v, moment)
     accumulate(w.nodes.sums, i, MASS, (weight * mass,) + part)
     accumulate_optional(field(w.nodes.fields, Normal), i, scale(mass, leading(gradient, v)))
+    accumulate_optional(field(w.nodes.fields, SeenMass), i, (weight * mass * mass,))
 
 
 @load_of.on(InternalForce)

@@ -20,9 +20,9 @@ from karamelo_py.compiler.compile import (
     real,
     shared,
 )
-from karamelo_py.compiler.fields import load, load_vector
+from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.tuples import record, subtract
+from karamelo_py.compiler.tuples import clear_first, record, subtract
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import (
     DT,
@@ -37,6 +37,9 @@ from karamelo_py.kernels.arrays import (
     TIMESTEP,
     Hooks,
     NoHooks,
+    of_change,
+    of_force,
+    of_momentum,
 )
 from karamelo_py.kernels.g2p import STRAINS, FBar, Move, SeriesTerm, TrialStrain
 from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks
@@ -47,6 +50,7 @@ from karamelo_py.kernels.nodes import (
     ExtendSeries,
     MomentumToVelocity,
     StartSeries,
+    SumsToVelocity,
     TakeMean,
     Update,
     UpdateToVelocity,
@@ -55,6 +59,7 @@ from karamelo_py.kernels.p2g import (
     InternalForce,
     MassMomentum,
     MomentumAgain,
+    Normal,
     SeriesBack,
     Volumes,
 )
@@ -69,7 +74,7 @@ from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows, inverse_stretch_squared
 from karamelo_py.points.grid import inside
-from karamelo_py.points.kinematics import dimension, largest_component
+from karamelo_py.points.kinematics import Axisymmetric, dimension, largest_component
 from karamelo_py.points.laws import initial_state, wave_speed_squared
 from karamelo_py.points.transfers.xpic import XPIC
 
@@ -314,6 +319,38 @@ def _(contact, s, steps):
     return None
 
 
+@kernel
+def _clear_radial(kin, nodes, grids):
+    for g in range(grids.first.size):
+        if abs(grids.x0[g]) > grids.slack[g] * grids.h[g]:
+            continue
+        for n in range(grids.first[g], grids.first[g] + grids.step_x[g]):
+            if nodes.sums[n, MASS] > 0:
+                nodes.sums[n, of_momentum(kin)] = 0
+                nodes.sums[n, of_force(kin)] = 0
+                nodes.update[n, 0] = 0
+                nodes.update[n, of_change(kin)] = 0
+                nodes.velocity[n, 0] = 0
+                clear_first(field(nodes.fields, Normal), n)
+
+
+@point_function()
+def hold_axis(kin, s):
+    """Let no node on an axis of symmetry leave it; by default there is none."""
+
+
+@hold_axis.otherwise
+def _(kin, s):
+    return None
+
+
+@hold_axis.on(Axisymmetric)
+def _(kin, s):
+    # v_r = 0 at r = 0: N / r of a node there grows without bound where a point comes near. And a
+    # body that touches another on the axis has a normal along it.
+    _clear_radial(kin, s.nodes, s.grids)
+
+
 @point_function()
 def sum_series(transfer, s, mode):
     """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
@@ -336,6 +373,7 @@ def _(transfer, s, mode):
         visit_here(s, mode, visit, dt, True, True)
         factor *= -float(order - k + 1) / k
         sweep_nodes(mode, ExtendSeries(real(factor, dt)), s.kin, s.nodes, s.spans, dt)
+    hold_axis(s.kin, s)
 
 
 @point_function()
@@ -357,7 +395,7 @@ def _(averaging, s, mode, dt):
 
 @shared
 def light_node(s):
-    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of the lightest point.
+    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of a point that the node sees.
 
     Less than one: a share below m / m_p would be less than what comes back to the node through the
     points' velocities, and the strain of the node would run ahead of its stress.
@@ -365,7 +403,7 @@ def light_node(s):
     clock = s.control.clock[0]
     courant = clock.rate * s.control.values[DT] / clock.spacing
     masses = min(dimension(s.kin) * courant * courant, 1.0)
-    return UpdateToVelocity(real(masses * clock.lightest, s.nodes.sums[0, MASS]))
+    return UpdateToVelocity(real(masses, s.nodes.sums[0, MASS]))
 
 
 light_node.goes_through = UpdateToVelocity.goes_through
@@ -393,6 +431,10 @@ CONTACT = _call(
 )
 CONTACT_BEFORE = _call("touch_velocity(s.contact, s, 0)", lambda s: None)
 CONTACT_AFTER = _call("touch_velocity(s.contact, s, 1)", lambda s: None)
+AXIS = _call(
+    "hold_axis(s.kin, s)",
+    lambda s: "v_r = 0 on the axis" if hold_axis.defined(type(s.kin)) else None,
+)
 SERIES = _call(
     "sum_series(s.transfer, s, mode)",
     lambda s: "series of XPIC" if isinstance(s.transfer, XPIC) else None,
@@ -400,11 +442,14 @@ SERIES = _call(
 
 SUMS = table.Scatter((MassMomentum(), InternalForce()), PresentWeights(), ClearSums())
 MASS_AND_MOMENTUM = table.Scatter((MassMomentum(),), PresentWeights(), ClearSums())
+# For schemes that strain first.
+VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.Nodes(SumsToVelocity()))
 FORCE = table.Scatter((InternalForce(),), OldWeights())
 # v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
 ACCELERATE = (
     HEAT,
     table.AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS),
+    AXIS,
     table.Nodes(Update()),
     table.AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE),
     CONTACT,
@@ -419,6 +464,7 @@ MOVE = (
 MOMENTUM_AGAIN = (
     table.Scatter((MomentumAgain(),), OldWeights(), ClearVelocity()),
     table.Nodes(MomentumToVelocity()),
+    AXIS,
 )
 
 

@@ -7,6 +7,7 @@ which fields exist (`karamelo-py check` prints them) and, by their types, what i
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -191,6 +192,11 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         heat = Conducting(lower_nodes((NodalMean,), Line(), count, real))
     owners = [method.frame, transfer, averaging, contact, heat, grids]
     owners += [*hub.fixes.values(), hub.update.scheme, basis, method]
+    at_nodes = [
+        kind
+        for kind in fields.declared(owners, "node_fields")
+        if getattr(kind, "needed", lambda basis: True)(basis)
+    ]
     setup = Setup(
         frame=method.frame,
         kin=kin,
@@ -200,19 +206,17 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         contact=contact,
         heat=heat,
         grids=grids,
-        nodes=lower_nodes(fields.declared(owners, "node_fields"), kin, count, real),
+        nodes=lower_nodes(at_nodes, kin, count, real),
         blocks=lower_blocks(
             hub, kin, fields.declared(owners, "point_fields"), tiles, real, previous
         ),
         spans=tiles.empty_spans(),
         control=control,
     )
-    if basis.steep_edge:
-        clock.lightest = min(float(s.mass.astype(real).min()) for s in hub.solids.values())
     return setup, tiles
 
 
-def lower_nodes(kinds: tuple[type, ...], kin: NamedTuple, count: int, real: type) -> Nodes:
+def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> Nodes:
     """Fields of `count` nodes, zero: the system gives memory to pages only when touched."""
     d = kin.dimension
     return Nodes(

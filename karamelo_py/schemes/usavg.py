@@ -12,18 +12,17 @@ from karamelo_py.kernels.arrays import (
     POST_VELOCITIES_TO_GRID,
 )
 from karamelo_py.kernels.g2p import SecondStrain, Strain
-from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.step import (
     ACCELERATE,
     CONTACT_AFTER,
     CONTACT_BEFORE,
     FORCE,
-    MASS_AND_MOMENTUM,
     MOMENTUM_AGAIN,
     MOVE,
     SERIES,
+    VELOCITY_BEFORE,
 )
-from karamelo_py.kernels.table import AtNodes, AtPoints, Gather, Nodes
+from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 
 
 class USAVG(NamedTuple):
@@ -40,8 +39,7 @@ class USAVG(NamedTuple):
     courant = (1.0, 1.0)
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),
-        MASS_AND_MOMENTUM,
-        Nodes(SumsToVelocity()),
+        *VELOCITY_BEFORE,
         AtNodes(POST_UPDATE_GRID_STATE, ON_VELOCITY),
         CONTACT_BEFORE,
         Gather(Strain(), 0.5),

@@ -11,16 +11,15 @@ from karamelo_py.kernels.arrays import (
     POST_UPDATE_GRID_STATE,
 )
 from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.step import (
     ACCELERATE,
     CONTACT_BEFORE,
     FORCE,
-    MASS_AND_MOMENTUM,
     MOVE,
     SERIES,
+    VELOCITY_BEFORE,
 )
-from karamelo_py.kernels.table import AtNodes, AtPoints, Gather, Nodes
+from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 
 
 class USF(NamedTuple):
@@ -36,8 +35,7 @@ class USF(NamedTuple):
     courant = (1.0, 1.0)
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),
-        MASS_AND_MOMENTUM,
-        Nodes(SumsToVelocity()),
+        *VELOCITY_BEFORE,
         AtNodes(POST_UPDATE_GRID_STATE, ON_VELOCITY),
         CONTACT_BEFORE,
         Gather(Strain()),

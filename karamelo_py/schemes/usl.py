@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE
 from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.p2g import SeenMass
 from karamelo_py.kernels.step import ACCELERATE, MOVE, SERIES, SUMS, light_node
 from karamelo_py.kernels.table import AtPoints, Gather, Nodes
 
@@ -16,7 +17,7 @@ class USL(NamedTuple):
     One visit of the points a step: the fastest scheme. It dissipates a little. A node with next to
     no mass gets a large velocity, which would show in the gradient: there, and there only, the
     gradient takes the change of velocity by the share of the mass, below d (c dt / h)^2 times (at
-    most once) the mass of the lightest point of the scene. Momentum is kept.
+    most once) the mean mass of the points that the node sees. Momentum is kept.
 
     The stable step is shorter than of the other schemes: 0.65 h/c, and 0.4 h/c with one point a
     cell; 0.7 of that with Bernstein-quadratic. Where points average a mode of the nodes away, its
@@ -29,6 +30,7 @@ class USL(NamedTuple):
     """
 
     courant = (0.65, 0.4)
+    node_fields = (SeenMass,)
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),
         SUMS,
