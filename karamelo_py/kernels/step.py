@@ -19,6 +19,7 @@ from karamelo_py.compiler.compile import (
     point_function,
     real,
     shared,
+    subkernel,
 )
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.held import hold
@@ -319,7 +320,7 @@ def _(contact, s, steps):
     return None
 
 
-@kernel
+@subkernel
 def _clear_radial(kin, nodes, grids):
     for g in range(grids.first.size):
         if abs(grids.x0[g]) > grids.slack[g] * grids.h[g]:
