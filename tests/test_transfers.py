@@ -124,8 +124,10 @@ def test_definitions():
     mixed = (0.4 * 1.1 + 0.6 * 3, 0.4 * 2.2 + 0.6 * 4)
     for transfer in (FLIP(0.4), AFLIP(0.4), ASFLIP(0.4), TFLIP(0.4)):
         assert updated_velocity(transfer, v, v_pic, dv) == pytest.approx(mixed)
-    assert displacing_velocity(FLIP(0.4), v, v_pic) == v_pic
-    assert displacing_velocity(ASFLIP(0.4), v, v_pic) == v  # Fei et al. 2021
+    assert displacing_velocity(FLIP(0.4), v, v_pic, ()) == v_pic
+    # Fei et al. 2021: with their own velocity where they are not pressed together
+    assert displacing_velocity(ASFLIP(0.4), v, v_pic, 1.0) == v
+    assert displacing_velocity(ASFLIP(0.4), v, v_pic, 0.99) == v_pic
     assert (terms(FLIP(1.0)), terms(XPIC(5))) == (1, 5)
 
 

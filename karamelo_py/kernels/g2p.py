@@ -65,6 +65,7 @@ from karamelo_py.points.transfers import (
     displacing_velocity,
     gradient_weight,
     kept_gradient,
+    known_volume,
     straining,
     updated_velocity,
     zero_moment,
@@ -492,7 +493,9 @@ def _move(w, stencil, p, dt, total):
     old = load_vector(w.kin, w.points.v, p)
     v = constrained_velocity(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
     x = load_vector(w.kin, w.places.x, p)
-    step = scale(dt, constrained_velocity(law, v, displacing_velocity(w.transfer, v, total[0])))
+    j = known_volume(w.transfer, law, w.kin, state_of(w, law, p, dt))
+    displacing = displacing_velocity(w.transfer, v, total[0], j)
+    step = scale(dt, constrained_velocity(law, v, displacing))
     y = add_scaled(x, real(1, dt), step)
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, total[2])
     increase(field(w.points.fields, Bounces), p, hits)

@@ -48,13 +48,23 @@ def take_nodal_velocity(transfer: type) -> None:
 
 
 @point_function()
-def displacing_velocity(transfer, v, v_pic):
-    """The velocity that moves the point; `v` is its own after the step."""
+def displacing_velocity(transfer, v, v_pic, j):
+    """The velocity that moves the point; `v` is its own after the step, `j` its `known_volume`."""
 
 
 @displacing_velocity.otherwise
-def _(transfer, v, v_pic):
+def _(transfer, v, v_pic, j):
     return v_pic
+
+
+@point_function()
+def known_volume(transfer, law, kin, state):
+    """det F of a point for transfers that ask for it; else nothing."""
+
+
+@known_volume.otherwise
+def _(transfer, law, kin, state):
+    return ()
 
 
 @point_function()

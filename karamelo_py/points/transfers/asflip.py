@@ -1,18 +1,24 @@
-"""ASFLIP: AFLIP whose points may move against each other (Fei et al. 2021)."""
+"""ASFLIP: AFLIP whose points come apart where they are not pressed together (Fei et al. 2021)."""
 
 from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.points.transfers import Moment, affine, displacing_velocity
+from karamelo_py.compiler.compile import choose, real
+from karamelo_py.compiler.tuples import add_scaled, subtract
+from karamelo_py.points.laws import jacobian
+from karamelo_py.points.transfers import Moment, affine, displacing_velocity, known_volume
 from karamelo_py.points.transfers.flip import Share, blended
+
+COMPRESSED = 1e-3  # share of its volume that a point has to lose to go with the grid
 
 
 class ASFLIP(NamedTuple):
-    """AFLIP whose points move with their own velocity after the step, not with that of the grid.
+    """AFLIP whose points move with their own velocity after the step where they come apart.
 
     Points that the grid holds together come apart sooner: for granular flow and splashes
-    (Fei et al. 2021, section 5; here, as in Karamelo, without their factor for separation only).
+    (Fei et al. 2021, section 5). Where the material is compressed, by more than a thousandth of its
+    volume, points go with the grid as in all other transfers, so that they keep their order.
 
     Parameters
     ----------
@@ -31,9 +37,16 @@ class ASFLIP(NamedTuple):
     in_lanes = True
 
 
+@known_volume.on(ASFLIP)
+def _(transfer, law, kin, state):
+    return jacobian(law, kin, state)
+
+
 @displacing_velocity.on(ASFLIP)
-def _(transfer, v, v_pic):
-    return v
+def _(transfer, v, v_pic, j):
+    one = real(1, j)
+    beta = choose(one - j < real(COMPRESSED, j), one, j - j)
+    return add_scaled(v_pic, beta, subtract(v, v_pic))
 
 
 blended(ASFLIP)
