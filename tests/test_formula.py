@@ -10,9 +10,11 @@ import pytest
 from karamelo_py.compiler.formula import (
     BLOCK,
     CONSTANT,
-    MAX_DEPTH,
+    KEEP,
+    KEPT,
     OPERATIONS,
     POINT,
+    ROWS,
     SPREAD,
     UNIFORM,
     Program,
@@ -168,7 +170,7 @@ def test_positions_now_and_in_the_beginning_are_told_apart(hub):
 def test_the_program_follows_the_published_values(hub):
     rising = formula(hub, "2*time")
     program = rising.program(hub.values)
-    out, stack = np.zeros(BLOCK), np.zeros((MAX_DEPTH, BLOCK))
+    out, stack = np.zeros(BLOCK), np.zeros((ROWS, BLOCK))
     for time in (1.0, 2.0):
         hub.values.set("time", time)
         evaluate(program, hub.values.array, np.zeros((6, BLOCK)), BLOCK, out, stack)
@@ -179,8 +181,46 @@ def test_the_program_follows_the_published_values(hub):
 def test_only_the_count_asked_for_is_written():
     program = Program(np.array([[CONSTANT + UNIFORM, 0]]), np.array([3.0]))
     out = np.zeros(BLOCK)
-    evaluate(program, np.zeros(4), np.zeros((6, BLOCK)), 5, out, np.zeros((MAX_DEPTH, BLOCK)))
+    evaluate(program, np.zeros(4), np.zeros((6, BLOCK)), 5, out, np.zeros((ROWS, BLOCK)))
     assert out.sum() == 15
+
+
+def test_a_named_formula_is_evaluated_once(hub):
+    """Newton's method for cos(u) = u: each of its ten steps uses the one before three times."""
+    steps = "\n".join("u = u - (cos(u) - u)/(-sin(u) - 1)" for _ in range(10))
+    hub.interpreter.run_text(f"u = x + 1.5 + time/1000\n{steps}\n")
+    found = hub.interpreter.variables["u"]
+    result = found.evaluate_points(hub.values, np.column_stack([A, B]))
+    assert result == pytest.approx(np.full(300, 0.7390851332151607), rel=1e-15)
+    operations = list(found.program(hub.values).code[:, 0])
+    assert operations.count(OPERATIONS["cos"]) == 10
+    assert operations.count(KEEP) == 10
+    assert operations.count(KEPT) == 4 * 9 + 4  # u, and in cos, in -u and in sin
+
+
+def test_a_formula_of_time_is_evaluated_once_as_well(hub):
+    hub.interpreter.run_text("a = sin(time)\nb = a*a + a\nc = b*x + b\n")
+    found = hub.interpreter.variables["c"]
+    b = np.sin(0.7) ** 2 + np.sin(0.7)
+    result = found.evaluate_points(hub.values, np.column_stack([A, B]))
+    assert result == pytest.approx(b * A + b, rel=1e-15)
+    operations = list(found.program(hub.values).code[:, 0])
+    assert operations.count(OPERATIONS["sin"] + UNIFORM) == 1
+    assert KEEP + UNIFORM in operations
+
+
+@pytest.mark.parametrize("nesting", ["(x + {})", "({} + x)", "min(1, 2*{})"])
+def test_formulas_may_be_nested_beyond_the_stack(hub, nesting):
+    lines = "".join("f = " + nesting.format("f") + "\n" for _ in range(300))
+    hub.interpreter.run_text(f"f = x/1000\n{lines}")
+    result = hub.interpreter.variables["f"].evaluate_points(hub.values, np.column_stack([A, B]))
+    expected = A / 1000
+    for _ in range(300):
+        expected = np.minimum(1, 2 * expected) if "min" in nesting else expected + A
+    assert result == pytest.approx(expected, rel=1e-12)
+    # As deep in one line as the parser goes.
+    deep = formula(hub, "x" + "+(x*2" * 60 + ")" * 60)
+    assert deep.evaluate_points(hub.values, np.ones((3, 1))) == pytest.approx(121)
 
 
 def test_what_is_the_same_everywhere_is_computed_once(hub):

@@ -3,7 +3,8 @@
 A formula costs no compilation of its own. The evaluator goes through the program once per block and
 does each operation for all points of the block in a simple loop. What is the same at all points
 (time, constants, and whatever is made of them alone) is computed once per block: such instructions
-carry the mark `UNIFORM`, and a `SPREAD` makes a row of the result where points come in.
+carry the mark `UNIFORM`, and a `SPREAD` makes a row of the result where points come in. What a
+formula needs more than once is computed once and kept in a row behind the stack.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from karamelo_py.compiler.compile import caller_of, kernel
 
 BLOCK = 128
 MAX_DEPTH = 32
+MAX_KEPT = 32
+ROWS = MAX_DEPTH + MAX_KEPT  # of the scratch that a program works in: the stack, then what is kept
 # Added to an operation that is done once for the whole block.
 UNIFORM = 1 << 16
 
@@ -25,6 +28,8 @@ UNIFORM = 1 << 16
 CONSTANT, GLOBAL, POINT = 0, 1, 2
 # Make a row of the number that lies `operand` below the top.
 SPREAD = 3
+# Take the top off into the row `operand` of what is kept; push that row.
+KEEP, KEPT = 150, 151
 
 # fmt: off
 UNARY = (
@@ -251,7 +256,7 @@ def _evaluate_compiled(program, globals_, points, count, out, stack):
         Number of points, at most BLOCK.
     out : ndarray (BLOCK,) float64
         Gets the `count` results.
-    stack : ndarray (MAX_DEPTH, BLOCK) float64
+    stack : ndarray (ROWS, BLOCK) float64
         Scratch.
     """
     code = program.code
@@ -285,6 +290,14 @@ def _evaluate_compiled(program, globals_, points, count, out, stack):
         elif op < SELECT:
             top -= 1
             _binary(op, n, stack[top], stack[top + 1])
+        elif op == KEEP:
+            for i in range(n):
+                stack[MAX_DEPTH + operand, i] = stack[top, i]
+            top -= 1
+        elif op == KEPT:
+            top += 1
+            for i in range(n):
+                stack[top, i] = stack[MAX_DEPTH + operand, i]
         else:
             top -= 2
             for i in range(n):
@@ -354,6 +367,7 @@ _BY_NUMBER = {number: _NUMPY.get(name) or getattr(np, name) for name, number in 
 
 def _evaluate_numpy(program, globals_, points, count, out, stack):
     values: list = []
+    kept: dict = {}
     with np.errstate(all="ignore"):
         for op, operand in program.code:
             op = int(op) % UNIFORM
@@ -363,6 +377,10 @@ def _evaluate_numpy(program, globals_, points, count, out, stack):
                 values.append(np.full(count, globals_[operand]))
             elif op == POINT:
                 values.append(np.array(points[operand, :count]))
+            elif op == KEEP:
+                kept[operand] = values.pop()
+            elif op == KEPT:
+                values.append(kept[operand])
             elif op != SPREAD:
                 takes = 1 if op < _FIRST_BINARY else 2 if op < SELECT else 3
                 values[-takes:] = [np.asarray(_BY_NUMBER[op](*values[-takes:]), dtype=float)]
@@ -406,7 +424,7 @@ def evaluate_all(program, globals_, x, x0, out, scratch):
         Positions now and in the beginning.
     out : ndarray (n,) float64
         Gets the results.
-    scratch : ndarray (6 + MAX_DEPTH, BLOCK) float64
+    scratch : ndarray (6 + ROWS, BLOCK) float64
     """
     points = scratch[:6]
     stack = scratch[6:]

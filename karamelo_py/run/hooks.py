@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.compile import address_of
-from karamelo_py.compiler.formula import BLOCK, EVALUATE, MAX_DEPTH, STACK, evaluate_in_table
+from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 from karamelo_py.kernels.arrays import HOOK, PROGRAM, Hooks, NoHooks
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.language.faults import told
@@ -37,7 +37,7 @@ def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
         constants=np.concatenate([np.empty(0), *builder.constants]),
         x0=np.empty((0, dimension)) if x0 is None else x0,
         chosen=np.zeros(BLOCK, np.int64),
-        scratch=np.zeros((STACK + MAX_DEPTH, BLOCK)),
+        scratch=np.zeros((STACK + ROWS, BLOCK)),
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from karamelo_py.compiler.formula import Program
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import FUNCTIONS, TAIL, compute, compute_quietly
+from karamelo_py.script.programs import in_order, program
 from karamelo_py.script.syntax import Binary, Function, Name, Node, Number, Raw, Text, Unary
 from karamelo_py.script.values import Values
 
@@ -21,10 +22,10 @@ POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
 GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 
-# Operands on the evaluator's stack, levels of nesting, number of operations in all.
-_MAX_STACK = 32
-_MAX_DEPTH = 200
+# Number of operations in all; of those that messages show.
 _MAX_SIZE = 20000
+_MAX_SHOWN = 1000
+_MAX_LEVELS = 100
 
 # Functions that the evaluator does not know as such.
 _REWRITTEN = {
@@ -81,7 +82,7 @@ _PRECEDENCE = {
 class _Term:
     """A node of a formula: a number, the name of a seed, or an operation on terms."""
 
-    __slots__ = ("depth", "names", "need", "operands", "operation", "size", "value")
+    __slots__ = ("names", "operands", "operation", "size", "value")
 
     def __init__(self, operation: str, operands: tuple[_Term, ...], value: Any):
         self.operation = operation
@@ -92,15 +93,12 @@ class _Term:
             self.names = frozenset({value})
         elif operands:
             self.names = frozenset().union(*(term.names for term in operands))
-        self.depth = 1 + max((term.depth for term in operands), default=0)
+        # Operations as if none were shared, counted in earnest only where they seem too many.
         self.size = 1 + sum(term.size for term in operands)
-        # Operands wait on the stack while the next one is computed.
-        self.need = max((k + term.need for k, term in enumerate(operands)), default=1)
-        if self.need > _MAX_STACK or self.depth > _MAX_DEPTH or self.size > _MAX_SIZE:
-            raise ScriptError(
-                "the formula is too long",
-                expected=f"at most {_MAX_SIZE} operations, nested {_MAX_STACK} deep",
-            )
+        if self.size > _MAX_SIZE:
+            self.size = len(in_order(self))
+        if self.size > _MAX_SIZE:
+            raise ScriptError("the formula is too long", expected=f"at most {_MAX_SIZE} operations")
 
 
 def _number(value: float) -> _Term:
@@ -173,7 +171,9 @@ class Formula:
 
     @property
     def text(self) -> str:
-        """The formula as it could stand in a script, down to its seeds."""
+        """The formula as it could stand in a script, down to its seeds, unless it is too long."""
+        if not _is_short(self._term):
+            return f"a long formula of {', '.join(sorted(self.names)) or 'numbers'}"
         return _text(self._term)
 
     def __repr__(self) -> str:
@@ -197,15 +197,14 @@ class Formula:
 
     def program(self, values: Values) -> Program:
         """The formula for :func:`karamelo_py.compiler.formula.evaluate`."""
-        from karamelo_py.compiler import formula as kernels
+        from karamelo_py.compiler.formula import GLOBAL, POINT
 
-        code: list[tuple[int, int]] = []
-        constants: dict[float, int] = {}
-        _compile(self._term, values, kernels, code, constants)
-        return kernels.Program(
-            np.array(code, dtype=np.int64).reshape(-1, 2),
-            np.array(list(constants), dtype=np.float64),
-        )
+        def place(name: str) -> tuple[int, int]:
+            if name in POINT_SEEDS:
+                return POINT, POINT_SEEDS.index(name)
+            return GLOBAL, values.slot(_published(name, values))
+
+        return program(self._term, place)
 
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
@@ -230,7 +229,7 @@ class Formula:
         x = _three_columns(x)
         x0 = x if x0 is None else _three_columns(x0)
         out = np.empty(len(x))
-        scratch = np.empty((6 + kernels.MAX_DEPTH, kernels.BLOCK))
+        scratch = np.empty((6 + kernels.ROWS, kernels.BLOCK))
         kernels.evaluate_all(self.program(values), values.array, x, x0, out, scratch)
         return out
 
@@ -307,6 +306,16 @@ def number_text(value: float) -> str:
     return text.removesuffix(".0")
 
 
+def _is_short(root: _Term) -> bool:
+    """Whether a term can be written down, where what is shared is written again and again."""
+    levels: dict[int, int] = {}
+    sizes: dict[int, int] = {}
+    for term in in_order(root):
+        levels[id(term)] = 1 + max((levels[id(t)] for t in term.operands), default=0)
+        sizes[id(term)] = 1 + sum(sizes[id(t)] for t in term.operands)
+    return levels[id(root)] <= _MAX_LEVELS and sizes[id(root)] <= _MAX_SHOWN
+
+
 def _text(term: _Term) -> str:
     operation, operands = term.operation, term.operands
     if operation == "number":
@@ -336,53 +345,23 @@ def _bracketed(term: _Term, level: int) -> str:
     return _text(term) if own >= level else f"({_text(term)})"
 
 
-def _evaluate(term: _Term, values: Values) -> float:
-    if term.operation == "number":
-        return term.value
-    if term.operation == "name":
-        return values.get(_published(term.value, values))
-    return compute_quietly(term.operation, *[_evaluate(t, values) for t in term.operands])
+def _evaluate(root: _Term, values: Values) -> float:
+    found: dict[int, float] = {}
+    for term in in_order(root):
+        if term.operation == "number":
+            result = term.value
+        elif term.operation == "name":
+            result = values.get(_published(term.value, values))
+        else:
+            result = compute_quietly(term.operation, *[found[id(t)] for t in term.operands])
+        found[id(term)] = result
+    return found[id(root)]
 
 
 def _published(name: str, values: Values) -> str:
     if name not in values:
         raise ScriptError(f"'{name}' is no longer a value of a fix or a compute")
     return name
-
-
-def _compile(term: _Term, values: Values, kernels: Any, code: list, constants: dict) -> bool:
-    """Append the instructions for `term`; returns whether its result is the same at all points."""
-    if term.operation == "number":
-        # Keyed by the digits, not the value: 0.0 and -0.0 are different numbers.
-        slot = constants.setdefault(_Exact(term.value), len(constants))
-        code.append((kernels.CONSTANT + kernels.UNIFORM, slot))
-        return True
-    if term.operation == "name":
-        if term.value in POINT_SEEDS:
-            code.append((kernels.POINT, POINT_SEEDS.index(term.value)))
-            return False
-        code.append((kernels.GLOBAL + kernels.UNIFORM, values.slot(_published(term.value, values))))
-        return True
-    uniform = [_compile(operand, values, kernels, code, constants) for operand in term.operands]
-    operation = kernels.OPERATIONS[term.operation]
-    if all(uniform):
-        code.append((operation + kernels.UNIFORM, 0))
-        return True
-    for k, same in enumerate(uniform):
-        if same:
-            code.append((kernels.SPREAD, len(uniform) - 1 - k))
-    code.append((operation, 0))
-    return False
-
-
-class _Exact(float):
-    """A float that equals only its own bits."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, float) and self.hex() == other.hex()
-
-    def __hash__(self) -> int:
-        return hash(self.hex())
 
 
 def _three_columns(x: np.ndarray) -> np.ndarray:
