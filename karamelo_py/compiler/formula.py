@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import config, types
 
-from karamelo_py.compiler.compile import caller_of, kernel
+from karamelo_py.compiler.compile import by_type, caller_of, kernel
 
 BLOCK = 128
 MAX_DEPTH = 32
@@ -45,11 +45,11 @@ BINARY = (
 # fmt: on
 
 _FIRST_UNARY = 4
-_FIRST_BINARY = 64
+FIRST_BINARY = 64
 SELECT = 128
 OPERATIONS = (
     {name: _FIRST_UNARY + k for k, name in enumerate(UNARY)}
-    | {name: _FIRST_BINARY + k for k, name in enumerate(BINARY)}
+    | {name: FIRST_BINARY + k for k, name in enumerate(BINARY)}
     | {"if": SELECT}
 )
 
@@ -78,7 +78,35 @@ class Program(NamedTuple):
 
 @kernel
 def _function(op, a):
-    """A function that is rarely used, of one number: one chain of choices instead of many loops."""
+    """Any function of one number: one chain of choices, where a loop for each would be too much."""
+    if op == _NEG:
+        return -a
+    if op == _NOT:
+        return 1.0 if a == 0.0 else 0.0
+    if op == _ABS:
+        return abs(a)
+    if op == _SIGN:
+        return 1.0 if a > 0.0 else (-1.0 if a < 0.0 else a)
+    if op == _STEP:
+        return 0.0 if a < 0.0 else (1.0 if a >= 0.0 else a)
+    if op == _SQRT:
+        return math.sqrt(a)
+    if op == _EXP:
+        return math.exp(a)
+    if op == _LOG:
+        return math.log(a)
+    if op == _SIN:
+        return math.sin(a)
+    if op == _COS:
+        return math.cos(a)
+    if op == _FLOOR:
+        return np.floor(a)
+    if op == _CEIL:
+        return np.ceil(a)
+    if op == _ROUND:
+        return np.rint(a)
+    if op == _TRUNC:
+        return np.trunc(a)
     if op == _CBRT:
         return math.copysign(math.pow(abs(a), 1.0 / 3.0), a)
     if op == _LOG10:
@@ -119,8 +147,28 @@ def _function(op, a):
 
 
 @kernel
-def _compare(op, a, b):
-    """A comparison or a logical operation: 1.0 or 0.0."""
+def _pair(op, a, b):
+    """Any operation on two numbers: comparisons and logical ones give 1.0 or 0.0."""
+    if op == _ADD:
+        return a + b
+    if op == _SUB:
+        return a - b
+    if op == _MUL:
+        return a * b
+    if op == _DIV:
+        return a / b
+    if op == _POW:
+        return math.pow(a, b)
+    if op == _MIN:
+        return b if b < a else a
+    if op == _MAX:
+        return b if b > a else a
+    if op == _MOD:
+        return a % b  # the sign of the divisor, as in Python
+    if op == _ATAN2:
+        return math.atan2(a, b)
+    if op == _HYPOT:
+        return math.hypot(a, b)
     if op == _LT:
         result = a < b
     elif op == _LE:
@@ -164,27 +212,6 @@ def _unary(op, n, a):
     elif op == _ABS:
         for i in range(n):
             a[i] = abs(a[i])
-    elif op == _NOT:
-        for i in range(n):
-            a[i] = 1.0 if a[i] == 0.0 else 0.0
-    elif op == _SIGN:
-        for i in range(n):
-            a[i] = 1.0 if a[i] > 0.0 else (-1.0 if a[i] < 0.0 else a[i])
-    elif op == _STEP:
-        for i in range(n):
-            a[i] = 0.0 if a[i] < 0.0 else (1.0 if a[i] >= 0.0 else a[i])
-    elif op == _FLOOR:
-        for i in range(n):
-            a[i] = np.floor(a[i])
-    elif op == _CEIL:
-        for i in range(n):
-            a[i] = np.ceil(a[i])
-    elif op == _ROUND:
-        for i in range(n):
-            a[i] = np.rint(a[i])
-    elif op == _TRUNC:
-        for i in range(n):
-            a[i] = np.trunc(a[i])
     else:
         for i in range(n):
             a[i] = _function(op, a[i])
@@ -226,19 +253,9 @@ def _binary(op, n, a, b):
     elif op == _MAX:
         for i in range(n):
             a[i] = b[i] if b[i] > a[i] else a[i]
-    elif op == _MOD:
-        # The sign of the divisor, as in Python.
-        for i in range(n):
-            a[i] = a[i] % b[i]
-    elif op == _ATAN2:
-        for i in range(n):
-            a[i] = math.atan2(a[i], b[i])
-    elif op == _HYPOT:
-        for i in range(n):
-            a[i] = math.hypot(a[i], b[i])
     else:
         for i in range(n):
-            a[i] = _compare(op, a[i], b[i])
+            a[i] = _pair(op, a[i], b[i])
 
 
 @kernel
@@ -285,7 +302,7 @@ def _evaluate_compiled(program, globals_, points, count, out, stack):
             value = stack[top - operand, 0]
             for i in range(n):
                 stack[top - operand, i] = value
-        elif op < _FIRST_BINARY:
+        elif op < FIRST_BINARY:
             _unary(op, n, stack[top])
         elif op < SELECT:
             top -= 1
@@ -382,9 +399,31 @@ def _evaluate_numpy(program, globals_, points, count, out, stack):
             elif op == KEPT:
                 values.append(kept[operand])
             elif op != SPREAD:
-                takes = 1 if op < _FIRST_BINARY else 2 if op < SELECT else 3
+                takes = 1 if op < FIRST_BINARY else 2 if op < SELECT else 3
                 values[-takes:] = [np.asarray(_BY_NUMBER[op](*values[-takes:]), dtype=float)]
     out[:count] = values[0]
+
+
+def of_one(op, a):
+    """The function `op` of one number; inf or NaN where there is no result."""
+    with np.errstate(all="ignore"):
+        return float(_BY_NUMBER[op](a))
+
+
+@by_type(of_one)
+def _of_one(op, a):
+    return lambda op, a: _function(op, a)
+
+
+def of_two(op, a, b):
+    """The operation `op` on two numbers likewise."""
+    with np.errstate(all="ignore"):
+        return float(_BY_NUMBER[op](np.float64(a), b))
+
+
+@by_type(of_two)
+def _of_two(op, a, b):
+    return lambda op, a, b: _pair(op, a, b)
 
 
 evaluate = _evaluate_numpy if config.DISABLE_JIT else _evaluate_compiled

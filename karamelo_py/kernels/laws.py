@@ -1,28 +1,45 @@
 """Laws of materials as a run needs them: in its precision, and in tables.
 
-A law is a NamedTuple of numbers, or of parts that are NamedTuples of numbers
+A law is a NamedTuple of numbers, rows of numbers, or parts that are NamedTuples of the same
 (:mod:`karamelo_py.points.laws`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from karamelo_py.points.laws.numbers import Numbers
 
 
 def law_in(law: NamedTuple, real: type) -> NamedTuple:
     """The law with its numbers in the type `real`."""
-    return type(law)(*(law_in(p, real) if isinstance(p, tuple) else real(p) for p in law))
+    return type(law)(*(_in(p, real) for p in law))
+
+
+def _in(value: Any, real: type) -> Any:
+    if isinstance(value, tuple):
+        return law_in(value, real)
+    return np.array(value.values, real) if isinstance(value, Numbers) else real(value)
 
 
 def law_table(laws: Sequence[NamedTuple], real: type) -> NamedTuple:
-    """The NamedTuple of `laws` of one kind with an array (m,) for each number, m their count."""
-    columns = zip(*laws, strict=True)
-    return type(laws[0])(
-        *(law_table(c, real) if isinstance(c[0], tuple) else np.array(c, real) for c in columns)
-    )
+    """The NamedTuple of `laws` of one kind with an array (m,) for each number, m their count.
+
+    Rows of numbers become arrays (m, longest).
+    """
+    return type(laws[0])(*(_table(column, real) for column in zip(*laws, strict=True)))
+
+
+def _table(column: Sequence, real: type) -> Any:
+    if isinstance(column[0], tuple):
+        return law_table(column, real)
+    if isinstance(column[0], Numbers):
+        longest = max(len(row) for row in column)
+        return np.array([row.filled(longest) for row in column], real)
+    return np.array(column, real)
 
 
 def law_on(law: NamedTuple, h: float, T0: float | None) -> NamedTuple:

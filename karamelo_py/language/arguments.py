@@ -8,7 +8,7 @@ from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import Place, ScriptError
-from karamelo_py.script.expressions import Value
+from karamelo_py.script.expressions import Formula, Value, evaluate
 from karamelo_py.script.parser import parse_expression
 from karamelo_py.script.syntax import Raw
 
@@ -113,6 +113,16 @@ class Argument:
             )
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
+    def value_with(self, seeds: Sequence[str]) -> Value:
+        """The same, where the names `seeds` stand for what a formula is of, whatever they are else.
+
+        Raises
+        ------
+        ScriptError
+            With the place of what is wrong inside the argument.
+        """
+        return evaluate(parse_expression(self._raw), self._raw, _Seeds(self._interpreter, seeds))
+
     def behind(self, count: int) -> Argument:
         """What follows the first `count` characters."""
         return Argument(
@@ -136,6 +146,26 @@ class Argument:
             return None
         start = self._raw.source.text.index("=", self._raw.start) + 1
         return match[1], Argument(Raw(self._raw.source, start, self._raw.end), self._interpreter)
+
+
+class _Seeds:
+    """A scope in which some names are seeds of formulas."""
+
+    def __init__(self, outer: Any, seeds: Sequence[str]):
+        self.outer = outer
+        self.seeds = seeds
+
+    def name(self, name: str, node: Any, raw: Raw) -> Value:
+        """What a name stands for."""
+        return Formula.seed(name) if name in self.seeds else self.outer.name(name, node, raw)
+
+    def command(self, node: Any, raw: Raw) -> Value:
+        """The value of a call that is not a function."""
+        return self.outer.command(node, raw)
+
+    def hides(self, name: str) -> bool:
+        """Whether the script uses the name of a function for something else."""
+        return self.outer.hides(name)
 
 
 def look_up(catalogue: Any, argument: Argument):

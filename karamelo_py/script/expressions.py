@@ -7,11 +7,12 @@ the time, a published value), the result is a `Formula`, with the numbers folded
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
-from karamelo_py.compiler.formula import Program
+from karamelo_py.compiler.formula import GLOBAL, POINT, Program
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import FUNCTIONS, TAIL, compute, compute_quietly
 from karamelo_py.script.programs import in_order, program
@@ -197,7 +198,6 @@ class Formula:
 
     def program(self, values: Values) -> Program:
         """The formula for :func:`karamelo_py.compiler.formula.evaluate`."""
-        from karamelo_py.compiler.formula import GLOBAL, POINT
 
         def place(name: str) -> tuple[int, int]:
             if name in POINT_SEEDS:
@@ -205,6 +205,10 @@ class Formula:
             return GLOBAL, values.slot(_published(name, values))
 
         return program(self._term, place)
+
+    def program_of(self, seeds: Sequence[str], depth: int) -> Program:
+        """The formula of numbers that are not published, for a stack of this depth alone."""
+        return program(self._term, lambda name: (POINT, seeds.index(name)), depth=depth)
 
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None

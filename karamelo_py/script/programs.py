@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler import formula as kernels
 from karamelo_py.script.errors import ScriptError
 
 # Levels that are put on the stack without a row between; Python's own stack is spared, too.
@@ -34,7 +35,7 @@ def in_order(root: Any) -> list[Any]:
     return list(found.values())
 
 
-def program(root: Any, place: Callable[[str], tuple[int, int]]) -> Any:
+def program(root: Any, place: Callable[[str], tuple[int, int]], *, depth: int | None = None) -> Any:
     """The stack program of a term.
 
     Parameters
@@ -43,22 +44,23 @@ def program(root: Any, place: Callable[[str], tuple[int, int]]) -> Any:
         The term (`karamelo_py.script.expressions`).
     place
         The instruction that pushes a name: GLOBAL or POINT, and where it is.
+    depth
+        Of a stack without rows behind it; the program keeps nothing then.
 
     Raises
     ------
     ScriptError
         If more has to be kept at a time than there are rows.
     """
-    return _Writer(root, place).program()
+    return _Writer(root, place, depth).program()
 
 
 class _Writer:
     """One program while it is written: terms by their numbers, equal ones counted as one."""
 
-    def __init__(self, root: Any, place: Callable[[str], tuple[int, int]]):
-        from karamelo_py.compiler import formula
-
-        self.kernels = formula
+    def __init__(self, root: Any, place: Callable[[str], tuple[int, int]], depth: int | None):
+        self.bare = depth is not None
+        self.depth = depth or kernels.MAX_DEPTH
         self.place = place
         self.terms: list[tuple[str, tuple[int, ...], Any]] = []
         self.uses: list[int] = []
@@ -66,7 +68,7 @@ class _Writer:
         self.code: list[tuple[int, int]] = []
         self.constants: dict[_Exact, int] = {}
         self.rows: dict[int, int] = {}  # of terms that are kept now
-        self.free = list(range(formula.MAX_KEPT))[::-1]
+        self.free = list(range(kernels.MAX_KEPT))[::-1]
         self.root = self._number(root)
         self.kept = self._chosen()
 
@@ -90,12 +92,14 @@ class _Writer:
 
     def _is_uniform(self, operation: str, operands: tuple[int, ...], value: Any) -> bool:
         if operation == "name":
-            return self.place(value)[0] != self.kernels.POINT
+            return self.place(value)[0] != kernels.POINT
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
         """The terms that are kept: those with several users, and what the stack cannot hold."""
-        kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}
+        kept = set()
+        if not self.bare:
+            kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}
         rows, levels = [1] * len(self.terms), [1] * len(self.terms)
         for k, (_, operands, _) in enumerate(self.terms):
             while True:
@@ -103,8 +107,12 @@ class _Writer:
                 asked = [i + (1 if o in kept else rows[o]) for i, o in enumerate(operands)]
                 deep = [0 if o in kept else levels[o] for o in operands]
                 rows[k], levels[k] = max(asked, default=1), 1 + max(deep, default=0)
-                if rows[k] <= self.kernels.MAX_DEPTH and levels[k] <= _MOST_LEVELS:
+                if rows[k] <= self.depth and levels[k] <= _MOST_LEVELS:
                     break
+                if self.bare:
+                    raise ScriptError(
+                        "the formula is too long", expected=f"nested {self.depth} deep at most"
+                    )
                 kept.add(operands[deep.index(max(deep))])
         return kept
 
@@ -116,24 +124,24 @@ class _Writer:
                 if not self.free:
                     raise ScriptError(
                         "the formula is too long",
-                        expected=f"at most {self.kernels.MAX_KEPT} results that wait for their use",
+                        expected=f"at most {kernels.MAX_KEPT} results that wait for their use",
                     )
                 self.rows[k] = self.free.pop()
-                self._append(self.kernels.KEEP, self.rows[k], self.uniform[k])
+                self._append(kernels.KEEP, self.rows[k], self.uniform[k])
         self._write_or_take(self.root)
-        return self.kernels.Program(
+        return kernels.Program(
             np.array(self.code, dtype=np.int64).reshape(-1, 2),
             np.array(list(self.constants), dtype=np.float64),
         )
 
     def _append(self, operation: int, operand: int, uniform: bool) -> None:
-        self.code.append((operation + (self.kernels.UNIFORM if uniform else 0), operand))
+        self.code.append((operation + (kernels.UNIFORM if uniform else 0), operand))
 
     def _write_or_take(self, k: int) -> None:
         if k not in self.rows:
             self._write(k)
             return
-        self._append(self.kernels.KEPT, self.rows[k], self.uniform[k])
+        self._append(kernels.KEPT, self.rows[k], self.uniform[k])
         self.uses[k] -= 1
         if self.uses[k] == 0:
             self.free.append(self.rows.pop(k))
@@ -143,7 +151,7 @@ class _Writer:
         same = self.uniform[k]
         if operation == "number":
             slot = self.constants.setdefault(value, len(self.constants))
-            self._append(self.kernels.CONSTANT, slot, same)
+            self._append(kernels.CONSTANT, slot, same)
             return
         if operation == "name":
             self._append(*self.place(value), same)
@@ -153,8 +161,8 @@ class _Writer:
         if not same:
             for i, operand in enumerate(operands):
                 if self.uniform[operand]:
-                    self.code.append((self.kernels.SPREAD, len(operands) - 1 - i))
-        self._append(self.kernels.OPERATIONS[operation], 0, same)
+                    self.code.append((kernels.SPREAD, len(operands) - 1 - i))
+        self._append(kernels.OPERATIONS[operation], 0, same)
 
 
 class _Exact(float):

@@ -47,6 +47,21 @@ def _(temperature, heat):
 
 
 @point_function()
+def temperature_or(heat, otherwise):
+    """The temperature, or `otherwise` where the law has none."""
+
+
+@temperature_or.otherwise
+def _(heat, otherwise):
+    return otherwise
+
+
+@temperature_or.on(Warm)
+def _(heat, otherwise):
+    return heat.T
+
+
+@point_function()
 def heat_from(like, numbers):
     """The flat tuple `numbers` as `like` is: Warm(T), or ()."""
 

@@ -1,0 +1,182 @@
+"""strength formula: a flow stress that the script says."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.formula import (
+    CONSTANT,
+    FIRST_BINARY,
+    POINT,
+    SELECT,
+    SPREAD,
+    UNIFORM,
+    of_one,
+    of_two,
+)
+from karamelo_py.language.arguments import Argument
+from karamelo_py.language.scene import Scene
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.laws.numbers import Numbers
+from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
+from karamelo_py.points.laws.temperatures import temperature_or
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Formula
+
+SEEDS = ("ep", "epdot", "T")
+DEPTH = 8  # of the stack, a tuple
+
+
+class FlowFormula:
+    """For signatures: a formula of plastic strain, its rate and temperature, as numbers.
+
+    Two for each instruction: the operation, and the constant or the place of the seed.
+    """
+
+    script_kind: ClassVar[str] = "a formula of ep, epdot and T"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Numbers:
+        """The program that `argument` stands for."""
+        value = argument.value_with(SEEDS)
+        if isinstance(value, str):
+            raise ScriptError(f"'{value}' is text", place=argument.place)
+        formula = Formula.of(value)
+        others = formula.names.difference(SEEDS)
+        if others:
+            raise ScriptError(
+                f"the flow stress cannot depend on {min(others)}",
+                place=argument.place,
+                expected="a formula of ep, epdot and T, the plastic strain, its rate, the "
+                "temperature",
+            )
+        program = formula.program_of(SEEDS, DEPTH)
+        instructions = []
+        for operation, operand in program.code:
+            op = int(operation) % UNIFORM
+            if op != SPREAD:
+                constant = op == CONSTANT
+                instructions += [op, program.constants[operand] if constant else operand]
+        return Numbers(instructions)
+
+
+class FlowStress(NamedTuple):
+    """Flow stress by a formula of plastic strain, its rate, and temperature.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    Y
+        The flow stress: a formula of ep, the equivalent plastic strain, epdot, its rate in the
+        step, and T, the temperature. Here these names stand for nothing else.
+    T
+        Temperature where neither the material nor its solid has one.
+
+    Example
+    -------
+    strength(steel, formula, 80e9, 350e6 + 600e6*(1 - exp(-12*ep)))
+    strength(hot, formula, 80e9, (350e6 + 275e6*ep^0.36)*(1 + 0.022*log(max(epdot, 1))))
+
+    Notes
+    -----
+    Each step solves q = 3 G x + Y for the plastic strain x of the step, with Y at its end, by
+    Newton's method with a slope from differences. Y may fall with plastic strain, but not by 3 G or
+    more for each unit of it, and counts as 0 where it is below. A formula is interpreted: it
+    costs no compilation of its own, and some ten times the time of a law that is compiled.
+
+    See Also
+    --------
+    johnson_cook, zerilli-armstrong, tabulated, temperature plastic_work
+    """
+
+    G: float
+    program: Numbers
+    count: float
+    initial_temperature: float
+
+    @classmethod
+    def given(
+        cls,
+        G: Annotated[float, Positive],
+        Y: FlowFormula,
+        *,
+        T: Annotated[float, NonNegative] = 293.0,
+    ):
+        """The law from its formula."""
+        law = cls(G, Y, len(Y) // 2, T)
+        _check(law)
+        return law
+
+
+def _check(law: FlowStress) -> None:
+    """Refuse a formula that has no value where plastic flow begins, or further on."""
+    for ep in (0.0, 1e-3, 0.1, 1.0):
+        for epdot in (0.0, 1.0, 1e4):
+            Y = value(law, ep, epdot, law.initial_temperature)
+            if np.isnan(Y) or np.inf == Y:
+                raise ScriptError(
+                    f"the flow stress is {Y:g} where ep = {ep:g}, epdot = {epdot:g}, "
+                    f"T = {law.initial_temperature:g}",
+                    argument="Y",
+                    expected="a number for every plastic strain and rate from 0 on",
+                    hint="max(epdot, 1) or the like keeps a rate off 0; T=... begins at another T",
+                )
+    if not value(law, 1e-6, 1.0, law.initial_temperature) > 0:
+        raise ScriptError("the flow stress is not above 0 at first", argument="Y")
+
+
+@shared
+def pushed(stack, number):
+    """The stack with a number on top; the lowest one goes."""
+    return (number, stack[0], stack[1], stack[2], stack[3], stack[4], stack[5], stack[6])
+
+
+@shared
+def replaced(stack, taken, number):
+    """The stack with a number in the place of the `taken` upmost ones."""
+    if taken == 1:
+        return (number, stack[1], stack[2], stack[3], stack[4], stack[5], stack[6], stack[7])
+    if taken == 2:
+        return (number, stack[2], stack[3], stack[4], stack[5], stack[6], stack[7], 0.0)
+    return (number, stack[3], stack[4], stack[5], stack[6], stack[7], 0.0, 0.0)
+
+
+@shared
+def value(strength, ep, epdot, T):
+    """The formula at a plastic strain, a rate and a temperature, in double precision."""
+    stack = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for k in range(int(strength.count)):
+        op = int(strength.program[2 * k])
+        operand = real(strength.program[2 * k + 1], 1.0)
+        if op == CONSTANT:
+            stack = pushed(stack, operand)
+        elif op == POINT:
+            seed = ep if operand == 0 else (epdot if operand == 1 else T)
+            stack = pushed(stack, real(seed, 1.0))
+        elif op < FIRST_BINARY:
+            stack = replaced(stack, 1, of_one(op, stack[0]))
+        elif op < SELECT:
+            stack = replaced(stack, 2, of_two(op, stack[1], stack[0]))
+        else:
+            stack = replaced(stack, 3, stack[1] if stack[2] != 0.0 else stack[0])
+    return stack[0]
+
+
+hardening(FlowStress)
+
+
+@flow_stress.on(FlowStress)
+def _(strength, memory, increment, heat, dt):
+    zero = real(0, increment)
+    T = temperature_or(heat, strength.initial_temperature)
+    near = real(1e-6, increment) * (increment + real(1e-4, increment))
+    there = value(strength, memory[0] + increment, increment / dt, T)
+    beyond = value(strength, memory[0] + increment + near, (increment + near) / dt, T)
+    flow = max(real(there, increment), zero)
+    slope = (max(real(beyond, increment), zero) - flow) / near
+    # A slope of -3 G is where there is no solution any more.
+    return flow, max(slope, real(-2, slope) * strength.G)

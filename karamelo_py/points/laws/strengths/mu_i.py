@@ -1,0 +1,112 @@
+"""strength mu-i: dense granular flow, whose friction grows with the rate of shear."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Annotated, NamedTuple
+
+from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.tuples import plus, scale
+from karamelo_py.language.signature import Positive
+from karamelo_py.points.kinematics import contract, zero_symmetric
+from karamelo_py.points.laws.eos import pressure
+from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond
+from karamelo_py.points.laws.strengths.linear import elastic_trial
+from karamelo_py.points.laws.temperatures import thermal_pressure
+from karamelo_py.script.errors import ScriptError
+
+
+class MuI(NamedTuple):
+    """Friction of grains that flow: it grows with the rate of shear, mu(I).
+
+    Parameters
+    ----------
+    G
+        Shear modulus of the grains while they hold together.
+    mu_s
+        Friction of slow flow, the tangent of the angle of repose.
+    mu_2
+        Friction of fast flow, above mu_s.
+    I0
+        Inertial number at which friction is half way between.
+    d
+        Diameter of a grain.
+    rho_s
+        Density of a grain.
+
+    Example
+    -------
+    eos(beads, linear, 1500, 1e6)
+    strength(beads, mu-i, 4e5, 0.382, 0.643, 0.279, 0.5e-3, 2450)
+    material(beads, eos-strength, beads, beads)
+
+    Notes
+    -----
+    sqrt(s:s/2) = mu(I) p in flow, mu = mu_s + (mu_2 - mu_s)/(I0/I + 1), I = gamma' d sqrt(rho_s/p)
+    with the plastic shear rate gamma' (Jop, Forterre & Pouliquen 2006); below mu_s p the response
+    is elastic. Each step solves a quadratic equation for the shear stress at its end, whatever its
+    size (Dunatunga & Kamrin 2015). Grains that are less dense than at first are apart: they bear
+    nothing, and meet again when the density is back. Flow keeps the volume. The column
+    ``inertial`` of dumps is I.
+
+    See Also
+    --------
+    drucker-prager, mohr-coulomb, eos linear, material eos-strength
+    """
+
+    G: Annotated[float, Positive]
+    mu_s: Annotated[float, Positive]
+    mu_2: Annotated[float, Positive]
+    I0: Annotated[float, Positive]
+    d: Annotated[float, Positive]
+    rho_s: Annotated[float, Positive]
+
+    def checked(self):
+        """The law.
+
+        Raises
+        ------
+        ScriptError
+            If friction falls with the rate: such flow is not stable.
+        """
+        if self.mu_2 < self.mu_s:
+            raise ScriptError(
+                f"the friction of fast flow, {self.mu_2:g}, is below that of slow flow",
+                argument="mu_2",
+                expected=f"a number of at least mu_s = {self.mu_s:g}",
+            )
+        return self
+
+
+remembers(MuI, ep=0.0, inertial=0.0)
+
+
+@elastic_ratio.on(MuI)
+def _(strength, memory, j):
+    return min(j, real(1, j))  # grains that are apart are not stretched
+
+
+@respond.on(MuI)
+def _(strength, law, kin, s, strain, j, memories, dt):
+    zero, half = real(0, j), real(0.5, j)
+    memory = memories.strength
+    elastic = elastic_ratio(strength, memory, j)
+    p = pressure(law.eos, elastic, memories.energy, memories.heat)
+    p = plus(p, thermal_pressure(law.temperature, memories.heat))
+    if not p > zero:
+        return zero_symmetric(kin, j), (memory[0], zero), zero
+    trial = elastic_trial(kin, strength.G, s, strain)
+    shear = sqrt(half * contract(kin, trial, trial))
+    slow = strength.mu_s * p
+    if shear <= slow:
+        return trial, (memory[0], zero), zero
+    # (shear - tau)/(G dt) is the shear rate that tau = mu(I) p asks for: a quadratic equation.
+    fast = strength.mu_2 * p
+    grain = strength.d * sqrt(strength.rho_s / p)
+    viscous = strength.I0 * strength.G * dt / grain
+    b = fast + shear + viscous
+    c = fast * shear + slow * viscous
+    tau = real(2, c) * c / (b + sqrt(b * b - real(4, c) * c))
+    slip = (shear - tau) / strength.G
+    ep = memory[0] + slip * sqrt(real(1 / 3, slip))
+    return scale(tau / shear, trial), (ep, slip / dt * grain), tau * slip
