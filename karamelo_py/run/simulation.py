@@ -412,7 +412,7 @@ class Simulation:
 
     def _prepare_hooks(self) -> None:
         """Sort the fixes by how they act: once before the first step, in it, in every step."""
-        fixes = list(self.hub.fixes.values())
+        fixes = sorted(self.hub.fixes.values(), key=lambda fix: fix.acts_last)
         lasting = [fix for fix in fixes if not fix.first_step_only]
         new = [fix for fix in fixes if fix.first_step_only and fix not in self._begun]
         self._python = PythonHooks(self, lasting)
