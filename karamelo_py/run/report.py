@@ -14,6 +14,7 @@ from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import Fused, Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
+from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
@@ -75,7 +76,11 @@ def bytes_per_point(simulation: Simulation) -> int:
 def materials(hub: Hub, block: Any) -> list[Material]:
     """The materials of the points of this block: those in use whose laws are of its kind."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
-    return [material for material in used if law_kind(material.law) == law_kind(block.laws)]
+    return [
+        material
+        for material in used
+        if law_kind(material.law) == without_rate(law_kind(block.laws))
+    ]
 
 
 def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:

@@ -23,7 +23,7 @@ class EdgePressure(EdgeFix):
 
     Example
     -------
-    fix(cell, edge_pressure, all, sample, 1e5)
+    fix(cell, edge_pressure, all, disk, 1e5)
 
     Notes
     -----

@@ -29,7 +29,7 @@ class EdgeTraction(EdgeFix):
 
     Example
     -------
-    fix(pull, edge_traction, all, bar, xhi, 1e6*min(time/0.01, 1), 0)
+    fix(pull, edge_traction, all, disk, xhi, 1e6*min(time/0.01, 1), 0, 0)
 
     Notes
     -----
