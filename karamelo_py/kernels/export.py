@@ -68,6 +68,17 @@ def impose_stress(kin, like, points, laws, chosen, given, stress):
 
 
 @kernel
+def export_to_nodes(basis, kin, grids, grid_of, where, values, out):
+    """Add sum N value of the points to ``out`` (nodes,); ``values`` (n,)."""
+    for p in range(values.size):
+        grid = record(grids, index(grid_of[p]))
+        stencil = locate(basis, kin, grid, place_at(basis, kin, where, p))
+        for k in range(support(basis, kin)):
+            part = entry(basis, kin, grid, stencil, k)
+            out[index(part[0])] += part[1] * values[p]
+
+
+@kernel
 def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
     """The moments ``out`` (d d, n) sum N v (X - x) of velocity fields with these gradients.
 

@@ -22,8 +22,10 @@ from karamelo_py.kernels.export import (
 from karamelo_py.kernels.g2p import FBar
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.language.scene import Scene
+from karamelo_py.output.node_columns import NODE_COLUMNS
 from karamelo_py.points.boundary import ReflectingGrid
 from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density
+from karamelo_py.points.laws.plastic_rate import has_rate
 from karamelo_py.points.transfers import Moment
 
 AXES = "xyz"
@@ -44,7 +46,7 @@ NODE_NAMES = (
     + ["v" + axis for axis in AXES]
     + ["v" + axis + "_update" for axis in AXES]
     + ["f" + axis for axis in AXES]
-    + ["mass", "mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez"]
+    + ["mass", "vol", "mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez"]
 )
 
 
@@ -53,7 +55,7 @@ ABSENT_AT_POINTS = (
     "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
 )  # fmt: skip
 
-ABSENT_AT_NODES = ("mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez")
+ABSENT_AT_NODES = ("T",)
 
 
 class Fields:
@@ -188,9 +190,16 @@ class Fields:
         laws = [material.law for material in self.hub.materials.values()]
         return {name for law in laws for name in columns_of(law)}
 
+    def rate_is_asked_for(self) -> bool:
+        """Whether a dump or a compute has the column ``epdot``, which points keep for it alone."""
+        askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
+        return any("epdot" in getattr(asker, "columns", ()) for asker in askers)
+
     def absent_at_points(self) -> list[str]:
         """Names that `particle` knows, but that are 0 because no material has them."""
         present = self.columns_of_laws() | set(self.declared_columns())
+        if any(has_rate(material.law) for material in self.hub.materials.values()):
+            present.add("epdot")
         return [name for name in ABSENT_AT_POINTS if name not in present]
 
     def absent_at_nodes(self) -> list[str]:
@@ -225,7 +234,7 @@ class Fields:
             return self.reference_volume * self._exported[:, JACOBIAN]
         if name == "ienergy":
             return self._exported[:, ENERGY].copy()
-        if name in self.columns_of_laws():
+        if name in self.columns_of_laws() or name == "epdot":
             return self._cached(name, lambda s: _shown(s, name)).copy()
         if name == "seq":
             return _von_mises(self._exported[:, :STRAIN])
@@ -259,6 +268,8 @@ class Fields:
             return np.where(heat.sums[:, MASS] > 0, heat.velocity[:, 0], 0.0)
         if name in ABSENT_AT_NODES:
             return np.zeros(self.node_count)
+        if name in NODE_COLUMNS:
+            return NODE_COLUMNS[name](self.hub, self._simulation)
         axis = AXES.index(name[1])
         if axis >= d:
             return np.zeros(self.node_count)

@@ -43,6 +43,7 @@ from karamelo_py.points.laws import (
     specific_volume,
     with_temperature,
 )
+from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
@@ -257,6 +258,8 @@ def lower_block(
     """The points of all solids whose law is of one kind."""
     method = hub.update.method
     known = [law_on(s.material.law, s.h, s.T0) for s in solids]
+    if hub.fields.rate_is_asked_for():
+        known = [with_rate(law, kin, s.h) for law, s in zip(known, solids, strict=True)]
     laws_of_solids = list(dict.fromkeys(known))
     laws = law_table(laws_of_solids, real)
 
@@ -300,7 +303,7 @@ def resumed(block: Block, previous: State) -> Block:
 
     take(points.x, previous.places)
     take(points.v, previous.v)
-    take(points.state, previous.laws.get(law_kind(block.laws)))
+    take(points.state, previous.laws.get(without_rate(law_kind(block.laws))))
     for one in points.fields:
         take(one.array, previous.fields.get(type(one)))
     present = np.ones(len(points.id), np.bool_)

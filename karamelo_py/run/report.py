@@ -88,7 +88,11 @@ def bytes_per_point(simulation: Simulation) -> int:
 def materials(hub: Hub, block: Any) -> list[Material]:
     """The materials of the points of this block: those in use whose laws are of its kind."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
-    return [material for material in used if law_kind(material.law) == law_kind(block.laws)]
+    return [
+        material
+        for material in used
+        if law_kind(material.law) == without_rate(law_kind(block.laws))
+    ]
 
 
 def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:

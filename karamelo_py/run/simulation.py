@@ -45,6 +45,7 @@ from karamelo_py.kernels.step import (
 from karamelo_py.kernels.sweep import Serial, Threaded, Visit, sweep_nodes
 from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, law_kind, with_stress
+from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.hooks import lower_hooks
 from karamelo_py.run.lowering import (
     State,
@@ -78,6 +79,7 @@ def scene_key(hub: Hub) -> tuple:
         update.boundary,
         fields.declared(hub.fixes.values(), "point_fields"),
         fields.declared(hub.fixes.values(), "node_fields"),
+        hub.fields.rate_is_asked_for(),
         hub.settings.precision,
         hub.settings.threads,
     )
@@ -244,7 +246,7 @@ class Simulation:
             state = block.points.state
             rows = np.zeros((len(state), self.count), state.dtype)
             rows[:, block.points.id] = state
-            laws[law_kind(block.laws)] = rows
+            laws[without_rate(law_kind(block.laws))] = rows
         kept = [kind for kind in self.point_fields if fields.is_kept(kind)]
         return State(
             self.count,
@@ -449,7 +451,7 @@ class Simulation:
 
     def _prepare_hooks(self) -> None:
         """Sort the fixes by how they act: once before the first step, in it, in every step."""
-        fixes = list(self.hub.fixes.values())
+        fixes = sorted(self.hub.fixes.values(), key=lambda fix: fix.acts_last)
         lasting = [fix for fix in fixes if not fix.first_step_only]
         new = [fix for fix in fixes if fix.first_step_only and fix not in self._begun]
         self._python = PythonHooks(self, lasting)

@@ -68,6 +68,8 @@ class Fix:
         sets forces on points in ``initial_integrate``.
     needs_all_points
         Whether no point may be deleted (boundary delete) while it acts.
+    acts_last
+        Whether it acts after all others at each moment, wherever the script has it.
     friction
         Coefficient of friction between its two `solids`, for methods with contact on the grid; None
         for fixes that say nothing about that.
@@ -87,6 +89,7 @@ class Fix:
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
     needs_all_points = False
+    acts_last = False
     friction: float | None = None
     solids: tuple = ()
     id: str = ""

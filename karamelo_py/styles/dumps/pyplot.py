@@ -87,7 +87,7 @@ class PyPlot(Dump):
     ):
         if field is not None:
             self.check_columns([field], hub.fields.particle_names(), first=4)
-        super().__init__(hub, every, file)
+        super().__init__(hub, every, file, *([] if field is None else [field]))
         self.format = self.check_format()
         self.size = (_inches("width", width), _inches("height", height))
         if field is not None:

@@ -1,0 +1,81 @@
+"""The rate of plastic strain, for output: a further part of laws that lowering adds when asked."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+from karamelo_py.compiler.compile import choose, real
+from karamelo_py.points.laws import (
+    Absent,
+    column,
+    columns_of,
+    initial_state,
+    shown,
+    wave_speed_squared,
+)
+from karamelo_py.points.laws.eos_strength import EosStrength, memory_of
+from karamelo_py.points.laws.further import Further, initial_part, part_after
+from karamelo_py.points.laws.strengths import equivalent_plastic_strain
+
+# Karamelo smooths over the time in which sound goes through this many cells.
+CELLS = 1000
+
+
+class PlasticRate(NamedTuple):
+    """Rate of the equivalent plastic strain, smoothed over a time."""
+
+    time: float
+
+
+class Smoothed(NamedTuple):
+    """Tag of the smoothed rate."""
+
+
+column(PlasticRate, "epdot", Smoothed())
+
+
+@initial_part.on(PlasticRate)
+def _(part, like):
+    return (real(0, like), real(-1, like))  # no plastic strain is known yet
+
+
+@part_after.on(PlasticRate)
+def _(part, memory, law, kin, j, s, memories, dt):
+    ep = equivalent_plastic_strain(law.strength, memories.strength)
+    before = choose(memory[1] < 0, ep, memory[1])
+    change = (ep - before - dt * memory[0]) / part.time
+    return (max(memory[0] + change, real(0, j)), ep)
+
+
+@shown.on(Smoothed)
+def _(what, law, kin, state):
+    further = memory_of(law, kin, state).further
+    return further[len(further) - 2]
+
+
+def has_rate(law: NamedTuple) -> bool:
+    """Whether a law has plastic strain, so that it has a rate."""
+    return isinstance(law, EosStrength) and "ep" in columns_of(law)
+
+
+def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
+    """A law that keeps its rate behind all that it keeps else; `h` is the cell size."""
+    if not has_rate(law):
+        return law
+    speed = sqrt(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))
+    return law._replace(further=_behind(law.further, PlasticRate(CELLS * h / speed)))
+
+
+def without_rate(kinds: tuple[type, ...]) -> tuple[type, ...]:
+    """The kinds of a law (`law_kind`) as they are when nobody asks for the rate."""
+    if PlasticRate not in kinds:
+        return kinds
+    k = kinds.index(PlasticRate)
+    return kinds[: k - 1] + kinds[k + 1 :]
+
+
+def _behind(parts: NamedTuple, part: NamedTuple) -> NamedTuple:
+    if isinstance(parts, Absent):
+        return Further(part, parts)
+    return parts._replace(rest=_behind(parts.rest, part))

@@ -1,0 +1,63 @@
+"""fix local_damping: forces against the motion, as large as what is out of balance."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from karamelo_py.language.signature import In
+from karamelo_py.scene.group import NodeGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix, node_hook
+from karamelo_py.script.expressions import Expression
+
+
+def brake(mass, v, v_star, force, value, before, dt, share):
+    """v* loses a share of its change, against v; the total is the force that does so."""
+    against = value * abs(v_star - v)
+    if v == 0:
+        against = 0.0
+    elif v > 0:
+        against = -against
+    return v, v_star + against, force, mass * against / dt
+
+
+class LocalDamping(Fix):
+    """Bring a scene to rest: each node is braked by a share of the force that is out of balance.
+
+    Parameters
+    ----------
+    group
+        Group of nodes, or ``all``.
+    alpha
+        The share, from 0 to 1; 0.8 is usual. A number or a formula of time: damping may end.
+
+    Example
+    -------
+    fix(weight, body_force, all, 0, -9.81)
+    fix(calm, local_damping, all, 0.8)
+
+    Notes
+    -----
+    f - alpha |f| sign(v), component by component, in the place of the force f of a node (Cundall
+    1987). Where forces balance there is no damping: the state of rest is that without it, whatever
+    the stiffness, and steady motion is not braked. A scene takes some ten periods of its slowest
+    vibration to come to rest with 0.8.
+
+    It acts after all other fixes, wherever it stands: nodes that are held, or move as told at a
+    constant speed, are not braked, and their reactions are those of the scene. Publishes the sum of
+    what it adds as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    body_force, edge_traction, run_while
+    """
+
+    published = ("x", "y", "z")
+    acts_last = True
+
+    post_update_grid_state = node_hook(brake)
+
+    def __init__(self, hub: Hub, group: NodeGroup, alpha: Annotated[Expression, In(0, 1)] = 0.8):
+        super().__init__(hub, group)
+        share = alpha if isinstance(alpha, Expression) else Expression(alpha)
+        self.formulas = (share,) * hub.domain.dimension
