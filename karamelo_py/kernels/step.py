@@ -19,7 +19,6 @@ from karamelo_py.compiler.compile import (
     point_function,
     real,
     shared,
-    subkernel,
 )
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.held import hold

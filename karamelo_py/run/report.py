@@ -14,6 +14,7 @@ from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import Fused, Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
+from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.savings import savings
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
