@@ -85,13 +85,16 @@ def kernel(function: Callable | None = None, **options: Any) -> Callable:
 
 
 def inner_kernel(function: Callable) -> Callable:
-    """A kernel that only kernels call, kept on disk for all of them."""
+    """A kernel that only kernels call (never Python), kept on disk for all of them."""
     inlining.kept.add(function.__qualname__)
     return kernel(function, no_cpython_wrapper=True)
 
 
 def subkernel(function: Callable) -> Callable:
-    """A function that kernels call, too large to be written into each place that calls it."""
+    """A function that kernels call, too large to be written into each place that calls it.
+
+    Python must not call it: there is nothing of it that Python could call.
+    """
     inlining.left.add(function.__qualname__)
     return njit(**_HOW, no_cpython_wrapper=True)(function)
 

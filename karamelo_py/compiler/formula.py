@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import config, types
 
-from karamelo_py.compiler.compile import by_type, caller_of, kernel
+from karamelo_py.compiler.compile import by_type, caller_of, kernel, subkernel
 
 BLOCK = 128
 MAX_DEPTH = 32
@@ -76,7 +76,7 @@ class Program(NamedTuple):
     constants: np.ndarray
 
 
-@kernel
+@subkernel
 def _function(op, a):
     """Any function of one number: one chain of choices, where a loop for each would be too much."""
     if op == _NEG:
@@ -146,7 +146,7 @@ def _function(op, a):
     return math.log1p(a)
 
 
-@kernel
+@subkernel
 def _pair(op, a, b):
     """Any operation on two numbers: comparisons and logical ones give 1.0 or 0.0."""
     if op == _ADD:
@@ -188,7 +188,7 @@ def _pair(op, a, b):
     return 1.0 if result else 0.0
 
 
-@kernel
+@subkernel
 def _unary(op, n, a):
     """Replace the first `n` numbers of `a` by a function of them."""
     if op == _NEG:
@@ -217,7 +217,7 @@ def _unary(op, n, a):
             a[i] = _function(op, a[i])
 
 
-@kernel
+@subkernel
 def _binary(op, n, a, b):
     """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
     if op == _ADD:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import kernel
+from karamelo_py.compiler.compile import kernel, subkernel
 from karamelo_py.compiler.fields import field, load
 from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels.p2g import Force
@@ -42,7 +42,7 @@ class Cells(NamedTuple):
     count: np.ndarray  # (3,) int64: cells along each direction
 
 
-@kernel
+@subkernel
 def _number(id, begin1, end1, begin2, end2, bodies):
     """The number in `bodies` of the point with an id, or -1 where it lies in neither range."""
     if begin1 <= id < end1:
@@ -80,7 +80,7 @@ def distribute(kin, points, begin1, end1, begin2, end2, bodies):
             field(points.fields, Force)[k, p] += bodies.force[i, k]
 
 
-@kernel
+@subkernel
 def _range(x, begin, end, k):
     """Least and largest coordinate k of some points."""
     lo, hi = inf, -inf
@@ -90,7 +90,7 @@ def _range(x, begin, end, k):
     return lo, hi
 
 
-@kernel
+@subkernel
 def _largest(values, begin, end):
     largest = 0.0
     for i in range(begin, end):
@@ -98,7 +98,7 @@ def _largest(values, begin, end):
     return largest
 
 
-@kernel
+@subkernel
 def _lay_cells(d, bodies, cells, reach):
     """Cells over all places where the bodies may touch; returns their width, 0 if there are none.
 
@@ -131,7 +131,7 @@ def _lay_cells(d, bodies, cells, reach):
         width *= 2.0
 
 
-@kernel
+@subkernel
 def _find_cells(d, bodies, cells, width):
     """The cell of every point, and those of the second body sorted by it, stably."""
     n, m = bodies.first2, bodies.mass.size
@@ -158,7 +158,7 @@ def _find_cells(d, bodies, cells, width):
             cells.start[c] += 1
 
 
-@kernel
+@subkernel
 def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     """The force between two points, if they touch; whether they do."""
     x, f = bodies.x, bodies.force
