@@ -19,6 +19,8 @@ from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.lanes import Eights, Fours, group
 from karamelo_py.compiler.tuples import row
 from karamelo_py.points.basis import entry, locate, support
+from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
+from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
 from karamelo_py.points.grid import Grid
@@ -176,7 +178,9 @@ def _map_in_lanes(basis, grid, x, mass, nodes, seen, n):
         _map(basis, grid, x, mass, nodes, seen, group(Fours(), q, min(4, n - q)))
 
 
-@pytest.mark.parametrize("basis", [Linear(), QuadraticSpline()])
+@pytest.mark.parametrize(
+    "basis", [Linear(), QuadraticSpline(), CubicSpline(), BernsteinQuadratic()]
+)
 @pytest.mark.parametrize("spread", [0.1, 2.4], ids=["one cell", "many cells"])
 def test_weights_gather_and_scatter(basis, spread):
     """Points of one cell take the short way; sums at nodes differ by the order of additions."""
@@ -185,11 +189,15 @@ def test_weights_gather_and_scatter(basis, spread):
     x = np.zeros((3, n))
     x[:2] = 0.05 + spread * rng.uniform(size=(2, n))
     mass = rng.uniform(1, 2, n)
-    seen = rng.normal(size=(42, 4))
-    alone, together = np.zeros((2, 42, 4))
+    per_cell = basis.nodes_per_cell
+    step = per_cell * GRID.ny + 1
+    grid = GRID._replace(step_x=step)
+    count = (per_cell * GRID.nx + 1) * step
+    seen = rng.normal(size=(count, 4))
+    alone, together = np.zeros((2, count, 4))
     x1, x2 = x.copy(), x.copy()
-    _map_alone(basis, GRID, x1, mass, alone, seen, n)
-    _map_in_lanes(basis, GRID, x2, mass, together, seen, n)
+    _map_alone(basis, grid, x1, mass, alone, seen, n)
+    _map_in_lanes(basis, grid, x2, mass, together, seen, n)
     assert x2.tobytes() == x1.tobytes()
     assert alone[:, 0].sum() == pytest.approx(mass.sum(), rel=1e-14)
     np.testing.assert_allclose(together[:, :3], alone[:, :3], rtol=0, atol=1e-14 * mass.sum())

@@ -127,6 +127,20 @@ def by_type(function: Callable) -> Callable:
     return choose
 
 
+def of_numbers(function: Callable) -> Callable:
+    """The same for a chooser that knows nothing of lanes: they have choosers of their own."""
+
+    def choose(chooser: Callable) -> Callable:
+        @functools.wraps(chooser)
+        def guarded(*arguments: Any) -> Callable | None:
+            return None if lanes_of(arguments) else chooser(*arguments)
+
+        by_type(function)(guarded)
+        return chooser
+
+    return choose
+
+
 def shared(function: Callable) -> Callable:
     """Mark a helper of point functions that needs no choice by type: kernels may call it."""
     by_type(function)(lambda *arguments: function)
@@ -140,6 +154,28 @@ class Undefined(TypeError):
         names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
         super().__init__(f"{function} is not defined for ({names})")
         self.classes = classes
+
+
+def knows_lanes(tag: type, function: str) -> bool:
+    """Whether a point function of a class takes several points at once.
+
+    Those of a class with numbers are called for one point after another, so that a plug-in may
+    branch as it likes, where the class does not say ``in_lanes``; and those that it names in
+    ``one_by_one``.
+    """
+    knows = getattr(tag, "in_lanes", not getattr(tag, "_fields", ()))
+    return knows and function not in getattr(tag, "one_by_one", ())
+
+
+def one_by_one(function: Callable, count: int) -> Callable:
+    """A function of `count` arguments, some in lanes, that does `function` for each lane."""
+    names = "".join(f"a{k}, " for k in range(count))
+    return define(names, f"return call(function, ({names}))", function=function, call=in_each_lane)
+
+
+def in_each_lane(function: Callable, arguments: tuple) -> Any:
+    """What a function of numbers gives for each lane among its arguments."""
+    raise TypeError("only compiled kernels know lanes")
 
 
 def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
@@ -183,7 +219,12 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
         dispatch.__doc__ = stub.__doc__
 
         def choose(*arguments: Any) -> Callable | None:
-            return find(tuple(tag_class(a) for a in arguments[:tags]))
+            classes = tuple(tag_class(a) for a in arguments[:tags])
+            found = find(classes)
+            if found and lanes_of(arguments):
+                if not all(knows_lanes(tag, stub.__name__) for tag in classes):
+                    return one_by_one(dispatch, len(arguments))
+            return found
 
         by_type(dispatch)(choose)
 
@@ -229,14 +270,17 @@ def real(value: float, like: Any) -> Any:
 
 
 def lanes_of(numba_type: Any) -> int:
-    """How many lanes a Numba type has (:mod:`karamelo_py.compiler.lanes`); 0 for numbers."""
+    """How many lanes a Numba type has (:mod:`karamelo_py.compiler.lanes`); 0 for numbers.
+
+    Of tuples, those of what is in them.
+    """
+    if isinstance(numba_type, tuple | numba.types.BaseTuple):
+        return max(map(lanes_of, numba_type), default=0)
     return getattr(numba_type, "width", 0)
 
 
-@by_type(real)
+@of_numbers(real)
 def _real(value, like):
-    if lanes_of(value) or lanes_of(like):
-        return None
     if like is numba.types.float32:
         return lambda value, like: numba.float32(value)
     return lambda value, like: numba.float64(value)
@@ -250,10 +294,8 @@ def round_off(like: Any) -> Any:
 _ROUND_OFF = {"float32": 2.0**-23}
 
 
-@by_type(round_off)
+@of_numbers(round_off)
 def _round_off(like):
-    if lanes_of(like):
-        return None
     if like is numba.types.float32:
         return lambda like: numba.float32(2.0**-23)
     return lambda like: numba.float64(2.0**-52)
@@ -272,10 +314,8 @@ def _fused(typing_context, a, b, c):
     return a(a, b, c), codegen
 
 
-@by_type(fma)
+@of_numbers(fma)
 def _fma(a, b, c):
-    if lanes_of(a) or lanes_of(b) or lanes_of(c):
-        return None
     if a == b == c and isinstance(a, numba.types.Float):
         return lambda a, b, c: _fused(a, b, c)
     return lambda a, b, c: a * b + c
@@ -288,9 +328,7 @@ def choose(condition: bool, a: float, b: float) -> float:
 
 @by_type(choose)
 def _choose(condition, a, b):
-    if lanes_of(condition):
-        return None
-    return lambda condition, a, b: a if condition else b
+    return None if lanes_of(condition) else lambda condition, a, b: a if condition else b
 
 
 def in_all(condition: bool) -> bool:
@@ -298,9 +336,15 @@ def in_all(condition: bool) -> bool:
     return condition
 
 
-@by_type(in_all)
-def _in_all(condition):
-    return None if lanes_of(condition) else lambda condition: condition
+of_numbers(in_all)(lambda condition: lambda condition: condition)
+
+
+def in_any(condition: bool) -> bool:
+    """Whether a condition holds in any lane; it itself where there are none."""
+    return condition
+
+
+of_numbers(in_any)(lambda condition: lambda condition: condition)
 
 
 def of_present(p: int, value: float) -> float:
@@ -308,9 +352,7 @@ def of_present(p: int, value: float) -> float:
     return value
 
 
-@by_type(of_present)
-def _of_present(p, value):
-    return None if lanes_of(p) else lambda p, value: value
+of_numbers(of_present)(lambda p, value: lambda p, value: value)
 
 
 def accumulate(array: Any, i: int, first: int, values: tuple) -> None:
@@ -319,10 +361,8 @@ def accumulate(array: Any, i: int, first: int, values: tuple) -> None:
         array[i, first + k] += value
 
 
-@by_type(accumulate)
+@of_numbers(accumulate)
 def _accumulate(array, i, first, values):
-    if lanes_of(i) or any(lanes_of(value) for value in values):
-        return None
     lines = [f"array[i, first + {k}] += values[{k}]" for k in range(len(values))]
     return define("array, i, first, values", *lines)
 
@@ -332,9 +372,7 @@ def largest(a: float) -> float:
     return a
 
 
-@by_type(largest)
-def _largest(a):
-    return None if lanes_of(a) else lambda a: a
+of_numbers(largest)(lambda a: lambda a: a)
 
 
 def first_failing(condition: bool) -> int:
@@ -342,9 +380,7 @@ def first_failing(condition: bool) -> int:
     return 0
 
 
-@by_type(first_failing)
-def _first_failing(condition):
-    return None if lanes_of(condition) else lambda condition: 0
+of_numbers(first_failing)(lambda condition: lambda condition: 0)
 
 
 def is_one(number: int) -> bool:
@@ -352,9 +388,7 @@ def is_one(number: int) -> bool:
     return True
 
 
-@by_type(is_one)
-def _is_one(number):
-    return None if lanes_of(number) else lambda number: True
+of_numbers(is_one)(lambda number: lambda number: True)
 
 
 def first_lane(number: int) -> int:
@@ -362,9 +396,7 @@ def first_lane(number: int) -> int:
     return number
 
 
-@by_type(first_lane)
-def _first_lane(number):
-    return None if lanes_of(number) else lambda number: number
+of_numbers(first_lane)(lambda number: lambda number: number)
 
 
 def index(i: int) -> int:
@@ -375,11 +407,7 @@ def index(i: int) -> int:
     return i
 
 
-@by_type(index)
-def _index(i):
-    if lanes_of(i):
-        return None
-    return lambda i: numba.uint64(i)
+of_numbers(index)(lambda i: lambda i: numba.uint64(i))
 
 
 def over_blocks(per_block: Callable) -> Callable:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from llvmlite import ir
@@ -36,8 +36,11 @@ from karamelo_py.compiler.compile import (
     first_lane,
     fma,
     in_all,
+    in_any,
+    in_each_lane,
     index,
     is_one,
+    lanes_of,
     largest,
     of_present,
     real,
@@ -45,7 +48,7 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.compiler.tuples import row
 
-_I32 = ir.IntType(32)
+_I32, _I64 = ir.IntType(32), ir.IntType(64)
 
 
 class Lanes(types.Type):
@@ -213,19 +216,24 @@ for _operation, _sign in (
     _comparison(_operation, _sign)
 
 
-@infer_global(operator.neg)
-class _Negative(AbstractTemplate):
-    def generic(self, arguments, keywords):
-        if isinstance(arguments[0], Lanes):
-            return signature(arguments[0], arguments[0])
-        return None
+def _unary(operation: Any, code: Callable) -> None:
+    @infer_global(operation)
+    class Template(AbstractTemplate):
+        def generic(self, arguments, keywords):
+            lanes = arguments[0]
+            return signature(lanes, lanes) if isinstance(lanes, Lanes) else None
+
+    @lower_builtin(operation, Lanes)
+    def lower(context, builder, sig, arguments):
+        return code(builder, sig.args[0].scalar, arguments[0])
 
 
-@lower_builtin(operator.neg, Lanes)
-def _negative(context, builder, sig, arguments):
-    if isinstance(sig.args[0].scalar, types.Float):
-        return builder.fneg(arguments[0])
-    return builder.neg(arguments[0])
+def _negated(builder: Any, scalar: types.Type, value: Any) -> Any:
+    return builder.fneg(value) if isinstance(scalar, types.Float) else builder.neg(value)
+
+
+_unary(operator.neg, _negated)
+_unary(operator.not_, lambda builder, scalar, value: builder.not_(value))
 
 
 def _call_vector(name: str, lanes: Lanes) -> Callable:
@@ -304,9 +312,19 @@ def _select(typing_context, condition, a, b):
 
 @by_type(choose)
 def _choose(condition, a, b):
-    if isinstance(condition, Lanes):
+    if not isinstance(condition, Lanes):
+        return None
+    if not isinstance(a, types.BaseTuple):
         return lambda condition, a, b: _select(condition, a, b)
-    return None
+    items = "".join(f"choose(condition, a[{k}], b[{k}]), " for k in range(len(a)))
+    return _spelled("condition, a, b", items, a, choose=choose)
+
+
+def _spelled(parameters: str, items: str, like: Any, **names: Any) -> Callable:
+    """A function that returns a tuple of these items, a NamedTuple where `like` is one."""
+    if isinstance(like, types.BaseNamedTuple):
+        return define(parameters, f"return make({items})", make=like.instance_class, **names)
+    return define(parameters, f"return ({items})", **names)
 
 
 def _extreme(function: Callable, sign: str) -> None:
@@ -326,18 +344,24 @@ _extreme(max, ">")
 _extreme(min, "<")
 
 
-@intrinsic
-def _all_of(typing_context, mask):
-    def codegen(context, builder, sig, arguments):
-        bits = builder.bitcast(arguments[0], ir.IntType(mask.width))
-        return builder.icmp_signed("==", bits, ir.Constant(bits.type, -1))
+def _truth(function: Callable, sign: str, bits_of: int) -> None:
+    """Let a question about all lanes be one about the bits of a mask."""
 
-    return types.boolean(mask), codegen
+    @intrinsic
+    def asked(typing_context, mask):
+        def codegen(context, builder, sig, arguments):
+            bits = builder.bitcast(arguments[0], ir.IntType(mask.width))
+            return builder.icmp_signed(sign, bits, ir.Constant(bits.type, bits_of))
+
+        return types.boolean(mask), codegen
+
+    @by_type(function)
+    def chosen(condition):
+        return (lambda condition: asked(condition)) if isinstance(condition, Lanes) else None
 
 
-@by_type(in_all)
-def _in_all(condition):
-    return (lambda condition: _all_of(condition)) if isinstance(condition, Lanes) else None
+_truth(in_all, "==", -1)
+_truth(in_any, "!=", 0)
 
 
 # --- conversions ------------------------------------------------------------------------------
@@ -724,7 +748,7 @@ def _row(array, i, first, like):
 @intrinsic
 def _scatter(typing_context, array, nodes, first, values):
     """Add to components of the records of nodes, lane after lane; summed before to one node."""
-    width = max(has_lanes(value) for value in values)
+    width = max(lanes_of(value) for value in values)
     lanes = Lanes(array.dtype, width)
 
     def codegen(context, builder, sig, arguments):
@@ -771,7 +795,7 @@ def _records(builder: Any, parts: list) -> list:
 
 @by_type(accumulate)
 def _accumulate(array, i, first, values):
-    if isinstance(array, types.Array) and (isinstance(i, Lanes) or has_lanes(values)):
+    if isinstance(array, types.Array) and (isinstance(i, Lanes) or lanes_of(values)):
         return lambda array, i, first, values: _scatter(array, i, first, values)
     return None
 
@@ -800,15 +824,6 @@ def _first_lane(number):
 # --- one lane after another -------------------------------------------------------------------
 
 
-def has_lanes(numba_type: Any) -> int:
-    """How many lanes a number, or the numbers in a tuple, have; 0 for none."""
-    if isinstance(numba_type, Lanes):
-        return numba_type.width
-    if isinstance(numba_type, types.BaseTuple):
-        return max((has_lanes(item) for item in numba_type), default=0)
-    return 0
-
-
 @intrinsic
 def _extract(typing_context, value, k):
     def codegen(context, builder, sig, arguments):
@@ -817,70 +832,99 @@ def _extract(typing_context, value, k):
     return value.scalar(value, types.int64), codegen
 
 
-def _part(value, k):
-    """The number of the k-th lane; of tuples, of what is in them."""
+def _of_leaves(kind: Any, change: Callable) -> Any:
+    """The type of a tuple, or number, with another type for each number in it."""
+    if not isinstance(kind, types.BaseTuple):
+        return change(kind)
+    items = [_of_leaves(item, change) for item in kind]
+    return types.BaseTuple.from_types(items, getattr(kind, "instance_class", None))
 
 
-@by_type(_part)
-def _choose_part(value, k):
-    if isinstance(value, Lanes):
-        return lambda value, k: _extract(value, k)
-    if not has_lanes(value):
-        return lambda value, k: value
-    items = "".join(f"part(value[{i}], k), " for i in range(len(value)))
-    if isinstance(value, types.BaseNamedTuple):
-        return define("value, k", f"return make({items})", part=_part, make=value.instance_class)
-    return define("value, k", f"return ({items})", part=_part)
+def _one_of(kind: Any) -> Any:
+    """The type of what one lane has."""
+    return _of_leaves(kind, lambda k: k.scalar if isinstance(k, Lanes) else k)
 
 
-@intrinsic
-def _packed(typing_context, numbers):
-    lanes = Lanes(
-        types.boolean if isinstance(numbers.dtype, types.Boolean) else numbers.dtype, len(numbers)
-    )
-
-    def codegen(context, builder, sig, arguments):
-        values = cgutils.unpack_tuple(builder, arguments[0])
-        if isinstance(lanes.scalar, types.Boolean):
-            values = [
-                v if v.type == ir.IntType(1) else builder.trunc(v, ir.IntType(1)) for v in values
-            ]
-        return _pack(builder, values, lanes)
-
-    return lanes(numbers), codegen
+def _apart(builder: Any, kind: Any, value: Any) -> Iterator[tuple[Any, Any]]:
+    """What is in a tuple that is no tuple itself: type and value of one after another."""
+    if not isinstance(kind, types.BaseTuple):
+        yield kind, value
+        return
+    for k, item in enumerate(kind):
+        yield from _apart(builder, item, builder.extract_value(value, k))
 
 
-def _joined(results):
-    """The results of all lanes as one result with lanes."""
+def _joined(context: Any, builder: Any, kind: Any, values: Iterator) -> Any:
+    """The tuple of this type that has these values."""
+    if not isinstance(kind, types.BaseTuple):
+        return next(values)
+    items = [_joined(context, builder, item, values) for item in kind]
+    return context.make_tuple(builder, kind, items)
 
 
-@by_type(_joined)
-def _choose_joined(results):
-    first = next(iter(results))
-    if not isinstance(first, types.BaseTuple):
-        return lambda results: _packed(results)
-    width = len(results)
-    items = "".join(
-        f"joined(({''.join(f'results[{k}][{i}], ' for k in range(width))})), "
-        for i in range(len(first))
-    )
-    if isinstance(first, types.BaseNamedTuple):
-        return define("results", f"return make({items})", joined=_joined, make=first.instance_class)
-    return define("results", f"return ({items})", joined=_joined)
+def _room(builder: Any, lanes: Lanes) -> tuple[Any, Any]:
+    """Memory for lanes, as one vector and as numbers; truth takes bytes there."""
+    bits = ir.IntType(8) if isinstance(lanes.scalar, types.Boolean) else _element(lanes.scalar)
+    room = cgutils.alloca_once(builder, ir.VectorType(bits, lanes.width))
+    return room, builder.bitcast(room, bits.as_pointer())
 
 
-def one_by_one(function: Callable, arguments: tuple) -> Callable | None:
-    """A function that does `function` for each lane among its arguments, or None for none."""
-    width = max((has_lanes(a) for a in arguments), default=0)
-    if not width:
-        return None
-    names = [f"a{k}" for k in range(len(arguments))]
-    calls = "".join(
-        f"f({', '.join(f'part({name}, {lane})' for name in names)}), " for lane in range(width)
-    )
-    return define(
-        ", ".join(names), f"return joined(({calls}))", f=function, part=_part, joined=_joined
-    )
+@intrinsic(prefer_literal=True)
+def _lane_by_lane(typing_context, function, unrolled, arguments):
+    """What a function of numbers gives for one lane after another."""
+    width = lanes_of(arguments)
+    inner = function.get_call_type(typing_context, tuple(map(_one_of, arguments)), {})
+    result = _of_leaves(inner.return_type, lambda kind: Lanes(kind, width))
+
+    def codegen(context, builder, sig, values):
+        called = context.get_function(function, inner)
+        context.add_linking_libs(getattr(called, "libs", ()))
+        given = []
+        for kind, value in _apart(builder, arguments, values[2]):
+            if isinstance(kind, Lanes):
+                room, place = _room(builder, kind)
+                if isinstance(kind.scalar, types.Boolean):
+                    value = builder.zext(value, room.type.pointee)
+                builder.store(value, room)
+                value = place
+            given.append((kind, value))
+        count = ir.Constant(_I64, width)
+        if not unrolled.literal_value:
+            # The loop is to stay one, with one copy of the function: LLVM must not know its count.
+            count = builder.asm(ir.FunctionType(_I64, [_I64]), "", "=r,0", [count], False)
+        empty = context.get_constant_undef(result)
+        kinds = [kind for kind, _ in _apart(builder, result, empty)]
+        rooms = [_room(builder, kind) for kind in kinds]
+        with cgutils.for_range(builder, count) as loop:
+            numbers = []
+            for kind, value in given:
+                if isinstance(kind, Lanes):
+                    value = builder.load(builder.gep(value, [loop.index]))
+                    if isinstance(kind.scalar, types.Boolean):
+                        value = builder.trunc(value, ir.IntType(1))
+                numbers.append(value)
+            numbers = iter(numbers)
+            of_lane = [_joined(context, builder, kind, numbers) for kind in inner.args]
+            found = called(builder, of_lane)
+            pairs = zip(_apart(builder, inner.return_type, found), rooms, strict=True)
+            for (kind, number), (_, place) in pairs:
+                if isinstance(kind, types.Boolean):
+                    number = builder.zext(number, ir.IntType(8))
+                builder.store(number, builder.gep(place, [loop.index]))
+        vectors = (
+            builder.trunc(builder.load(room), _vector(kind))
+            if isinstance(kind.scalar, types.Boolean)
+            else builder.load(room)
+            for kind, (room, _) in zip(kinds, rooms, strict=True)
+        )
+        return _joined(context, builder, result, vectors)
+
+    return result(function, unrolled, arguments), codegen
+
+
+@by_type(in_each_lane)
+def _in_each_lane(function, arguments):
+    return lambda function, arguments: _lane_by_lane(function, False, arguments)
 
 
 @intrinsic
@@ -923,7 +967,11 @@ def _each_lane(function: Callable) -> None:
 
     @by_type(function)
     def chosen(*arguments):
-        return one_by_one(function, arguments)
+        if not lanes_of(arguments):
+            return None
+        names = ", ".join(f"a{k}" for k in range(len(arguments)))
+        call = f"return call(function, True, ({names},))"
+        return define(names, call, function=function, call=_lane_by_lane)
 
 
 for _function in (math.log, math.exp, math.pow, operator.pow):

@@ -133,7 +133,7 @@ def _in_lanes(visit, s, block):
     basis, transfer, averaging, grids = (
         s[s.fields.index(name)] for name in ("basis", "transfer", "averaging", "grids")
     )
-    parts = [*tasks, *quantities, basis, transfer, averaging, block[block.fields.index("laws")]]
+    parts = [*tasks, *quantities, basis, transfer, averaging]  # laws see to themselves
     knows = all(getattr(part.instance_class, "in_lanes", False) for part in parts)
     if not knows or reflected.defined(grids.instance_class):
         return lambda visit, s, block: OneByOne()
