@@ -221,9 +221,9 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
         def choose(*arguments: Any) -> Callable | None:
             classes = tuple(tag_class(a) for a in arguments[:tags])
             found = find(classes)
-            if found and lanes_of(arguments):
-                if not all(knows_lanes(tag, stub.__name__) for tag in classes):
-                    return one_by_one(dispatch, len(arguments))
+            apart = found and lanes_of(arguments)
+            if apart and not all(knows_lanes(tag, stub.__name__) for tag in classes):
+                return one_by_one(dispatch, len(arguments))
             return found
 
         by_type(dispatch)(choose)
