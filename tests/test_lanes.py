@@ -17,6 +17,7 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.lanes import Eights, Fours, group
+from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.compiler.tuples import row
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
@@ -25,9 +26,20 @@ from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import PlaneStrain, Space, zero_tensor
-from karamelo_py.points.laws import advance, initial_state
+from karamelo_py.points.laws import advance, initial_state, law_kind, plastic_strain
+from karamelo_py.points.laws.damages.damage_johnson_cook import JohnsonCookDamage
+from karamelo_py.points.laws.eos.fluid import Tait
+from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos.shock import Shock
+from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
+from karamelo_py.points.laws.strengths.fluid import Viscous
+from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strengths.plastic import LinearHardening
+from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
+from karamelo_py.points.laws.viscosity.artificial import ArtificialViscosity
 
 pytestmark = pytest.mark.xdist_group("lanes")
 KIN = PlaneStrain()
@@ -125,20 +137,99 @@ def _advance_in_lanes(law, kin, state, dl, dt, n):
         _advance(law, kin, state, dl, dt, group(Fours(), q, min(4, n - q)))
 
 
+COPPER = Shock(1 / 8940, 1.38e11, 1.5, 0.0, 298.0)
+COOK = JohnsonCook.given(43.9e9, 65e6, 356e6, 0.37, 1.0, 0.02, 1.1, 298.0, 1356.0)
+WEAR = JohnsonCookDamage(0.002, 0.1, -3.0, 0.014, 1.12, 1.0, 298.0, 1356.0)
+LAWS = [
+    LinearElastic(1e-3, 500.0, 400.0),
+    NeoHookean(1e-3, 500.0, 400.0),
+    EosStrength(Tait(1e-3, 1e3, 7.0, 0.0), Viscous(1e-3, 0.1)),
+    EosStrength(LinearPressure(1e-3, 1e3), LinearHardening(400.0, 0.5, 20.0)),
+    # Pressure, damage, heat, rate; at first no point yields, then some do.
+    EosStrength(
+        COPPER,
+        COOK,
+        ArtificialViscosity(1.5, 0.06, 1e-3),
+        WEAR,
+        PlasticWork(0.9, 385.0, 0.0, 1e5, 298.0, 1356.0),
+    ),
+    # Its response is computed for one lane after another.
+    EosStrength(LinearPressure(1e-3, 1e3), DruckerPrager.given(400.0, 0.1, 30.0, 5.0)),
+]
+
+
 @pytest.mark.parametrize("kin", [PlaneStrain(), Space()], ids=["plane", "space"])
-@pytest.mark.parametrize("law", [LinearElastic(1e-3, 500.0, 400.0), NeoHookean(1e-3, 500.0, 400.0)])
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: "-".join(k.__name__ for k in law_kind(law)))
 def test_laws_unchanged(law, kin):
     """The same function of a law, four points at once; eleven points end within a group."""
     n = 11
     start = np.array(initial_state(law, kin, 1.0))
-    dl = 1e-3 * np.random.default_rng(2).normal(size=(kin.tensor_size, n))
+    dl = np.linspace(1e-4, 2e-3, n) * np.random.default_rng(2).normal(size=(kin.tensor_size, n))
     alone = np.repeat(start[:, None], n, axis=1)
     together = alone.copy()
     for _ in range(3):
-        _advance_alone(law, kin, alone, dl, 1e-3, n)
-        _advance_in_lanes(law, kin, together, dl, 1e-3, n)
+        _advance_alone(law, kin, alone, dl, 1e-6, n)
+        _advance_in_lanes(law, kin, together, dl, 1e-6, n)
     assert (alone != start[:, None]).any()
     assert together.tobytes() == alone.tobytes()
+    if isinstance(law, EosStrength) and not isinstance(law.strength, Viscous):
+        strain = [plastic_strain(law, kin, tuple(state)) for state in alone.T]
+        assert max(strain) > 0  # something yields
+
+
+@kernel
+def _powers(x, y, out, p):
+    out[0, p] = power(x[p], y[p])
+    out[1, p] = logarithm(x[p])
+    out[2, p] = exponential(y[p])
+
+
+@kernel
+def _powers_alone(x, y, out, n):
+    for p in range(n):
+        _powers(x, y, out, p)
+
+
+@kernel
+def _powers_in_lanes(tag, width, x, y, out, n):
+    for q in range(0, n, width):
+        _powers(x, y, out, group(tag, q, min(width, n - q)))
+
+
+@pytest.mark.parametrize("real_type", WIDTHS)
+def test_powers(real_type):
+    """Against the C library in more digits: two operations, and |y ln x| of them in a power."""
+    width, tag = WIDTHS[real_type]
+    rng = np.random.default_rng(4)
+    x = (10 ** rng.uniform(-4, 4, 2000)).astype(real_type)
+    x[:1000] = rng.uniform(0.9, 1.1, 1000)
+    y = rng.uniform(-8, 8, 2000).astype(real_type)
+    alone, together = np.zeros((2, 3, 2000), real_type)
+    _powers_alone(x, y, alone, 2000)
+    _powers_in_lanes(tag, width, x, y, together, 2000)
+    assert together.tobytes() == alone.tobytes()
+    a, b = x.astype(np.longdouble), y.astype(np.longdouble)
+    eps = np.finfo(real_type).eps
+    growth = 2 + np.abs(b * np.log(a))
+    off = np.abs(alone - np.stack([a**b, np.log(a), np.exp(b)]))
+    assert (off[0] <= eps * growth * a**b).all()
+    assert (off[1] <= 2 * eps * np.abs(np.log(a))).all()
+    assert (off[2] <= 2 * eps * np.exp(b)).all()
+
+
+@pytest.mark.parametrize("real_type", WIDTHS)
+def test_powers_at_the_ends(real_type):
+    """Nothing, one, too much and too little, and the smallest numbers."""
+    width, tag = WIDTHS[real_type]
+    last = np.log2(np.finfo(real_type).smallest_subnormal) + 4
+    x = np.array([0.0, 0.0, 1.0, 2.0, 2.0, 2.0, -1.0, np.nan], real_type)
+    y = np.array([0.4, 0.0, 1e3, 2e3, -2e3, last, 0.5, 0.5], real_type)
+    out = np.zeros((3, 8), real_type)
+    _powers_in_lanes(tag, width, x, y, out, 8)
+    np.testing.assert_array_equal(out[0, :5], [0, 1, 1, np.inf, 0])
+    assert out[0, 5] == pytest.approx(2.0**last, rel=1 / 16)
+    assert np.isnan(out[0, 6:]).all()
+    np.testing.assert_array_equal(out[1, :3], [-np.inf, -np.inf, 0])
 
 
 GRID = Grid(

@@ -9,8 +9,10 @@ import pytest
 from laws import TURN, integrated, mises, stress, stretched, worked
 from tensors import ALL_KINEMATICS, symmetric_flat
 
+from karamelo_py.kernels.laws import law_in
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import (
+    Absent,
     advance,
     dissipated_energy,
     energy_density,

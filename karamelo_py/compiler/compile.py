@@ -156,17 +156,6 @@ class Undefined(TypeError):
         self.classes = classes
 
 
-def knows_lanes(tag: type, function: str) -> bool:
-    """Whether a point function of a class takes several points at once.
-
-    Those of a class with numbers are called for one point after another, so that a plug-in may
-    branch as it likes, where the class does not say ``in_lanes``; and those that it names in
-    ``one_by_one``.
-    """
-    knows = getattr(tag, "in_lanes", not getattr(tag, "_fields", ()))
-    return knows and function not in getattr(tag, "one_by_one", ())
-
-
 def one_by_one(function: Callable, count: int) -> Callable:
     """A function of `count` arguments, some in lanes, that does `function` for each lane."""
     names = "".join(f"a{k}, " for k in range(count))
@@ -185,6 +174,9 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
     ``name.on(Class, ...)`` and serve both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and
     inside kernels, where the types are known at compile time and no branch is left. A plug-in adds
     its own in the same way. ``name.otherwise`` marks what classes without their own get.
+
+    Point functions serve one point or several at once (:mod:`karamelo_py.compiler.lanes`). Those
+    that a class names in ``one_by_one``, since they branch, are called for one point after another.
     """
 
     def declare(stub: Callable) -> Callable:
@@ -221,8 +213,8 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
         def choose(*arguments: Any) -> Callable | None:
             classes = tuple(tag_class(a) for a in arguments[:tags])
             found = find(classes)
-            apart = found and lanes_of(arguments)
-            if apart and not all(knows_lanes(tag, stub.__name__) for tag in classes):
+            apart = any(stub.__name__ in getattr(tag, "one_by_one", ()) for tag in classes)
+            if apart and lanes_of(arguments):
                 return one_by_one(dispatch, len(arguments))
             return found
 

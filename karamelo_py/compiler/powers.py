@@ -16,8 +16,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from karamelo_py.compiler.compile import by_type, choose, define, fma, real
-from karamelo_py.compiler.lanes import Lanes, _element, _vector
+from karamelo_py.compiler.compile import by_type, choose, define, fma, real, shared
+from karamelo_py.compiler.lanes import Lanes, _call_vector, _element, _vector
 
 
 def logarithm(x: float) -> float:
@@ -48,6 +48,12 @@ def _bits(kind: Any) -> tuple[Any, Any, int, int]:
     )
 
 
+def _short(whole: ir.Type) -> ir.Type:
+    """Whole numbers of 32 bits, from which every processor makes real ones."""
+    short = ir.IntType(32)
+    return ir.VectorType(short, whole.count) if isinstance(whole, ir.VectorType) else short
+
+
 def _constant(whole: ir.Type, value: int) -> ir.Constant:
     return ir.Constant(whole, [value] * whole.count if isinstance(whole, ir.VectorType) else value)
 
@@ -64,11 +70,8 @@ def _taken_apart(typing_context, x):
         shift = _constant(whole, mantissa)
         e = builder.ashr(builder.sub(bits, _constant(whole, root)), shift)
         m = builder.bitcast(builder.sub(bits, builder.shl(e, shift)), number)
-        narrow = ir.IntType(32)
-        if isinstance(whole, ir.VectorType):
-            narrow = ir.VectorType(narrow, whole.count)
         if mantissa == 52:
-            e = builder.trunc(e, narrow)
+            e = builder.trunc(e, _short(whole))
         return context.make_tuple(builder, made, [m, builder.sitofp(e, number)])
 
     return made(x), codegen
@@ -80,9 +83,7 @@ def _scaled(typing_context, x, n):
 
     def codegen(context, builder, sig, arguments):
         number, whole, mantissa, bias = _bits(x)
-        narrow = ir.IntType(32)
-        if isinstance(whole, ir.VectorType):
-            narrow = ir.VectorType(narrow, whole.count)
+        narrow = _short(whole)
         n = builder.fptosi(arguments[1], narrow)
         half = builder.ashr(n, _constant(narrow, 1))
         value = arguments[0]
@@ -101,8 +102,6 @@ def _scaled(typing_context, x, n):
 @intrinsic
 def _nearest(typing_context, x):
     """The whole number next to x."""
-    from karamelo_py.compiler.lanes import _call_vector
-
     if isinstance(x, Lanes):
         return x(x), _call_vector("rint", x)
 
@@ -142,10 +141,11 @@ _logarithm = define(
     taken_apart=_taken_apart,
     **_NAMES,
 )
-# e^x = 2^n e^r with |r| up to ln 2 / 2
+# e^x = 2^n e^r with |r| up to ln 2 / 2; beyond these limits it is 0 or infinite
 _exponential = define(
-    "x",
-    "x = min(max(x, real(-1000, x)), real(1000, x))",
+    "x, most",
+    "most = real(most, x)",
+    "x = min(max(x, -most), most)",
     f"n = nearest(x * real({1 / _LN_2!r}, x))",
     f"r = fma(-n, real({_REST!r}, x), fma(-n, real({_LN_2!r}, x), x))",
     "rr = r * r",
@@ -164,7 +164,11 @@ def _choose_logarithm(x):
 
 @by_type(exponential)
 def _choose_exponential(x):
-    return _exponential
+    most = 1000 if _bits(x)[3] == 1023 else 130
+    return lambda x: _exponential(x, most)
+
+
+shared(_exponential)
 
 
 @by_type(power)

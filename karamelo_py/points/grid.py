@@ -14,8 +14,6 @@ from karamelo_py.points.kinematics import dimension
 class Grid(NamedTuple):
     """One regular grid. Lengths are in the units of the scene, counts in cells."""
 
-    in_lanes = True
-
     x0: float  # lower corner
     y0: float
     z0: float

@@ -204,8 +204,6 @@ column(EosStrength, "dissipated", dissipated_energy)
 class Memory(NamedTuple):
     """What the parts of a law remember at one point: flat tuples, empty for parts without."""
 
-    in_lanes = True
-
     energy: Any  # of the equation of state
     viscous: Any  # viscous pressure
     damage: Any

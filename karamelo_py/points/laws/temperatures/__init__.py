@@ -13,8 +13,6 @@ from karamelo_py.compiler.compile import point_function, real, shared
 class Warm(NamedTuple):
     """Temperature of a point, and the tag of laws that have one."""
 
-    in_lanes = True
-
     T: float
 
 
