@@ -17,7 +17,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import by_type, choose, define, fma, real, shared
-from karamelo_py.compiler.lanes import Lanes, _call_vector, _element, _vector
+from karamelo_py.compiler.lanes.numbers import Lanes, call_vector, element, vector_of
 
 
 def logarithm(x: float) -> float:
@@ -42,7 +42,7 @@ def _bits(kind: Any) -> tuple[Any, Any, int, int]:
     if isinstance(kind, Lanes):
         whole = ir.VectorType(whole, kind.width)
     return (
-        (_vector(kind) if isinstance(kind, Lanes) else _element(kind)),
+        (vector_of(kind) if isinstance(kind, Lanes) else element(kind)),
         whole,
         *((52, 1023) if scalar.bitwidth == 64 else (23, 127)),
     )
@@ -103,11 +103,11 @@ def _scaled(typing_context, x, n):
 def _nearest(typing_context, x):
     """The whole number next to x."""
     if isinstance(x, Lanes):
-        return x(x), _call_vector("rint", x)
+        return x(x), call_vector("rint", x)
 
     def codegen(context, builder, sig, arguments):
         name = f"llvm.rint.f{x.bitwidth}"
-        kind = _element(x)
+        kind = element(x)
         function = builder.module.globals.get(name) or ir.Function(
             builder.module, ir.FunctionType(kind, [kind]), name
         )
