@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import log1p, sin
+
 import numpy as np
 import pytest
 from numba.core.errors import TypingError
@@ -19,11 +21,13 @@ from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.lanes import Eights, Fours, group
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.compiler.tuples import row
+from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
+from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import PlaneStrain, Space, zero_tensor
 from karamelo_py.points.laws import advance, initial_state, law_kind, plastic_strain
@@ -57,6 +61,7 @@ def _number(a, b, out, p):
     x, y = a[p], b[0, p]
     out[0, p] = fma(x, y, real(2, x)) / (x * x + real(1, x))
     out[1, p] = choose(x > y, min(x, real(0.5, x)), max(x, y, -y)) - abs(y)
+    out[3, p] = sin(x) // real(0.3, x) + log1p(abs(y)) % real(0.25, y)
     out[2, p] = real(int(x + real(3, x)), x) + real(in_all(x < real(9, x)), y)
 
 
@@ -74,7 +79,7 @@ def test_arithmetic(real_type, n):
     rng = np.random.default_rng(1)
     a, b = rng.normal(size=n).astype(real_type), rng.normal(size=(1, n)).astype(real_type)
     a[: n // 4], b[0, : n // 2 : 2] = 0.0, -0.0
-    alone, together = np.full((2, 3, n + 8), 7, real_type)
+    alone, together = np.full((2, 4, n + 8), 7, real_type)
     _numbers_alone(a, b, alone, n)
     _numbers_in_lanes(tag, width, a, b, together, n)
     assert together.tobytes() == alone.tobytes()
@@ -104,6 +109,18 @@ def test_extremes_of_what_is_no_number():
     _extremes_alone(a, b[None], alone, 25)
     _extremes_in_lanes(a, b[None], together, 25)
     assert together.tobytes() == alone.tobytes()
+
+
+@kernel
+def _branches(a, out):
+    p = group(Fours(), 0, 4)
+    if a[p] > 0:
+        out[0, p] = a[p]
+
+
+def test_a_branch_says_what_to_write():
+    with pytest.raises(TypingError, match="take choose, in_all or in_any"):
+        _branches(np.ones(4), np.zeros((1, 4)))
 
 
 @kernel
@@ -239,9 +256,9 @@ GRID = Grid(
 
 
 @kernel
-def _map(basis, grid, x, mass, nodes, seen, p):
+def _map(basis, grid, x, mass, nodes, seen, out, p):
     """Mass and position to the nodes, and a field of the nodes to the points."""
-    here = x[0, p], x[1, p]
+    here = place_at(basis, KIN, x, p)
     stencil = locate(basis, KIN, grid, here)
     total = real(0, here[0]), real(0, here[0]), real(0, here[0])
     for k in range(support(basis, KIN)):
@@ -254,30 +271,30 @@ def _map(basis, grid, x, mass, nodes, seen, p):
             fma(gradient[0], found[1], total[1]),
             fma(gradient[1], found[2], total[2]),
         )
-    store(x, p, total)
+    store(out, p, total)
 
 
 @kernel
-def _map_alone(basis, grid, x, mass, nodes, seen, n):
+def _map_alone(basis, grid, x, mass, nodes, seen, out, n):
     for p in range(n):
-        _map(basis, grid, x, mass, nodes, seen, p)
+        _map(basis, grid, x, mass, nodes, seen, out, p)
 
 
 @kernel
-def _map_in_lanes(basis, grid, x, mass, nodes, seen, n):
+def _map_in_lanes(basis, grid, x, mass, nodes, seen, out, n):
     for q in range(0, n, 4):
-        _map(basis, grid, x, mass, nodes, seen, group(Fours(), q, min(4, n - q)))
+        _map(basis, grid, x, mass, nodes, seen, out, group(Fours(), q, min(4, n - q)))
 
 
 @pytest.mark.parametrize(
-    "basis", [Linear(), QuadraticSpline(), CubicSpline(), BernsteinQuadratic()]
+    "basis", [Linear(), QuadraticSpline(), CubicSpline(), BernsteinQuadratic(), UGIMP()]
 )
 @pytest.mark.parametrize("spread", [0.1, 2.4], ids=["one cell", "many cells"])
 def test_weights_gather_and_scatter(basis, spread):
     """Points of one cell take the short way; sums at nodes differ by the order of additions."""
     n = 14
     rng = np.random.default_rng(3)
-    x = np.zeros((3, n))
+    x = np.full((4, n), 0.125)  # the last are half sizes of domains
     x[:2] = 0.05 + spread * rng.uniform(size=(2, n))
     mass = rng.uniform(1, 2, n)
     per_cell = basis.nodes_per_cell
@@ -286,10 +303,10 @@ def test_weights_gather_and_scatter(basis, spread):
     count = (per_cell * GRID.nx + 1) * step
     seen = rng.normal(size=(count, 4))
     alone, together = np.zeros((2, count, 4))
-    x1, x2 = x.copy(), x.copy()
-    _map_alone(basis, grid, x1, mass, alone, seen, n)
-    _map_in_lanes(basis, grid, x2, mass, together, seen, n)
-    assert x2.tobytes() == x1.tobytes()
+    of_alone, of_together = np.zeros((2, 3, n))
+    _map_alone(basis, grid, x, mass, alone, seen, of_alone, n)
+    _map_in_lanes(basis, grid, x, mass, together, seen, of_together, n)
+    assert of_together.tobytes() == of_alone.tobytes()
     assert alone[:, 0].sum() == pytest.approx(mass.sum(), rel=1e-14)
     np.testing.assert_allclose(together[:, :3], alone[:, :3], rtol=0, atol=1e-14 * mass.sum())
     assert (together[:, 3] == 0).all()  # what lies behind the components of a record

@@ -10,6 +10,7 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import (
@@ -169,5 +170,17 @@ def _each_lane(function: Callable) -> None:
         return define(names, call, function=function, call=_lane_by_lane)
 
 
-for _function in (math.log, math.exp, math.pow, operator.pow):
+for _function in (
+    math.log, math.log1p, math.exp, math.expm1, math.pow, math.sin, math.cos, math.tan, math.atan2,
+    operator.pow, operator.floordiv, operator.mod,
+):  # fmt: skip
     _each_lane(_function)
+
+
+@by_type(bool)
+def _branch(value):
+    if lanes_of(value):
+        raise TypingError(
+            "several points are computed at once, which a branch cannot tell apart: take choose, "
+            "in_all or in_any, or name the point function in one_by_one"
+        )
