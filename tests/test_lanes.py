@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import log1p, sin
+
 import numpy as np
 import pytest
 from numba.core.errors import TypingError
@@ -17,15 +19,31 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.lanes import Eights, Fours, group
+from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.compiler.tuples import row
+from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, support
+from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
+from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
+from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import PlaneStrain, Space, zero_tensor
-from karamelo_py.points.laws import advance, initial_state
+from karamelo_py.points.laws import advance, initial_state, law_kind, plastic_strain
+from karamelo_py.points.laws.damages.damage_johnson_cook import JohnsonCookDamage
+from karamelo_py.points.laws.eos.fluid import Tait
+from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos.shock import Shock
+from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
+from karamelo_py.points.laws.strengths.fluid import Viscous
+from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strengths.plastic import LinearHardening
+from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
+from karamelo_py.points.laws.viscosity.artificial import ArtificialViscosity
 
 pytestmark = pytest.mark.xdist_group("lanes")
 KIN = PlaneStrain()
@@ -43,6 +61,7 @@ def _number(a, b, out, p):
     x, y = a[p], b[0, p]
     out[0, p] = fma(x, y, real(2, x)) / (x * x + real(1, x))
     out[1, p] = choose(x > y, min(x, real(0.5, x)), max(x, y, -y)) - abs(y)
+    out[3, p] = sin(x) // real(0.3, x) + log1p(abs(y)) % real(0.25, y)
     out[2, p] = real(int(x + real(3, x)), x) + real(in_all(x < real(9, x)), y)
 
 
@@ -60,7 +79,7 @@ def test_arithmetic(real_type, n):
     rng = np.random.default_rng(1)
     a, b = rng.normal(size=n).astype(real_type), rng.normal(size=(1, n)).astype(real_type)
     a[: n // 4], b[0, : n // 2 : 2] = 0.0, -0.0
-    alone, together = np.full((2, 3, n + 8), 7, real_type)
+    alone, together = np.full((2, 4, n + 8), 7, real_type)
     _numbers_alone(a, b, alone, n)
     _numbers_in_lanes(tag, width, a, b, together, n)
     assert together.tobytes() == alone.tobytes()
@@ -90,6 +109,18 @@ def test_extremes_of_what_is_no_number():
     _extremes_alone(a, b[None], alone, 25)
     _extremes_in_lanes(a, b[None], together, 25)
     assert together.tobytes() == alone.tobytes()
+
+
+@kernel
+def _branches(a, out):
+    p = group(Fours(), 0, 4)
+    if a[p] > 0:
+        out[0, p] = a[p]
+
+
+def test_a_branch_says_what_to_write():
+    with pytest.raises(TypingError, match="take choose, in_all or in_any"):
+        _branches(np.ones(4), np.zeros((1, 4)))
 
 
 @kernel
@@ -123,20 +154,99 @@ def _advance_in_lanes(law, kin, state, dl, dt, n):
         _advance(law, kin, state, dl, dt, group(Fours(), q, min(4, n - q)))
 
 
+COPPER = Shock(1 / 8940, 1.38e11, 1.5, 0.0, 298.0)
+COOK = JohnsonCook.given(43.9e9, 65e6, 356e6, 0.37, 1.0, 0.02, 1.1, 298.0, 1356.0)
+WEAR = JohnsonCookDamage(0.002, 0.1, -3.0, 0.014, 1.12, 1.0, 298.0, 1356.0)
+LAWS = [
+    LinearElastic(1e-3, 500.0, 400.0),
+    NeoHookean(1e-3, 500.0, 400.0),
+    EosStrength(Tait(1e-3, 1e3, 7.0, 0.0), Viscous(1e-3, 0.1)),
+    EosStrength(LinearPressure(1e-3, 1e3), LinearHardening(400.0, 0.5, 20.0)),
+    # Pressure, damage, heat, rate; at first no point yields, then some do.
+    EosStrength(
+        COPPER,
+        COOK,
+        ArtificialViscosity(1.5, 0.06, 1e-3),
+        WEAR,
+        PlasticWork(0.9, 385.0, 0.0, 1e5, 298.0, 1356.0),
+    ),
+    # Its response is computed for one lane after another.
+    EosStrength(LinearPressure(1e-3, 1e3), DruckerPrager.given(400.0, 0.1, 30.0, 5.0)),
+]
+
+
 @pytest.mark.parametrize("kin", [PlaneStrain(), Space()], ids=["plane", "space"])
-@pytest.mark.parametrize("law", [LinearElastic(1e-3, 500.0, 400.0), NeoHookean(1e-3, 500.0, 400.0)])
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: "-".join(k.__name__ for k in law_kind(law)))
 def test_laws_unchanged(law, kin):
     """The same function of a law, four points at once; eleven points end within a group."""
     n = 11
     start = np.array(initial_state(law, kin, 1.0))
-    dl = 1e-3 * np.random.default_rng(2).normal(size=(kin.tensor_size, n))
+    dl = np.linspace(1e-4, 2e-3, n) * np.random.default_rng(2).normal(size=(kin.tensor_size, n))
     alone = np.repeat(start[:, None], n, axis=1)
     together = alone.copy()
     for _ in range(3):
-        _advance_alone(law, kin, alone, dl, 1e-3, n)
-        _advance_in_lanes(law, kin, together, dl, 1e-3, n)
+        _advance_alone(law, kin, alone, dl, 1e-6, n)
+        _advance_in_lanes(law, kin, together, dl, 1e-6, n)
     assert (alone != start[:, None]).any()
     assert together.tobytes() == alone.tobytes()
+    if isinstance(law, EosStrength) and not isinstance(law.strength, Viscous):
+        strain = [plastic_strain(law, kin, tuple(state)) for state in alone.T]
+        assert max(strain) > 0  # something yields
+
+
+@kernel
+def _powers(x, y, out, p):
+    out[0, p] = power(x[p], y[p])
+    out[1, p] = logarithm(x[p])
+    out[2, p] = exponential(y[p])
+
+
+@kernel
+def _powers_alone(x, y, out, n):
+    for p in range(n):
+        _powers(x, y, out, p)
+
+
+@kernel
+def _powers_in_lanes(tag, width, x, y, out, n):
+    for q in range(0, n, width):
+        _powers(x, y, out, group(tag, q, min(width, n - q)))
+
+
+@pytest.mark.parametrize("real_type", WIDTHS)
+def test_powers(real_type):
+    """Against the C library in more digits: two operations, and |y ln x| of them in a power."""
+    width, tag = WIDTHS[real_type]
+    rng = np.random.default_rng(4)
+    x = (10 ** rng.uniform(-4, 4, 2000)).astype(real_type)
+    x[:1000] = rng.uniform(0.9, 1.1, 1000)
+    y = rng.uniform(-8, 8, 2000).astype(real_type)
+    alone, together = np.zeros((2, 3, 2000), real_type)
+    _powers_alone(x, y, alone, 2000)
+    _powers_in_lanes(tag, width, x, y, together, 2000)
+    assert together.tobytes() == alone.tobytes()
+    a, b = x.astype(np.longdouble), y.astype(np.longdouble)
+    eps = np.finfo(real_type).eps
+    growth = 2 + np.abs(b * np.log(a))
+    off = np.abs(alone - np.stack([a**b, np.log(a), np.exp(b)]))
+    assert (off[0] <= eps * growth * a**b).all()
+    assert (off[1] <= 2 * eps * np.abs(np.log(a))).all()
+    assert (off[2] <= 2 * eps * np.exp(b)).all()
+
+
+@pytest.mark.parametrize("real_type", WIDTHS)
+def test_powers_at_the_ends(real_type):
+    """Nothing, one, too much and too little, and the smallest numbers."""
+    width, tag = WIDTHS[real_type]
+    last = np.log2(np.finfo(real_type).smallest_subnormal) + 4
+    x = np.array([0.0, 0.0, 1.0, 2.0, 2.0, 2.0, -1.0, np.nan], real_type)
+    y = np.array([0.4, 0.0, 1e3, 2e3, -2e3, last, 0.5, 0.5], real_type)
+    out = np.zeros((3, 8), real_type)
+    _powers_in_lanes(tag, width, x, y, out, 8)
+    np.testing.assert_array_equal(out[0, :5], [0, 1, 1, np.inf, 0])
+    assert out[0, 5] == pytest.approx(2.0**last, rel=1 / 16)
+    assert np.isnan(out[0, 6:]).all()
+    np.testing.assert_array_equal(out[1, :3], [-np.inf, -np.inf, 0])
 
 
 GRID = Grid(
@@ -146,9 +256,9 @@ GRID = Grid(
 
 
 @kernel
-def _map(basis, grid, x, mass, nodes, seen, p):
+def _map(basis, grid, x, mass, nodes, seen, out, p):
     """Mass and position to the nodes, and a field of the nodes to the points."""
-    here = x[0, p], x[1, p]
+    here = place_at(basis, KIN, x, p)
     stencil = locate(basis, KIN, grid, here)
     total = real(0, here[0]), real(0, here[0]), real(0, here[0])
     for k in range(support(basis, KIN)):
@@ -161,36 +271,42 @@ def _map(basis, grid, x, mass, nodes, seen, p):
             fma(gradient[0], found[1], total[1]),
             fma(gradient[1], found[2], total[2]),
         )
-    store(x, p, total)
+    store(out, p, total)
 
 
 @kernel
-def _map_alone(basis, grid, x, mass, nodes, seen, n):
+def _map_alone(basis, grid, x, mass, nodes, seen, out, n):
     for p in range(n):
-        _map(basis, grid, x, mass, nodes, seen, p)
+        _map(basis, grid, x, mass, nodes, seen, out, p)
 
 
 @kernel
-def _map_in_lanes(basis, grid, x, mass, nodes, seen, n):
+def _map_in_lanes(basis, grid, x, mass, nodes, seen, out, n):
     for q in range(0, n, 4):
-        _map(basis, grid, x, mass, nodes, seen, group(Fours(), q, min(4, n - q)))
+        _map(basis, grid, x, mass, nodes, seen, out, group(Fours(), q, min(4, n - q)))
 
 
-@pytest.mark.parametrize("basis", [Linear(), QuadraticSpline()])
+@pytest.mark.parametrize(
+    "basis", [Linear(), QuadraticSpline(), CubicSpline(), BernsteinQuadratic(), UGIMP()]
+)
 @pytest.mark.parametrize("spread", [0.1, 2.4], ids=["one cell", "many cells"])
 def test_weights_gather_and_scatter(basis, spread):
     """Points of one cell take the short way; sums at nodes differ by the order of additions."""
     n = 14
     rng = np.random.default_rng(3)
-    x = np.zeros((3, n))
+    x = np.full((4, n), 0.125)  # the last are half sizes of domains
     x[:2] = 0.05 + spread * rng.uniform(size=(2, n))
     mass = rng.uniform(1, 2, n)
-    seen = rng.normal(size=(42, 4))
-    alone, together = np.zeros((2, 42, 4))
-    x1, x2 = x.copy(), x.copy()
-    _map_alone(basis, GRID, x1, mass, alone, seen, n)
-    _map_in_lanes(basis, GRID, x2, mass, together, seen, n)
-    assert x2.tobytes() == x1.tobytes()
+    per_cell = basis.nodes_per_cell
+    step = per_cell * GRID.ny + 1
+    grid = GRID._replace(step_x=step)
+    count = (per_cell * GRID.nx + 1) * step
+    seen = rng.normal(size=(count, 4))
+    alone, together = np.zeros((2, count, 4))
+    of_alone, of_together = np.zeros((2, 3, n))
+    _map_alone(basis, grid, x, mass, alone, seen, of_alone, n)
+    _map_in_lanes(basis, grid, x, mass, together, seen, of_together, n)
+    assert of_together.tobytes() == of_alone.tobytes()
     assert alone[:, 0].sum() == pytest.approx(mass.sum(), rel=1e-14)
     np.testing.assert_allclose(together[:, :3], alone[:, :3], rtol=0, atol=1e-14 * mass.sum())
     assert (together[:, 3] == 0).all()  # what lies behind the components of a record

@@ -37,7 +37,7 @@ WEAR = JohnsonCookDamage(D1, D2, D3, D4, D5, 1.0, TR, TM)
 HEAT = PlasticWork(0.0, 0.5, 0.0, 0.0, TR, TM)
 INTACT = EosStrength(LinearPressure(0.125, K), Plastic(G, Y))
 BREAKING = INTACT._replace(damage=WEAR)
-COOK = JohnsonCook(G, 0.4, 0.3, 0.3, 1.0, 0.05, 1.1, TR, TM)
+COOK = JohnsonCook.given(G, 0.4, 0.3, 0.3, 1.0, 0.05, 1.1, TR, TM)
 ALL_PARTS = EosStrength(
     Shock(0.125, K, 1.5, 0.05, TR), COOK, damage=WEAR, temperature=HEAT._replace(chi=0.9)
 )

@@ -9,8 +9,10 @@ import pytest
 from laws import TURN, integrated, mises, stress, stretched, worked
 from tensors import ALL_KINEMATICS, symmetric_flat
 
+from karamelo_py.kernels.laws import law_in
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import (
+    Absent,
     advance,
     dissipated_energy,
     energy_density,
@@ -31,7 +33,7 @@ from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
 RHO, K, G = 8.0, 160.0, 80.0
 EOS = LinearPressure(1 / RHO, K)
 A, B, N, RATE0, C, M, TR, TM = 0.4, 0.3, 0.3, 1.0, 0.05, 1.1, 300.0, 1300.0
-COOK = JohnsonCook(G, A, B, N, RATE0, C, M, TR, TM)
+COOK = JohnsonCook.given(G, A, B, N, RATE0, C, M, TR, TM)
 HARDENING = LinearHardening(G, 0.4, 2.0)
 SWIFT = Swift(G, 0.4, 0.5, 0.002, 0.5)
 HEAT = PlasticWork(0.9, 0.5, 0.0, 0.0, TR, TM)
@@ -140,7 +142,8 @@ def test_factor_of_the_temperature():
         flow.append(mises(law, kin, state) / static_flow(COOK, ep))
         assert temperature(law, kin, state) == T
     assert flow == pytest.approx([1, 1, 1 - 0.5**M, 0, 0], rel=1e-12, abs=1e-12)
-    never = EosStrength(EOS, COOK._replace(m=0.0).checked(), temperature=HEAT)
+    assert JohnsonCook.given(G, A, B, N, RATE0, C, 0.0, TR, TM).softening == Absent()
+    never = EosStrength(EOS, COOK._replace(softening=Absent()), temperature=HEAT)
     state = with_temperature(never, kin, start(never, kin), 800.0)
     state = stretched(never, kin, state, isochoric(1e-2), 1, 1e3)
     ep = plastic_strain(never, kin, state)
@@ -264,7 +267,7 @@ def test_line_has_the_same_numbers():
 def test_single_precision():
     """Newton's method ends in single precision, too, and the numbers stay in it."""
     law = EosStrength(EOS, COOK)
-    single = EosStrength(*(type(p)(*(np.float32(x) for x in p)) if p else p for p in law))
+    single = law_in(law, np.float32)
     kin = Axisymmetric()
     state = initial_state(single, kin, np.float32(1))
     dl = tuple(np.float32(x) for x in (1e-2, 0, 0, -0.5e-2, -0.5e-2))

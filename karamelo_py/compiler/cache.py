@@ -215,7 +215,7 @@ class KernelCache(_Cache):
 
 
 # What chooses code by type, and what is in every kernel.
-WHOLE_FILES = [inlining.__file__, held.__file__, WHOLE, Path(WHOLE).with_name("compile.py")]
+WHOLE_FILES = [inlining.__file__, held.__file__, *WHOLE, Path(__file__).with_name("compile.py")]
 
 
 def _setting() -> str:

@@ -130,6 +130,20 @@ def by_type(function: Callable) -> Callable:
     return choose
 
 
+def of_numbers(function: Callable) -> Callable:
+    """The same for a chooser that knows nothing of lanes: they have choosers of their own."""
+
+    def choose(chooser: Callable) -> Callable:
+        @functools.wraps(chooser)
+        def guarded(*arguments: Any) -> Callable | None:
+            return None if lanes_of(arguments) else chooser(*arguments)
+
+        by_type(function)(guarded)
+        return chooser
+
+    return choose
+
+
 def shared(function: Callable) -> Callable:
     """Mark a helper of point functions that needs no choice by type: kernels may call it."""
     by_type(function)(lambda *arguments: function)
@@ -145,6 +159,17 @@ class Undefined(TypeError):
         self.classes = classes
 
 
+def one_by_one(function: Callable, count: int) -> Callable:
+    """A function of `count` arguments, some in lanes, that does `function` for each lane."""
+    names = "".join(f"a{k}, " for k in range(count))
+    return define(names, f"return call(function, ({names}))", function=function, call=in_each_lane)
+
+
+def in_each_lane(function: Callable, arguments: tuple) -> Any:
+    """What a function of numbers gives for each lane among its arguments."""
+    raise TypeError("only compiled kernels know lanes")
+
+
 def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
@@ -152,6 +177,9 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
     ``name.on(Class, ...)`` and serve both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and
     inside kernels, where the types are known at compile time and no branch is left. A plug-in adds
     its own in the same way. ``name.otherwise`` marks what classes without their own get.
+
+    Point functions serve one point or several at once (:mod:`karamelo_py.compiler.lanes`). Those
+    that a class names in ``one_by_one``, since they branch, are called for one point after another.
     """
 
     def declare(stub: Callable) -> Callable:
@@ -186,7 +214,12 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
         dispatch.__doc__ = stub.__doc__
 
         def choose(*arguments: Any) -> Callable | None:
-            return find(tuple(tag_class(a) for a in arguments[:tags]))
+            classes = tuple(tag_class(a) for a in arguments[:tags])
+            found = find(classes)
+            apart = any(stub.__name__ in getattr(tag, "one_by_one", ()) for tag in classes)
+            if apart and lanes_of(arguments):
+                return one_by_one(dispatch, len(arguments))
+            return found
 
         by_type(dispatch)(choose)
 
@@ -232,14 +265,17 @@ def real(value: float, like: Any) -> Any:
 
 
 def lanes_of(numba_type: Any) -> int:
-    """How many lanes a Numba type has (:mod:`karamelo_py.compiler.lanes`); 0 for numbers."""
+    """How many lanes a Numba type has (:mod:`karamelo_py.compiler.lanes`); 0 for numbers.
+
+    Of tuples, those of what is in them.
+    """
+    if isinstance(numba_type, tuple | numba.types.BaseTuple):
+        return max(map(lanes_of, numba_type), default=0)
     return getattr(numba_type, "width", 0)
 
 
-@by_type(real)
+@of_numbers(real)
 def _real(value, like):
-    if lanes_of(value) or lanes_of(like):
-        return None
     if like is numba.types.float32:
         return lambda value, like: numba.float32(value)
     return lambda value, like: numba.float64(value)
@@ -253,10 +289,8 @@ def round_off(like: Any) -> Any:
 _ROUND_OFF = {"float32": 2.0**-23}
 
 
-@by_type(round_off)
+@of_numbers(round_off)
 def _round_off(like):
-    if lanes_of(like):
-        return None
     if like is numba.types.float32:
         return lambda like: numba.float32(2.0**-23)
     return lambda like: numba.float64(2.0**-52)
@@ -275,10 +309,8 @@ def _fused(typing_context, a, b, c):
     return a(a, b, c), codegen
 
 
-@by_type(fma)
+@of_numbers(fma)
 def _fma(a, b, c):
-    if lanes_of(a) or lanes_of(b) or lanes_of(c):
-        return None
     if a == b == c and isinstance(a, numba.types.Float):
         return lambda a, b, c: _fused(a, b, c)
     return lambda a, b, c: a * b + c
@@ -291,9 +323,7 @@ def choose(condition: bool, a: float, b: float) -> float:
 
 @by_type(choose)
 def _choose(condition, a, b):
-    if lanes_of(condition):
-        return None
-    return lambda condition, a, b: a if condition else b
+    return None if lanes_of(condition) else lambda condition, a, b: a if condition else b
 
 
 def in_all(condition: bool) -> bool:
@@ -301,9 +331,15 @@ def in_all(condition: bool) -> bool:
     return condition
 
 
-@by_type(in_all)
-def _in_all(condition):
-    return None if lanes_of(condition) else lambda condition: condition
+of_numbers(in_all)(lambda condition: lambda condition: condition)
+
+
+def in_any(condition: bool) -> bool:
+    """Whether a condition holds in any lane; it itself where there are none."""
+    return condition
+
+
+of_numbers(in_any)(lambda condition: lambda condition: condition)
 
 
 def of_present(p: int, value: float) -> float:
@@ -311,9 +347,7 @@ def of_present(p: int, value: float) -> float:
     return value
 
 
-@by_type(of_present)
-def _of_present(p, value):
-    return None if lanes_of(p) else lambda p, value: value
+of_numbers(of_present)(lambda p, value: lambda p, value: value)
 
 
 def accumulate(array: Any, i: int, first: int, values: tuple) -> None:
@@ -322,10 +356,8 @@ def accumulate(array: Any, i: int, first: int, values: tuple) -> None:
         array[i, first + k] += value
 
 
-@by_type(accumulate)
+@of_numbers(accumulate)
 def _accumulate(array, i, first, values):
-    if lanes_of(i) or any(lanes_of(value) for value in values):
-        return None
     lines = [f"array[i, first + {k}] += values[{k}]" for k in range(len(values))]
     return define("array, i, first, values", *lines)
 
@@ -335,9 +367,7 @@ def largest(a: float) -> float:
     return a
 
 
-@by_type(largest)
-def _largest(a):
-    return None if lanes_of(a) else lambda a: a
+of_numbers(largest)(lambda a: lambda a: a)
 
 
 def first_failing(condition: bool) -> int:
@@ -345,9 +375,7 @@ def first_failing(condition: bool) -> int:
     return 0
 
 
-@by_type(first_failing)
-def _first_failing(condition):
-    return None if lanes_of(condition) else lambda condition: 0
+of_numbers(first_failing)(lambda condition: lambda condition: 0)
 
 
 def is_one(number: int) -> bool:
@@ -355,9 +383,7 @@ def is_one(number: int) -> bool:
     return True
 
 
-@by_type(is_one)
-def _is_one(number):
-    return None if lanes_of(number) else lambda number: True
+of_numbers(is_one)(lambda number: lambda number: True)
 
 
 def first_lane(number: int) -> int:
@@ -365,9 +391,7 @@ def first_lane(number: int) -> int:
     return number
 
 
-@by_type(first_lane)
-def _first_lane(number):
-    return None if lanes_of(number) else lambda number: number
+of_numbers(first_lane)(lambda number: lambda number: number)
 
 
 def index(i: int) -> int:
@@ -378,11 +402,7 @@ def index(i: int) -> int:
     return i
 
 
-@by_type(index)
-def _index(i):
-    if lanes_of(i):
-        return None
-    return lambda i: numba.uint64(i)
+of_numbers(index)(lambda i: lambda i: numba.uint64(i))
 
 
 def over_blocks(per_block: Callable) -> Callable:

@@ -28,7 +28,7 @@ from numba.core.registry import cpu_target
 # Known by name: their versions are part of every key.
 _OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
 # What Numba's own functions do with lanes cannot be followed from them: all of it is in every key.
-WHOLE = str(Path(__file__).with_name("lanes.py"))
+WHOLE = [str(path) for path in sorted(Path(__file__).with_name("lanes").glob("*.py"))]
 SPELLED = "<spelled>"  # the file of functions that are written at compile time
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), range, slice)
 
@@ -148,7 +148,7 @@ class _Watch(event.Listener):
             return
         code = function.__code__
         # What was spelled out at compile time was spelled by a function that is followed itself.
-        known = _opaque(function) or code.co_filename in (SPELLED, WHOLE)
+        known = _opaque(function) or code.co_filename in (SPELLED, *WHOLE)
         _contents[compiled.library] = Contents(choices, frozenset(() if known else (code,)))
 
 

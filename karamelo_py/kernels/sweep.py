@@ -28,6 +28,7 @@ from karamelo_py.compiler.compile import (
     subkernel,
 )
 from karamelo_py.compiler.fields import load_vector
+from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.compiler.held import address, at_address, at_hand, hold, is_held
 from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
 from karamelo_py.compiler.tuples import record
@@ -133,9 +134,12 @@ def _in_lanes(visit, s, block):
     basis, transfer, averaging, grids = (
         s[s.fields.index(name)] for name in ("basis", "transfer", "averaging", "grids")
     )
-    parts = [*tasks, *quantities, basis, transfer, averaging, block[block.fields.index("laws")]]
-    knows = all(getattr(part.instance_class, "in_lanes", False) for part in parts)
-    if not knows or reflected.defined(grids.instance_class):
+    law = block[block.fields.index("laws")]
+    parts = {part.instance_class for part in (*tasks, *quantities, basis, transfer, averaging)}
+    parts.update(classes_in(law))
+    if not all(getattr(part, "in_lanes", False) for part in parts) or reflected.defined(
+        grids.instance_class
+    ):
         return lambda visit, s, block: OneByOne()
     made = lanes_for(block[0][block[0].fields.index("mass")].dtype.bitwidth)
     return lambda visit, s, block: made()

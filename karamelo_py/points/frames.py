@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
 from karamelo_py.compiler.fields import tensor
+from karamelo_py.compiler.powers import power
 from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
 from karamelo_py.points.kinematics import (
     add_symmetric_dot,
@@ -149,14 +150,14 @@ def scaled_increment(frame, kin, dl, f, ratio):
 @scaled_increment.on(Updated)
 def _(frame, kin, dl, f, ratio):
     # (I + dl) s - I
-    s = ratio ** stretched_share(kin, ratio)
+    s = power(ratio, stretched_share(kin, ratio))
     return add_scaled(scale(s, dl), s - real(1, s), identity(kin, s))
 
 
 @scaled_increment.on(Total)
 def _(frame, kin, dl, f, ratio):
     # (F + dl) s - F
-    s = ratio ** stretched_share(kin, ratio)
+    s = power(ratio, stretched_share(kin, ratio))
     return add_scaled(scale(s, dl), s - real(1, s), f)
 
 

@@ -27,6 +27,7 @@ class BernsteinQuadratic(NamedTuple):
     nodes_per_cell = 2
     steady_moment = False  # D of the affine transfers vanishes at the corners of cells
     steep_edge = True
+    in_lanes = True
 
 
 @along.on(BernsteinQuadratic)

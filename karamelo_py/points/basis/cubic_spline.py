@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.compile import choose, in_all, real, shared
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 
@@ -22,6 +22,7 @@ class CubicSpline(NamedTuple):
     """
 
     steep_edge = False
+    in_lanes = True
 
 
 @along.on(CubicSpline)
@@ -29,8 +30,6 @@ def _(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
     cell = int(a)
-    if cell < 1 or cell >= last - 1:
-        return _at_wall(grid, a, last)
     t = a - real(cell, a)
     s = real(1, a) - t
     half, sixth, two_thirds = real(0.5, a), real(1 / 6, a), real(2 / 3, a)
@@ -57,7 +56,11 @@ def _(basis, kin, grid, place, direction):
         three * s * weights[2],
         three * (real(1, a) + s) * weights[3],
     )
-    return Along(cell - 1, r, weights, gradients, affine)
+    line = Along(cell - 1, r, weights, gradients, affine)
+    bulk = (cell >= 1) & (cell < last - 1)
+    if in_all(bulk):
+        return line
+    return choose(bulk, line, _at_wall(grid, a, last))
 
 
 @shared
@@ -68,18 +71,18 @@ def _at_wall(grid, a, last):
     r = a - real(first, a)
     zero, one = real(0, a), real(1, a)
     if last == 1:  # both walls at once: what is left are the hat functions
-        gradients = (-grid.inv_h, grid.inv_h, zero, zero)
+        gradients = (zero - grid.inv_h, zero + grid.inv_h, zero, zero)
         return Along(first, r, (one - r, r, zero, zero), gradients, gradients)
-    if cell == 0:
-        n, g, c = _beside_wall(grid, a)
-        return Along(first, r, n + (zero,), g + (zero,), c + (zero,))
-    n, g, c = _beside_wall(grid, real(last, a) - a)
-    n = (n[2], n[1], n[0])
-    g = (-g[2], -g[1], -g[0])
-    c = (-c[2], -c[1], -c[0])
-    if last == 2:
-        return Along(first, r, n + (zero,), g + (zero,), c + (zero,))
-    return Along(first, r, (zero,) + n, (zero,) + g, (zero,) + c)
+    lower = cell == 0
+    n, g, c = _beside_wall(grid, choose(lower, a, real(last, a) - a))
+    n = choose(lower, n, (n[2], n[1], n[0]))
+    g = choose(lower, g, (-g[2], -g[1], -g[0]))
+    c = choose(lower, c, (-c[2], -c[1], -c[0]))
+    behind = (cell > 0) & (last > 2)  # they are the last three of the four
+    n = choose(behind, (zero,) + n, n + (zero,))
+    g = choose(behind, (zero,) + g, g + (zero,))
+    c = choose(behind, (zero,) + c, c + (zero,))
+    return Along(first, r, n, g, c)
 
 
 @shared

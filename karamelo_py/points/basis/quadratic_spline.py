@@ -41,24 +41,9 @@ def _(basis, kin, grid, place, direction):
     r = real(1, a) + t
     four = real(4, a) * grid.inv_h
     affine = (-four * r * weights[0], -four * t * weights[1], four * (left + half) * weights[2])
-    wall = _at_wall(grid, a, last)
-    return Along(
-        choose(bulk, nearest - 1, wall.first),
-        choose(bulk, r, wall.r),
-        _each(bulk, weights, wall.weights),
-        _each(bulk, gradients, wall.gradients),
-        _each(bulk, affine, wall.affine),
-    )
-
-
-@shared
-def _each(condition, a, b):
-    """One triple or the other."""
-    return (
-        choose(condition, a[0], b[0]),
-        choose(condition, a[1], b[1]),
-        choose(condition, a[2], b[2]),
-    )
+    _at_wall(grid, a, last)
+    line = Along(nearest - 1, r, weights, gradients, affine)
+    return choose(bulk, line, _at_wall(grid, a, last))
 
 
 @shared

@@ -26,6 +26,7 @@ class UGIMP(NamedTuple):
     """
 
     steep_edge = True
+    in_lanes = True
     shape = ("half_size",)
 
 

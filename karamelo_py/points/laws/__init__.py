@@ -10,6 +10,10 @@ the arguments. Where a script gives other numbers than the law computes with, a 
 has the arguments and returns the law; `checked`, a method, refuses what no annotation can, and
 returns the law or a simpler one that means the same.
 
+A law that says ``in_lanes``, as all its parts do, is computed for several points at once: its point
+functions do not branch over numbers of a point, but `choose`; those that do are named in
+``one_by_one``. Points of other laws are visited one by one.
+
 What dumps and plots can show of a law is declared beside it (`column`).
 """
 
@@ -25,6 +29,8 @@ from karamelo_py.compiler.compile import point_function, real
 
 class Absent(NamedTuple):
     """Tag of a part that a law does not have."""
+
+    in_lanes = True
 
 
 def law_kind(law: NamedTuple) -> tuple[type, ...]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from math import log, sqrt
 from typing import Any, ClassVar, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.compile import choose, point_function, real, shared
 from karamelo_py.compiler.tuples import either, following, increased, leading, plus, scale
 from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.scene import Scene
@@ -170,6 +170,8 @@ class EosStrength(NamedTuple):
     eos, strength, damage, temperature, compute max_plastic_strain, compute dissipated_energy
     """
 
+    in_lanes = True
+
     eos: Any
     strength: Any
     viscosity: Any = Absent()
@@ -273,7 +275,7 @@ def intact_pressure(law, j, m):
 def full_pressure(law, j, m):
     """The pressure in the stress: damage takes of tension, not of compression."""
     p = intact_pressure(law, j, m)
-    return plus(borne(law.damage, m.damage, p) if p < 0 else p, m.viscous)
+    return plus(choose(p < 0, borne(law.damage, m.damage, p), p), m.viscous)
 
 
 @shared
@@ -363,7 +365,8 @@ def _(damage, law, kin, m, strain, s, j, dt):
     p = intact_pressure(law, j, m)
     q = von_mises(kin, s)
     bound = q + real(1e-3, p) * abs(p)
-    triaxiality = -p / bound if bound > 0 else real(0, p)
+    known = bound > 0
+    triaxiality = choose(known, -p / choose(known, bound, real(1, p)), real(0, p))
     return damage_after(damage, m.damage, strain, triaxiality, m.heat, dt)
 
 
@@ -379,9 +382,9 @@ def _(damage, law, kin, j, s, m, broken):
 
 @released.otherwise
 def _(damage, law, kin, j, s, m, broken):
-    energy = j * shear_energy(law.strength, kin, s)
-    if intact_pressure(law, j, m) < 0:
-        energy += compression_energy(law.eos, j, m.energy)
+    shear = j * shear_energy(law.strength, kin, s)
+    tension = intact_pressure(law, j, m) < 0
+    energy = shear + choose(tension, compression_energy(law.eos, j, m.energy), real(0, j))
     return (integrity(damage, m.damage) - integrity(damage, broken)) * energy
 
 
@@ -454,8 +457,8 @@ def _(law, kin, state):
     volume = compression_energy(law.eos, elastic, m.energy)
     volume -= stored_heat(law.eos, plus(j - j, m.loss))
     volume += plus(j - j, thermal_pressure(law.temperature, m.heat)) * (real(1, j) - j)
-    if intact_pressure(law, j, m) < 0:
-        volume = borne(law.damage, m.damage, volume)
+    tension = intact_pressure(law, j, m) < 0
+    volume = choose(tension, borne(law.damage, m.damage, volume), volume)
     shear = shear_energy(law.strength, kin, leading_symmetric(kin, state[1:]))
     return volume + j * borne(law.damage, m.damage, shear)
 

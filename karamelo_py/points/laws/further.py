@@ -17,6 +17,8 @@ from karamelo_py.points.laws import Absent
 class Further(NamedTuple):
     """A part, and further ones (`Absent` at the end)."""
 
+    in_lanes = True
+
     part: Any
     rest: Any
 

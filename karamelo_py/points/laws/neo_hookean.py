@@ -5,10 +5,10 @@ The state of a point is the deformation gradient F.
 
 from __future__ import annotations
 
-from math import log
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.powers import logarithm
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import (
@@ -106,7 +106,7 @@ def _(law, kin, state, dl, dt):
 @kirchhoff_stress.on(NeoHookean)
 def _(law, kin, state):
     # P = G (F - F^-T) + lam ln J F^-T, so tau = P F^T = G (b - I) + lam ln J I
-    pressure = law.lam * log(determinant(kin, state)) - law.G
+    pressure = law.lam * logarithm(determinant(kin, state)) - law.G
     return add_pressure(kin, law.G, left_cauchy_green(kin, state), pressure)
 
 
@@ -132,14 +132,14 @@ def _(law, kin, state):
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
     one = real(1, law.G)
     stretch = largest_row_sum(kin, left_cauchy_green(kin, state))
-    bulk = law.lam * (one - log(determinant(kin, state)))
+    bulk = law.lam * (one - logarithm(determinant(kin, state)))
     return (law.G * (one + stretch) + max(bulk, real(0, law.G))) * law.specific_volume
 
 
 @energy_density.on(NeoHookean)
 def _(law, kin, state):
     half = real(0.5, law.G)
-    ln_j = log(determinant(kin, state))
+    ln_j = logarithm(determinant(kin, state))
     excess = trace(left_cauchy_green(kin, state)) - real(3, law.G)
     return half * law.G * excess - law.G * ln_j + half * law.lam * ln_j * ln_j
 

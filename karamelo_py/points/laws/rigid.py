@@ -50,6 +50,8 @@ class Rigid(NamedTuple):
     material, fix velocity_particles, fix initial_velocity_particles
     """
 
+    in_lanes = True
+
     specific_volume: float  # volume per mass
 
     @classmethod

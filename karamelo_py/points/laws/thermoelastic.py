@@ -33,6 +33,8 @@ from karamelo_py.script.errors import ScriptError
 class Expansion(NamedTuple):
     """Temperature of an elastic law: stress -3 K alpha (T - T0)."""
 
+    in_lanes = True
+
     cp: float  # heat capacity per mass
     kappa: float  # conductivity
     alpha: float  # coefficient of linear expansion
@@ -42,6 +44,8 @@ class Expansion(NamedTuple):
 
 class Thermoelastic(NamedTuple):
     """An elastic law and its temperature; the state is that of the elastic law, then T."""
+
+    in_lanes = True
 
     elastic: Any
     heat: Any

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from math import exp, log
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.compile import choose, in_any, point_function, real
+from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws import column, damage, damage_initiation
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
@@ -65,6 +65,8 @@ class JohnsonCookDamage(NamedTuple):
     strength johnson_cook, temperature plastic_work, material eos-strength
     """
 
+    in_lanes = True
+
     d1: float
     d2: Annotated[float, NonNegative]
     d3: float
@@ -112,14 +114,16 @@ def _(damage, like):
 
 @damage_after.on(JohnsonCookDamage)
 def _(damage, memory, strain, triaxiality, heat, dt):
-    if not (strain > 0 and triaxiality > real(_CLOSED, strain)):
+    grows = (strain > 0) & (triaxiality > real(_CLOSED, strain))
+    if not in_any(grows):
         return memory
     one = real(1, strain)
-    failure = damage.d1 + damage.d2 * exp(min(damage.d3 * triaxiality, real(50, strain)))
+    failure = damage.d1 + damage.d2 * exponential(min(damage.d3 * triaxiality, real(50, strain)))
     rate = max(strain / (dt * damage.epsdot0), one)
-    failure *= one + damage.d4 * log(rate)
+    failure *= one + damage.d4 * logarithm(rate)
     failure *= warmed(heat, damage, one)
-    return (memory[0] + strain / max(failure, real(_SMALLEST_FAILURE_STRAIN, strain)),)
+    further = strain / max(failure, real(_SMALLEST_FAILURE_STRAIN, strain))
+    return (choose(grows, memory[0] + further, memory[0]),)
 
 
 @integrity.on(JohnsonCookDamage)

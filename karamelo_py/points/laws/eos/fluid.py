@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from math import inf, log
+from math import inf
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real, round_off
+from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.eos import (
     bulk_modulus,
@@ -47,6 +48,9 @@ class Tait(NamedTuple):
     strength fluid, ideal-gas, material eos-strength
     """
 
+    in_lanes = True
+    one_by_one = ("compression_energy",)
+
     specific_volume: float  # reference volume per mass
     K: float  # reference pressure; K gamma is the bulk modulus
     gamma: float
@@ -67,20 +71,20 @@ class Tait(NamedTuple):
 
 @pressure.on(Tait)
 def _(eos, j, memory, heat):
-    return max(eos.K * (j ** (-eos.gamma) - real(1, j)), -eos.tension)
+    return max(eos.K * (power(j, -eos.gamma) - real(1, j)), -eos.tension)
 
 
 @bulk_modulus.on(Tait)
 def _(eos, j, memory, heat):
-    return eos.K * eos.gamma * j ** (-eos.gamma)
+    return eos.K * eos.gamma * power(j, -eos.gamma)
 
 
 @compression_energy.on(Tait)
 def _(eos, j, memory):
     one = real(1, j)
-    power = one - eos.gamma
+    exponent = one - eos.gamma
     whole = j if eos.tension >= eos.K else min(j, ratio_at_pressure(eos, -eos.tension, ()))
-    grown = -log(whole) if power == 0 else (one - whole**power) / power
+    grown = -logarithm(whole) if exponent == 0 else (one - power(whole, exponent)) / exponent
     energy = eos.K * (grown - (one - whole))
     # From there on at constant tension.
     return energy + eos.tension * (j - whole) if j > whole else energy
@@ -91,4 +95,4 @@ def _(eos, p, heat):
     # Tension of K would need an infinite volume.
     one = real(1, p)
     borne = max(p, -eos.tension)
-    return max(one + borne / eos.K, round_off(p)) ** (-one / eos.gamma)
+    return power(max(one + borne / eos.K, round_off(p)), -one / eos.gamma)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.powers import power
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.eos import (
     at_pressure,
@@ -53,6 +54,8 @@ class IdealGas(NamedTuple):
     fluid, shock, strength fluid, material eos-strength
     """
 
+    in_lanes = True
+
     specific_volume: float  # reference volume per mass
     gamma: float  # ratio of specific heats
     energy: float  # E at the start, per reference volume
@@ -94,7 +97,7 @@ def _(eos, like):
 @compressed.on(IdealGas)
 def _(eos, memory, before, j, heating):
     # dE = -p dJ has the solution E J^(gamma - 1) = const, whatever the size of the step.
-    return (memory[0] * (before / j) ** (eos.gamma - real(1, j)) + heating,)
+    return (memory[0] * power(before / j, eos.gamma - real(1, j)) + heating,)
 
 
 @stored_heat.on(IdealGas)

@@ -37,6 +37,8 @@ class LinearPressure(NamedTuple):
     strength, material eos-strength
     """
 
+    in_lanes = True
+
     specific_volume: float  # reference volume per mass
     K: float
 

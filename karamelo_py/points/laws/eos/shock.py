@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import log1p, sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.compile import choose, point_function, real, shared
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.eos import (
     bulk_modulus,
@@ -65,6 +65,9 @@ class Shock(NamedTuple):
     linear, ideal-gas, strength johnson_cook, material eos-strength
     """
 
+    in_lanes = True
+    one_by_one = ("compression_energy", "ratio_at_pressure")
+
     specific_volume: float  # reference volume per mass
     modulus: float  # rho0 c0^2
     S: float
@@ -93,7 +96,7 @@ class Shock(NamedTuple):
 def tangent_from(eos, j):
     """The compression 1 - J beyond which pressure is a straight line."""
     limit = real(_STEEPEST, j)
-    return limit / eos.S if limit < eos.S else limit
+    return choose(limit < eos.S, limit / max(eos.S, limit), limit)
 
 
 @shared
@@ -101,13 +104,12 @@ def cold_pressure(eos, j):
     """Pressure of the Hugoniot curve; rho0 c0^2 mu in tension."""
     one = real(1, j)
     closed = one - j
-    if closed < 0:
-        return eos.modulus * closed / j
     inside = min(closed, tangent_from(eos, j))
     y = eos.S * inside
     flat = one - y
     slope = (one + y) / (flat * flat * flat)
-    return eos.modulus * (inside / (flat * flat) + slope * (closed - inside))
+    curve = eos.modulus * (inside / (flat * flat) + slope * (closed - inside))
+    return choose(closed < 0, eos.modulus * closed / j, curve)
 
 
 @point_function()
@@ -134,11 +136,10 @@ def _(eos, j, memory, heat):
 def _(eos, j, memory, heat):
     one = real(1, j)
     closed = one - j
-    if closed < 0:
-        return eos.modulus / j
     y = eos.S * min(closed, tangent_from(eos, j))
     flat = one - y
-    return j * eos.modulus * (one + y) / (flat * flat * flat)
+    curve = j * eos.modulus * (one + y) / (flat * flat * flat)
+    return choose(closed < 0, eos.modulus / j, curve)
 
 
 @compression_energy.on(Shock)

@@ -69,6 +69,9 @@ class DruckerPrager(NamedTuple):
     mohr-coulomb, eos linear, material eos-strength, compute max_plastic_strain
     """
 
+    in_lanes = True
+    one_by_one = ("respond",)
+
     G: float  # shear modulus
     cohesion: float
     friction: float

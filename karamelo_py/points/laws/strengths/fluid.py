@@ -42,6 +42,8 @@ class Viscous(NamedTuple):
     eos fluid, eos ideal-gas, material eos-strength
     """
 
+    in_lanes = True
+
     mu: float  # dynamic viscosity
     cell_size: float  # h, known when the scene is lowered
 

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import point_function, real, round_off, shared
+from karamelo_py.compiler.compile import (
+    choose,
+    in_any,
+    point_function,
+    real,
+    round_off,
+    shared,
+)
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws.strengths import remembers, shear_response
@@ -29,6 +36,14 @@ def _(strength, memory, increment, dt):
     return (memory[0] + increment,)
 
 
+@shared
+def returned(trial, q, flow, x):
+    """The deviatoric stress `trial`, brought back to `flow` where the plastic strain `x` grows."""
+    one = real(1, q)
+    yields = x > 0
+    return scale(choose(yields, flow / choose(yields, q, one), one), trial)
+
+
 def hardening(strength: type, **own: float | str) -> None:
     """Give `strength` (with a field ``G`` and a `flow_stress`) the radial return.
 
@@ -47,13 +62,9 @@ def hardening(strength: type, **own: float | str) -> None:
     def _(strength, kin, s, strain, memory, heat, dt):
         trial = elastic_trial(kin, strength.G, s, strain)
         q = von_mises(kin, trial)
-        none = real(0, q)
-        flow, slope = flow_stress(strength, memory, none, heat, dt)
-        if q > flow:
-            x = plastic_increment(strength, q, memory, heat, dt, flow, slope)
-            flow = q - real(3, q) * strength.G * x
-            return scale(flow / q, trial), hardened(strength, memory, x, dt), flow * x
-        return trial, hardened(strength, memory, none, dt), none
+        x = plastic_increment(strength, q, memory, heat, dt)
+        flow = q - real(3, q) * strength.G * x
+        return returned(trial, q, flow, x), hardened(strength, memory, x, dt), flow * x
 
 
 # Newton's method takes two or three; bisection, where it has to step in, one for each bit.
@@ -61,38 +72,38 @@ _MOST_ITERATIONS = 80
 
 
 @shared
-def plastic_increment(strength, q, memory, heat, dt, first, hardening):
-    """The plastic strain x of a step that solves q - 3 G x = flow stress, for q above it at 0.
+def plastic_increment(strength, q, memory, heat, dt):
+    """The plastic strain x of a step that solves q - 3 G x = flow stress, or 0 for q below that.
 
     The left side falls with x and the flow stress does not: there is one solution, whatever the
-    size of the step. Newton's method from the flow stress `first` at 0 and its slope, kept within
-    bounds by bisection.
+    size of the step. Newton's method from the flow stress at 0 and its slope, kept within bounds by
+    bisection.
     """
-    half = real(0.5, q)
+    zero, half = real(0, q), real(0.5, q)
     slope = real(3, q) * strength.G
     enough = real(4, q) * round_off(q) * q  # what the three terms are rounded to
     small = sqrt(round_off(q)) * q
-    low = real(0, q)
-    high = q / slope
-    x = (q - first) / (slope + hardening)
-    last = x
+    low, high = zero, q / slope
+    x = last = zero
+    active = q > zero
     for _ in range(_MOST_ITERATIONS):
         flow, hardening = flow_stress(strength, memory, x, heat, dt)
         excess = q - slope * x - flow
-        if excess > 0:
-            low = x
-        else:
-            high = x
+        active = active & ((x > 0) | (excess > 0))
+        low = choose(excess > 0, x, low)
+        high = choose(excess > 0, high, x)
         change = excess / (slope + hardening)
-        x += change
+        new = x + change
         # Changes go like their squares, c_(n+1) = (c_n / c_(n-1))^2 c_n: is the next one round-off?
         # Beside a kink of the curve they do not: there the excess has to be small, too.
-        next_is_small = abs(change * change * change) <= round_off(q) * x * last * last
-        if abs(excess) <= enough or (next_is_small and abs(excess) <= small):
-            break
+        next_is_small = abs(change * change * change) <= round_off(q) * new * last * last
+        done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))
+        within = (low < new) & (new < high)
+        middle = half * (low + high)
+        x = choose(active, choose(done | within, new, middle), x)
         last = change
-        if not (low < x < high):
-            x = half * (low + high)
-            if not (low < x < high):
-                break
+        # Lanes that have finished wait for the others.
+        active = active & (not (done | (middle <= low) | (middle >= high)))
+        if not in_any(active):
+            break
     return x

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from math import inf, log
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.compile import choose, point_function, real, shared
+from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
 from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
 from karamelo_py.points.laws.temperatures import Warm, homologous
@@ -51,80 +52,103 @@ class JohnsonCook(NamedTuple):
     plastic, swift, eos shock, damage damage_johnson_cook, temperature plastic_work
     """
 
-    G: Annotated[float, Positive]
-    A: Annotated[float, Positive]
-    B: Annotated[float, NonNegative]
-    n: Annotated[float, NonNegative]
-    epsdot0: Annotated[float, NonNegative]
-    C: Annotated[float, NonNegative]
-    m: Annotated[float, NonNegative]
-    Tr: float
-    Tm: float
-
-    def checked(self):
-        """The law; without the rate where nothing depends on it."""
-        check_temperatures(self.Tr, self.Tm)
-        reference_rate(self.epsdot0, self.C, "C")
-        # Without softening T* is to be 0 whatever T is: so it is for an infinite Tm.
-        law = self if self.m > 0 else self._replace(m=1.0, Tm=inf)
-        return law if self.C > 0 else StaticJohnsonCook(*law[:4], *law[6:])
-
-
-class StaticJohnsonCook(NamedTuple):
-    """(A + B ep^n) (1 - T*^m): the law where C is 0."""
+    in_lanes = True
 
     G: float
     A: float
     B: float
     n: float
+    rate: Any  # `RateFactor` or `Absent`
+    softening: Any  # `Softening` or `Absent`
+
+    @classmethod
+    def given(
+        cls,
+        G: Annotated[float, Positive],
+        A: Annotated[float, Positive],
+        B: Annotated[float, NonNegative],
+        n: Annotated[float, NonNegative],
+        epsdot0: Annotated[float, NonNegative],
+        C: Annotated[float, NonNegative],
+        m: Annotated[float, NonNegative],
+        Tr: float,
+        Tm: float,
+    ):
+        """The law with the factors that are not 1 anyway: others cost no logarithm and no power."""
+        check_temperatures(Tr, Tm)
+        epsdot0 = reference_rate(epsdot0, C, "C")
+        rate = RateFactor(epsdot0, C) if C > 0 else Absent()
+        return cls(G, A, B, n, rate, Softening(m, Tr, Tm) if m > 0 else Absent())
+
+
+class RateFactor(NamedTuple):
+    """1 + C ln(rate/epsdot0) above the reference rate."""
+
+    in_lanes = True
+
+    epsdot0: float
+    C: float
+
+
+class Softening(NamedTuple):
+    """1 - T*^m."""
+
+    in_lanes = True
+
     m: float
     Tr: float
     Tm: float
 
 
 hardening(JohnsonCook)
-hardening(StaticJohnsonCook)
 
 
 @shared
 def power_law(factor, exponent, strain):
     """factor strain^exponent and its slope; at no strain the slope is left out."""
-    if strain > 0:
-        value = factor * strain**exponent
-        return value, exponent * value / strain
-    return real(0, strain), real(0, strain)
+    some = strain > 0
+    base = choose(some, strain, real(1, strain))
+    value = choose(some, factor * power(base, exponent), real(0, strain))
+    return value, exponent * value / base
+
+
+@point_function(tags=2)
+def softened(softening, heat, like):
+    """The factor of the temperature: 1 where there is none."""
+
+
+@softened.otherwise
+def _(softening, heat, like):
+    return real(1, like)
+
+
+@softened.on(Softening, Warm)
+def _(softening, heat, like):
+    return real(1, like) - power(homologous(heat, softening.Tr, softening.Tm), softening.m)
 
 
 @point_function()
-def softening(heat, Tr, Tm, m):
-    """1 - T*^m, and 1 without a temperature."""
+def quickened(rate, flow, slope, increment, dt):
+    """Flow stress and slope with the factor of the rate."""
 
 
-@softening.otherwise
-def _(heat, Tr, Tm, m):
-    return real(1, m)
+@quickened.on(Absent)
+def _(rate, flow, slope, increment, dt):
+    return flow, slope
 
 
-@softening.on(Warm)
-def _(heat, Tr, Tm, m):
-    return real(1, m) - homologous(heat, Tr, Tm) ** m
-
-
-@flow_stress.on(StaticJohnsonCook)
-def _(strength, memory, increment, heat, dt):
-    hard, slope = power_law(strength.B, strength.n, memory[0] + increment)
-    soft = softening(heat, strength.Tr, strength.Tm, strength.m)
-    return (strength.A + hard) * soft, slope * soft
+@quickened.on(RateFactor)
+def _(rate, flow, slope, increment, dt):
+    one = real(1, increment)
+    relative = increment / (dt * rate.epsdot0)
+    faster = relative > one
+    factor = one + choose(faster, rate.C * logarithm(choose(faster, relative, one)), real(0, one))
+    steeper = choose(faster, flow * rate.C / choose(faster, increment, one), real(0, one))
+    return flow * factor, slope * factor + steeper
 
 
 @flow_stress.on(JohnsonCook)
 def _(strength, memory, increment, heat, dt):
-    one = real(1, increment)
     hard, slope = power_law(strength.B, strength.n, memory[0] + increment)
-    soft = softening(heat, strength.Tr, strength.Tm, strength.m)
-    static, slope = (strength.A + hard) * soft, slope * soft
-    rate = increment / (dt * strength.epsdot0)
-    if rate > one:
-        factor = one + strength.C * log(rate)
-        return static * factor, slope * factor + static * strength.C / increment
-    return static, slope
+    soft = softened(strength.softening, heat, hard)
+    return quickened(strength.rate, (strength.A + hard) * soft, slope * soft, increment, dt)

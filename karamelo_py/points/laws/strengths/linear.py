@@ -33,6 +33,8 @@ class Elastic(NamedTuple):
     plastic, eos, material eos-strength
     """
 
+    in_lanes = True
+
     G: Annotated[float, Positive]
 
 

@@ -53,6 +53,9 @@ class MohrCoulomb(NamedTuple):
     drucker-prager, eos linear, material eos-strength, compute max_plastic_strain
     """
 
+    in_lanes = True
+    one_by_one = ("respond",)
+
     G: float  # shear modulus
     cohesion: float  # c cos(phi)
     friction: float  # sin(phi)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
-from karamelo_py.compiler.tuples import scale
+from karamelo_py.compiler.compile import point_function, real
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.laws.strengths.hardening import returned
 from karamelo_py.points.laws.strengths.linear import elastic_trial
 
 
@@ -41,6 +41,8 @@ class LinearHardening(NamedTuple):
     linear, johnson_cook, swift, eos, material eos-strength, compute max_plastic_strain
     """
 
+    in_lanes = True
+
     G: Annotated[float, Positive]
     yield_stress: Annotated[float, Positive]
     H: Annotated[float, NonNegative] = 0.0
@@ -53,6 +55,8 @@ class LinearHardening(NamedTuple):
 class Plastic(NamedTuple):
     """The same with a yield stress that stays."""
 
+    in_lanes = True
+
     G: float
     yield_stress: float
 
@@ -62,23 +66,27 @@ remembers(LinearHardening, ep=0.0)
 
 
 @shear_response.on(Plastic)
-def _(strength, kin, s, strain, memory, heat, dt):
-    trial = elastic_trial(kin, strength.G, s, strain)
-    q = von_mises(kin, trial)
-    flow = strength.yield_stress
-    if q > flow:
-        increment = (q - flow) / (real(3, q) * strength.G)
-        return scale(flow / q, trial), (memory[0] + increment,), flow * increment
-    return trial, memory, real(0, q)
-
-
 @shear_response.on(LinearHardening)
 def _(strength, kin, s, strain, memory, heat, dt):
     trial = elastic_trial(kin, strength.G, s, strain)
     q = von_mises(kin, trial)
-    flow = strength.yield_stress + strength.H * memory[0]
-    if q > flow:
-        increment = (q - flow) / (real(3, q) * strength.G + strength.H)
-        flow += strength.H * increment
-        return scale(flow / q, trial), (memory[0] + increment,), flow * increment
-    return trial, memory, real(0, q)
+    H = hardening_modulus(strength)
+    flow = strength.yield_stress + H * memory[0]
+    x = max(q - flow, real(0, q)) / (real(3, q) * strength.G + H)
+    flow += H * x
+    return returned(trial, q, flow, x), (memory[0] + x,), flow * x
+
+
+@point_function()
+def hardening_modulus(strength):
+    """By how much the flow stress rises for each unit of plastic strain."""
+
+
+@hardening_modulus.on(Plastic)
+def _(strength):
+    return real(0, strength.G)
+
+
+@hardening_modulus.on(LinearHardening)
+def _(strength):
+    return strength.H

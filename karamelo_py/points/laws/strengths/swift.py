@@ -38,6 +38,8 @@ class Swift(NamedTuple):
     plastic, johnson_cook, material eos-strength
     """
 
+    in_lanes = True
+
     G: Annotated[float, Positive]
     A: Annotated[float, Positive]
     B: Annotated[float, NonNegative]

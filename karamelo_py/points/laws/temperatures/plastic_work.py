@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from karamelo_py.compiler.compile import choose
 from karamelo_py.language.signature import In, NonNegative, Positive
 from karamelo_py.points.laws import column, conductivity, heat_capacity, temperature
 from karamelo_py.points.laws.checks import check_temperatures
@@ -50,6 +51,8 @@ class PlasticWork(NamedTuple):
     strength johnson_cook, eos shock, material eos-strength, solid
     """
 
+    in_lanes = True
+
     chi: Annotated[float, In(0, 1)]
     cp: Annotated[float, Positive]
     kappa: Annotated[float, NonNegative]
@@ -73,9 +76,8 @@ def _(temperature, like):
 
 @heated.on(PlasticWork)
 def _(temperature, heat, work):
-    if heat[0] < temperature.Tm:
-        return Warm(heat.T + temperature.chi / temperature.cp * work)
-    return heat
+    warmer = heat.T + temperature.chi / temperature.cp * work
+    return Warm(choose(temperature.Tm > heat.T, warmer, heat.T))
 
 
 @thermal_pressure.on(PlasticWork)

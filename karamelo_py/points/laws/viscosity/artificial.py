@@ -16,6 +16,8 @@ from karamelo_py.points.laws.viscosity import (
 class ArtificialViscosity(NamedTuple):
     """q = rho h (Q1 h d^2 - Q2 c d) where the rate of volume change d is negative."""
 
+    in_lanes = True
+
     Q1: float  # quadratic coefficient
     Q2: float  # linear coefficient
     cell_size: float  # h, known when the scene is lowered

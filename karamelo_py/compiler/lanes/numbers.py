@@ -1,0 +1,408 @@
+"""Lanes as a number type: arithmetic, comparisons, choices, conversions."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.imputils import lower_builtin
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, models, register_model
+
+from karamelo_py.compiler.compile import (
+    by_type,
+    choose,
+    define,
+    fma,
+    in_all,
+    in_any,
+    index,
+    lanes_of,
+    real,
+    round_off,
+)
+
+I32, I64 = ir.IntType(32), ir.IntType(64)
+
+
+class Lanes(types.Type):
+    """`width` numbers of a scalar type in a register."""
+
+    def __init__(self, scalar: types.Type, width: int):
+        self.scalar, self.width = scalar, width
+        super().__init__(name=f"Lanes({scalar}, {width})")
+
+
+def element(scalar: types.Type) -> ir.Type:
+    """How a number lies in a register."""
+    if isinstance(scalar, types.Boolean):
+        return ir.IntType(1)
+    if isinstance(scalar, types.Integer):
+        return ir.IntType(scalar.bitwidth)
+    return {64: ir.DoubleType(), 32: ir.FloatType()}[scalar.bitwidth]
+
+
+def vector_of(lanes: Lanes) -> ir.VectorType:
+    return ir.VectorType(element(lanes.scalar), lanes.width)
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, lanes: Lanes):
+        super().__init__(manager, lanes, vector_of(lanes))
+
+
+def constant(values: list[int], bits: ir.Type = I32) -> ir.Constant:
+    return ir.Constant(ir.VectorType(bits, len(values)), values)
+
+
+def splat(builder: Any, value: Any, lanes: Lanes) -> Any:
+    """The same number in all lanes."""
+    vector = vector_of(lanes)
+    if isinstance(lanes.scalar, types.Boolean) and value.type != ir.IntType(1):
+        value = builder.trunc(value, ir.IntType(1))
+    one = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(I32, 0))
+    return builder.shuffle_vector(
+        one, ir.Constant(vector, ir.Undefined), constant([0] * lanes.width)
+    )
+
+
+def lane(builder: Any, value: Any, k: int) -> Any:
+    return builder.extract_element(value, ir.Constant(I32, k))
+
+
+def pack(builder: Any, values: list, lanes: Lanes) -> Any:
+    out = ir.Constant(vector_of(lanes), ir.Undefined)
+    for k, value in enumerate(values):
+        out = builder.insert_element(out, value, ir.Constant(I32, k))
+    return out
+
+
+def shape(lanes: Lanes) -> str:
+    """What LLVM's intrinsics call a vector: v4f64."""
+    kind = "f" if isinstance(lanes.scalar, types.Float) else "i"
+    return f"v{lanes.width}{kind}{lanes.scalar.bitwidth}"
+
+
+def shuffle(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
+    return builder.shuffle_vector(a, b, constant(order))
+
+
+def known(function: Callable, made: Callable) -> None:
+    """Let `function` know lanes: where an argument has some, it is the intrinsic `made`."""
+
+    @by_type(function)
+    def chosen(*arguments):
+        if not lanes_of(arguments):
+            return None
+        names = ", ".join(f"a{k}" for k in range(len(arguments)))
+        return define(names, f"return made({names})", made=made)
+
+
+# --- arithmetic -------------------------------------------------------------------------------
+
+
+def _wider(a: Any, b: Any) -> Lanes | None:
+    """Of two operands, at least one with lanes: the lanes of the result."""
+    if isinstance(a, Lanes) and isinstance(b, Lanes):
+        if a == b:
+            return a
+        if isinstance(a.scalar, types.Integer) and isinstance(b.scalar, types.Integer):
+            return a if a.scalar.bitwidth >= b.scalar.bitwidth else b
+        return None
+    lanes, other = (a, b) if isinstance(a, Lanes) else (b, a)
+    if not isinstance(lanes, Lanes) or not isinstance(other, types.Number | types.Boolean):
+        return None
+    # Numbers of cells beside a real number would be cut off: `real(i, x)` makes lanes of reals.
+    if not isinstance(lanes.scalar, types.Float) and isinstance(other, types.Float):
+        return None
+    return lanes
+
+
+def _both(builder: Any, sig: Any, arguments: Any, lanes: Lanes) -> list:
+    out = []
+    for kind, value in zip(sig.args, arguments, strict=True):
+        if not isinstance(kind, Lanes):
+            value = splat(builder, value, lanes)
+        elif kind != lanes:
+            value = builder.sext(value, vector_of(lanes))
+        out.append(value)
+    return out
+
+
+def _binary(operation: Any, of_floats: str | None, of_ints: str | None) -> None:
+    @infer_global(operation)
+    class Template(AbstractTemplate):
+        def generic(self, arguments, keywords):
+            if len(arguments) != 2:
+                return None
+            lanes = _wider(*arguments)
+            if lanes is None:
+                return None
+            if not (of_floats if isinstance(lanes.scalar, types.Float) else of_ints):
+                return None
+            return signature(
+                lanes, *(a if isinstance(a, Lanes) else lanes.scalar for a in arguments)
+            )
+
+    def lower(context, builder, sig, arguments):
+        lanes = sig.return_type
+        of = of_floats if isinstance(lanes.scalar, types.Float) else of_ints
+        return getattr(builder, of)(*_both(builder, sig, arguments, lanes))
+
+    for a, b in ((Lanes, Lanes), (Lanes, types.Any), (types.Any, Lanes)):
+        lower_builtin(operation, a, b)(lower)
+
+
+for _operations, _floats, _ints in (
+    ((operator.add, operator.iadd), "fadd", "add"),
+    ((operator.sub, operator.isub), "fsub", "sub"),
+    ((operator.mul, operator.imul), "fmul", "mul"),
+    ((operator.truediv, operator.itruediv), "fdiv", None),
+    ((operator.and_,), None, "and_"),
+    ((operator.or_,), None, "or_"),
+):
+    for _operation in _operations:
+        _binary(_operation, _floats, _ints)
+
+
+def _comparison(operation: Any, sign: str) -> None:
+    @infer_global(operation)
+    class Template(AbstractTemplate):
+        def generic(self, arguments, keywords):
+            lanes = _wider(*arguments)
+            if lanes is None:
+                return None
+            mask = Lanes(types.boolean, lanes.width)
+            return signature(
+                mask, *(a if isinstance(a, Lanes) else lanes.scalar for a in arguments)
+            )
+
+    def lower(context, builder, sig, arguments):
+        lanes = _wider(*sig.args)
+        a, b = _both(builder, sig, arguments, lanes)
+        if isinstance(lanes.scalar, types.Float):
+            compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
+            return compare(sign, a, b)
+        return builder.icmp_signed(sign, a, b)
+
+    for a, b in ((Lanes, Lanes), (Lanes, types.Any), (types.Any, Lanes)):
+        lower_builtin(operation, a, b)(lower)
+
+
+for _operation, _sign in (
+    (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="),
+    (operator.eq, "=="), (operator.ne, "!="),
+):  # fmt: skip
+    _comparison(_operation, _sign)
+
+
+def _unary(operation: Any, code: Callable) -> None:
+    @infer_global(operation)
+    class Template(AbstractTemplate):
+        def generic(self, arguments, keywords):
+            lanes = arguments[0]
+            return signature(lanes, lanes) if isinstance(lanes, Lanes) else None
+
+    @lower_builtin(operation, Lanes)
+    def lower(context, builder, sig, arguments):
+        return code(builder, sig.args[0].scalar, arguments[0])
+
+
+def _negated(builder: Any, scalar: types.Type, value: Any) -> Any:
+    return builder.fneg(value) if isinstance(scalar, types.Float) else builder.neg(value)
+
+
+_unary(operator.neg, _negated)
+_unary(operator.not_, lambda builder, scalar, value: builder.not_(value))
+
+
+def call_vector(name: str, lanes: Lanes) -> Callable:
+    """Code that calls an LLVM intrinsic of vectors, such as sqrt."""
+
+    def codegen(context, builder, sig, arguments):
+        vector = vector_of(lanes)
+        values = [
+            value if isinstance(kind, Lanes) else splat(builder, value, lanes)
+            for kind, value in zip(sig.args, arguments, strict=True)
+        ]
+        function = cgutils.get_or_insert_function(
+            builder.module,
+            ir.FunctionType(vector, [vector] * len(values)),
+            f"llvm.{name}.{shape(lanes)}",
+        )
+        return builder.call(function, values)
+
+    return codegen
+
+
+def _operands(*arguments: Any) -> tuple[Lanes, list]:
+    """The lanes among the arguments, and what the others are cast to."""
+    lanes = next(a for a in arguments if isinstance(a, Lanes))
+    return lanes, [a if isinstance(a, Lanes) else lanes.scalar for a in arguments]
+
+
+@intrinsic
+def _fma_lanes(typing_context, a, b, c):
+    lanes, typed = _operands(a, b, c)
+    return lanes(*typed), call_vector("fma", lanes)
+
+
+@intrinsic
+def _sqrt_lanes(typing_context, a):
+    return a(a), call_vector("sqrt", a)
+
+
+@intrinsic
+def _abs_lanes(typing_context, a):
+    return a(a), call_vector("fabs", a)
+
+
+known(fma, _fma_lanes)
+known(math.sqrt, _sqrt_lanes)
+known(abs, _abs_lanes)
+
+
+@intrinsic
+def select(typing_context, condition, a, b):
+    lanes, typed = _operands(a, b) if isinstance(a, Lanes) or isinstance(b, Lanes) else (None, None)
+    if lanes is None:
+        lanes, typed = Lanes(a, condition.width), [a, a]
+
+    def codegen(context, builder, sig, arguments):
+        values = [
+            value if isinstance(kind, Lanes) else splat(builder, value, lanes)
+            for kind, value in zip(sig.args[1:], arguments[1:], strict=True)
+        ]
+        return builder.select(arguments[0], *values)
+
+    return lanes(condition, *typed), codegen
+
+
+@by_type(choose)
+def _choose(condition, a, b):
+    if not isinstance(condition, Lanes):
+        return None
+    if not isinstance(a, types.BaseTuple):
+        return lambda condition, a, b: select(condition, a, b)
+    items = "".join(f"choose(condition, a[{k}], b[{k}]), " for k in range(len(a)))
+    return _spelled("condition, a, b", items, a, choose=choose)
+
+
+def _spelled(parameters: str, items: str, like: Any, **names: Any) -> Callable:
+    """A function that returns a tuple of these items, a NamedTuple where `like` is one."""
+    if isinstance(like, types.BaseNamedTuple):
+        return define(parameters, f"return make({items})", make=like.instance_class, **names)
+    return define(parameters, f"return ({items})", **names)
+
+
+def _extreme(function: Callable, sign: str) -> None:
+    """Let min or max of two or more numbers know lanes."""
+
+    @by_type(function)
+    def chosen(*arguments):
+        if not any(isinstance(a, Lanes) for a in arguments):
+            return None
+        names = [f"a{k}" for k in range(len(arguments))]
+        lines = ["best = a0"]
+        lines += [f"best = select({name} {sign} best, {name}, best)" for name in names[1:]]
+        return define(", ".join(names), *lines, "return best", select=select)
+
+
+_extreme(max, ">")
+_extreme(min, "<")
+
+
+def _truth(function: Callable, sign: str, bits_of: int) -> None:
+    """Let a question about all lanes be one about the bits of a mask."""
+
+    @intrinsic
+    def asked(typing_context, mask):
+        def codegen(context, builder, sig, arguments):
+            bits = builder.bitcast(arguments[0], ir.IntType(mask.width))
+            return builder.icmp_signed(sign, bits, ir.Constant(bits.type, bits_of))
+
+        return types.boolean(mask), codegen
+
+    known(function, asked)
+
+
+_truth(in_all, "==", -1)
+_truth(in_any, "!=", 0)
+
+
+# --- conversions ------------------------------------------------------------------------------
+
+
+@intrinsic
+def _truncated(typing_context, a):
+    whole = Lanes(types.int64, a.width)
+
+    def codegen(context, builder, sig, arguments):
+        # By way of 32 bits: every processor has that, and cells are no more.
+        narrow = ir.VectorType(I32, a.width)
+        return builder.sext(builder.fptosi(arguments[0], narrow), vector_of(whole))
+
+    return whole(a), codegen
+
+
+@by_type(int)
+def _int(a):
+    if isinstance(a, Lanes) and isinstance(a.scalar, types.Float):
+        return lambda a: _truncated(a)
+    return None
+
+
+@intrinsic
+def _converted(typing_context, value, like):
+    scalar = like.scalar if isinstance(like, Lanes) else like
+    lanes = Lanes(scalar, value.width)
+
+    def codegen(context, builder, sig, arguments):
+        if isinstance(value.scalar, types.Integer):
+            narrow = arguments[0]
+            if value.scalar.bitwidth > 32:
+                narrow = builder.trunc(narrow, ir.VectorType(I32, value.width))
+            return builder.sitofp(narrow, vector_of(lanes))
+        if value.scalar.bitwidth == scalar.bitwidth:
+            return arguments[0]
+        convert = builder.fpext if scalar.bitwidth == 64 else builder.fptrunc
+        return convert(arguments[0], vector_of(lanes))
+
+    return lanes(value, like), codegen
+
+
+@intrinsic
+def _spread(typing_context, value, like):
+    def codegen(context, builder, sig, arguments):
+        number = context.cast(builder, arguments[0], value, like.scalar)
+        return splat(builder, number, like)
+
+    return like(value, like), codegen
+
+
+@by_type(real)
+def _real(value, like):
+    if isinstance(value, Lanes):
+        return lambda value, like: _converted(value, like)
+    if isinstance(like, Lanes):
+        return lambda value, like: _spread(value, like)
+    return None
+
+
+@by_type(index)
+def _index(i):
+    return (lambda i: i) if lanes_of(i) else None
+
+
+@by_type(round_off)
+def _round_off(like):
+    if isinstance(like, Lanes):
+        error = 2.0**-23 if like.scalar == types.float32 else 2.0**-52
+        return lambda like: real(error, like)
+    return None
