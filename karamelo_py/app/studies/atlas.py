@@ -241,8 +241,15 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
         for path in pictures:
             title = entry.text.splitlines()[0] if entry.text else entry.name
             parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})\n")
-        said = (place / SAID).read_text(encoding="utf-8")
-        plain = said.replace(str(inputs), "inputs").rstrip()
-        parts.append(f"```text\n{plain}\n```\n")
+        said = (place / SAID).read_text(encoding="utf-8").replace(str(inputs), "inputs")
+        parts.append(f"```text\n{abridged(said)}\n```\n")
     page.write_text("\n".join(parts), encoding="utf-8")
     print(f"written: {page}; pictures are in {shown}")
+
+
+def abridged(said: str) -> str:
+    """All commands, and what the last one printed."""
+    lines = said.rstrip().splitlines()
+    commands = [line for line in lines if line.startswith("$ ")]
+    last = max(k for k, line in enumerate(lines) if line.startswith("$ "))
+    return "\n".join([*commands, *lines[last + 1 :]])
