@@ -148,6 +148,7 @@ def test_times_are_medians_of_repetitions(folder):
         (["-var", "N"], "not a list of values"),
         (["-var", "N=1,,2"], "not a list of values"),
         (["-var", "N=1,1"], "has a value twice"),
+        (["-var", "N=1,1", "-var", "speed=2,2", "-zip", "N,speed"], "same combination twice"),
         (["-var", "N=1", "-var", "N=2"], "given twice"),
         (["-var", "N=1:2"], "not a range"),
         (["-var", "N=1:2:1"], "at least 2 values"),
