@@ -147,3 +147,10 @@ def test_curves_of_a_sweep(folder, capsys):
     (folder / "s/law=2/log.mpm").unlink()
     assert main(["chart", "s.csv", "-curve", "err"]) == 1
     assert "no run has left a log.mpm" in capsys.readouterr().err
+
+
+@pytest.mark.full
+def test_the_atlas_of_the_pages_can_be_made_small(tmp_path, monkeypatch):
+    """Every entry at its smaller values, compiled where it is not interpreted: minutes."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["atlas", str(ROOT / "docs" / "atlas.toml"), "-small"]) == 0
