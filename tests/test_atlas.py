@@ -66,6 +66,7 @@ def test_an_atlas_runs_its_commands_once_and_writes_a_page(folder, capsys):
     page = (folder / "page.md").read_text(encoding="utf-8")
     assert "## Laws" in page and "![A law of time.](_static/atlas/laws/power/power.png)" in page
     assert "$ karamelo-py chart runs.csv -curve err" in page
+    assert "1/2" not in page
     assert str(folder) not in page
     assert (folder / "_static/atlas/laws/power/power.png").read_bytes()[1:4] == b"PNG"
     assert main(words) == 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -45,6 +46,7 @@ An entry has a name, a text, and commands that run in a folder of its own; {inpu
 KEPT = "entry.json"
 SAID = "said.txt"
 PICTURES = (".png", ".svg")
+_RUN = re.compile(r"\d+/\d+  |note: |drawn: ")
 
 
 @dataclass
@@ -248,8 +250,13 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
 
 
 def abridged(said: str) -> str:
-    """All commands, and what the last one printed."""
-    lines = said.rstrip().splitlines()
+    """All commands, and what the last one found: orders, edges, the table of a machine.
+
+    Runs one by one, and the way to them, are in the tables of the folder of work.
+    """
+    lines = [line.rstrip() for line in said.rstrip().splitlines()]
     commands = [line for line in lines if line.startswith("$ ")]
     last = max(k for k, line in enumerate(lines) if line.startswith("$ "))
-    return "\n".join([*commands, *lines[last + 1 :]])
+    found = [line for line in lines[last + 1 :] if not _RUN.match(line)]
+    orders = next((k for k, line in enumerate(found) if line.startswith("orders, of")), 0)
+    return "\n".join([*commands, *found[orders:]])
