@@ -135,10 +135,10 @@ def test_no_forecast_without_a_fall():
 
 
 SCENES = {
-    "in.axis_aligned_1d": ("error_z", 2e-3),
+    "in.axis_aligned_1d": ("error_z", 4e-3),
     "in.axis_aligned": ("error_z", 5e-3),
-    "in.vibrating_bar": ("error_z", 5e-3),
-    "in.vortex": ("error_z", 2e-2),
+    "in.vibrating_bar": ("error_z", 2e-2),
+    "in.vortex": ("error_z", 0.15, "-var", "G=0.01"),
     "in.axis_aligned_3d": ("error_z", 2e-2),
 }
 
@@ -153,9 +153,9 @@ def test_advice_meets_the_target_at_little_more_than_the_least_cost(
     Costs are particle-steps, which do not depend on what else the machine does.
     """
     monkeypatch.chdir(tmp_path)
-    column, target = SCENES[script]
-    fine = "0.25,0.5,1,2" if "3d" in script else "0.25,0.5,1,2,4"
-    family = ["-var", f"refine={fine}", "-var", "basis=linear,quadratic-spline,cubic-spline"]
+    column, target, *more = SCENES[script]
+    fine = "0.25,0.5,1,2" if "3d" in script or "vortex" in script else "0.25,0.5,1,2,4"
+    family = ["-var", f"refine={fine}", "-var", "basis=linear,quadratic-spline,cubic-spline", *more]
     path = str(INPUTS / script)
     words = ["-accuracy", column, "-target", str(target), "-run", "-threads", "1"]
     status = main(["advise", path, *family, *[w.replace("-threads", "--threads") for w in words]])

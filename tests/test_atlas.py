@@ -66,6 +66,7 @@ def test_an_atlas_runs_its_commands_once_and_writes_a_page(folder, capsys):
     page = (folder / "page.md").read_text(encoding="utf-8")
     assert "## Laws" in page and "![A law of time.](_static/atlas/laws/power/power.png)" in page
     assert "$ karamelo-py chart runs.csv -curve err" in page
+    assert "1/2" not in page
     assert str(folder) not in page
     assert (folder / "_static/atlas/laws/power/power.png").read_bytes()[1:4] == b"PNG"
     assert main(words) == 0
@@ -147,3 +148,10 @@ def test_curves_of_a_sweep(folder, capsys):
     (folder / "s/law=2/log.mpm").unlink()
     assert main(["chart", "s.csv", "-curve", "err"]) == 1
     assert "no run has left a log.mpm" in capsys.readouterr().err
+
+
+@pytest.mark.full
+def test_the_atlas_of_the_pages_can_be_made_small(tmp_path, monkeypatch):
+    """Every entry at its smaller values, compiled where it is not interpreted: minutes."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["atlas", str(ROOT / "docs" / "atlas.toml"), "-small"]) == 0

@@ -148,6 +148,7 @@ def test_times_are_medians_of_repetitions(folder):
         (["-var", "N"], "not a list of values"),
         (["-var", "N=1,,2"], "not a list of values"),
         (["-var", "N=1,1"], "has a value twice"),
+        (["-var", "N=1,1", "-var", "speed=2,2", "-zip", "N,speed"], "same combination twice"),
         (["-var", "N=1", "-var", "N=2"], "given twice"),
         (["-var", "N=1:2"], "not a range"),
         (["-var", "N=1:2:1"], "at least 2 values"),
@@ -256,3 +257,16 @@ def test_a_run_that_is_killed_is_recorded(folder):
     threading.Thread(target=kill).start()
     outcome = launch.run({"speed": "3"}, folder / "run")
     assert (outcome.status, outcome.reason) == ("killed", "ended by signal 9")
+
+
+@pytest.mark.parametrize(
+    ("reason", "again"),
+    [("internal error: ImportError: x", True), ("point 1 leaves the domain", False)],
+)
+def test_what_was_not_the_fault_of_a_run_is_tried_again(folder, reason, again):
+    launch = case.Launch(folder / "in.flight")
+    values, place = {"speed": "3"}, folder / "run"
+    place.mkdir()
+    known = {"key": launch.key(values), "status": "failed", "reason": reason, "facts": {}}
+    (place / case.KEPT).write_text(json.dumps(known), encoding="utf-8")
+    assert (launch.kept(values, place) is None) == again

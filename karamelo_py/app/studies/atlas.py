@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -45,6 +46,7 @@ An entry has a name, a text, and commands that run in a folder of its own; {inpu
 KEPT = "entry.json"
 SAID = "said.txt"
 PICTURES = (".png", ".svg")
+_RUN = re.compile(r"\d+/\d+  |note: |drawn: ")
 
 
 @dataclass
@@ -241,8 +243,20 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
         for path in pictures:
             title = entry.text.splitlines()[0] if entry.text else entry.name
             parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})\n")
-        said = (place / SAID).read_text(encoding="utf-8")
-        plain = said.replace(str(inputs), "inputs").rstrip()
-        parts.append(f"```text\n{plain}\n```\n")
+        said = (place / SAID).read_text(encoding="utf-8").replace(str(inputs), "inputs")
+        parts.append(f"```text\n{abridged(said)}\n```\n")
     page.write_text("\n".join(parts), encoding="utf-8")
     print(f"written: {page}; pictures are in {shown}")
+
+
+def abridged(said: str) -> str:
+    """All commands, and what the last one found: orders, edges, the table of a machine.
+
+    Runs one by one, and the way to them, are in the tables of the folder of work.
+    """
+    lines = [line.rstrip() for line in said.rstrip().splitlines()]
+    commands = [line for line in lines if line.startswith("$ ")]
+    last = max(k for k, line in enumerate(lines) if line.startswith("$ "))
+    found = [line for line in lines[last + 1 :] if not _RUN.match(line)]
+    orders = next((k for k, line in enumerate(found) if line.startswith("orders, of")), 0)
+    return "\n".join([*commands, *found[orders:]])

@@ -26,6 +26,7 @@ KEPT = "case.json"
 # Facts are indented by 2, the parts of the time by 4.
 _FACT = re.compile(r"^( {2}| {4})(\S.*?) {2,}(\S.*)$")
 _ERROR = re.compile(r"(?:^|: )error: (.*)")
+_NOT_ITS_OWN = re.compile(r"internal error|another run is writing")
 
 
 @dataclass
@@ -109,8 +110,9 @@ class Launch:
             return None
         if found.get("key") != self.key(case):
             return None
-        if found["status"] == "killed":
-            return None  # Somebody else's doing, which the next time may not come.
+        # Somebody else's doing, which the next time may not come.
+        if found["status"] == "killed" or _NOT_ITS_OWN.search(found["reason"]):
+            return None
         # A run that was given up is tried again when it may take longer.
         if found["status"] == "too long" and (self.limit or 1e300) > found["facts"]["wall_s"]:
             return None

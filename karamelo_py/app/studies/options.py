@@ -57,7 +57,8 @@ def add_combinations(parser: Any) -> None:
 
 def zipped(options: Any) -> list[list[str]]:
     """The variables that go in step."""
-    return [[name.strip() for name in group.split(",")] for group in options.zip]
+    groups = getattr(options, "zip", [])  # not every study of a family has it
+    return [[name.strip() for name in group.split(",")] for group in groups]
 
 
 def family(options: Any, *, timed: bool = False, repeat: int = 1) -> tuple[dict, Launch, int]:
@@ -77,7 +78,8 @@ def family(options: Any, *, timed: bool = False, repeat: int = 1) -> tuple[dict,
             expected="the name of a script",
             hint=f"did you mean {folder / close}?" if close else None,
         )
-    values = choices(options.var)
+    in_step = {name for group in zipped(options) for name in group}
+    values = choices(options.var, in_step)
     if not values:
         raise ScriptError("nothing varies", expected=f"-var {VALUES}")
     check_script(options.script, values)

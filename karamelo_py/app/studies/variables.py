@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -27,8 +27,10 @@ def number(text: str) -> float | None:
         return None
 
 
-def choices(words: Iterable[str]) -> dict[str, list[str]]:
+def choices(words: Iterable[str], in_step: Container[str] = ()) -> dict[str, list[str]]:
     """The values of each variable: ``N=10,20``, ``xi=0:1:5`` (5 of them), ``basis=linear``.
+
+    Variables that go `in_step` with others may have a value twice.
 
     Raises
     ------
@@ -46,7 +48,7 @@ def choices(words: Iterable[str]) -> dict[str, list[str]]:
                 f"-var {name} is given twice", expected=f"all values in one list: {VALUES}"
             )
         found[name] = [each for value in values for each in _spread(name, value)]
-        if len(set(found[name])) < len(found[name]):
+        if name not in in_step and len(set(found[name])) < len(found[name]):
             raise ScriptError(f"-var {name} has a value twice: {', '.join(found[name])}")
     return found
 
@@ -100,7 +102,9 @@ def cases(
                 "-zip: " + ", ".join(f"{k} has {n} values" for k, n in lengths.items()),
                 expected="lists of the same length",
             )
-        rows = zip(*(values[other] for other in together), strict=True)
+        rows = list(zip(*(values[other] for other in together), strict=True))
+        if len(set(rows)) < len(rows):
+            raise ScriptError("-zip " + ",".join(together) + ": the same combination twice")
         axes.append([dict(zip(together, row, strict=True)) for row in rows])
     for group in zipped:
         unknown = [name for name in group if name not in values]
