@@ -35,6 +35,7 @@ from karamelo_py.kernels.arrays import (
     MASS,
     ON_SUMS,
     ON_UPDATE,
+    ON_VELOCITY,
     POST_ADVANCE_PARTICLES,
     POST_GRID_TO_POINT,
     POST_HEAT_TO_GRID,
@@ -49,6 +50,7 @@ from karamelo_py.kernels.arrays import (
     of_force,
     of_momentum,
 )
+from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.kinematics import dimension
 
 _F8 = types.float64
@@ -225,14 +227,33 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
         slot = hooks.table[h].slot
         if slot >= 0:
             control.values[slot + c] += total
+    if hooks.programs[h, FRICTION].begin >= 0:
+        _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count)
+
+
+@kernel
+def _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count):
+    """Friction of the chosen nodes along their wall."""
+    programs = hooks.programs[h]
+    if target == ON_VELOCITY:
+        if hooks.table[h].stage == POST_VELOCITIES_TO_GRID:  # else v* is that of the step before
+            for q in range(count):
+                stick(kin, nodes, programs, hooks.chosen[q])
+        return
+    _evaluate(hooks, h, FRICTION, count, control, np.int64(VALUE), 0.0)
+    slot = hooks.table[h].slot
+    for q in range(count):
+        n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
+        rub(kin, nodes, programs, n, mu, dt, kept, control.values[slot : slot + 3])
 
 
 @subkernel
 def clear_total(hooks, h, control):
     """The totals of a hook start from zero."""
     slot = hooks.table[h].slot
+    rubs = hooks.programs[h, FRICTION].begin >= 0
     for c in range(3):
-        if slot >= 0 and hooks.programs[h, c].begin >= 0:
+        if slot >= 0 and (rubs or hooks.programs[h, c].begin >= 0):
             control.values[slot + c] = 0.0
 
 
