@@ -28,6 +28,7 @@ from numba import types
 
 from karamelo_py.compiler.compile import caller_of, entered, point_function, subkernel
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
     BEFORE,
     FINAL_INTEGRATE,
@@ -51,6 +52,7 @@ from karamelo_py.kernels.arrays import (
     of_momentum,
 )
 from karamelo_py.kernels.walls import FRICTION, rub, stick
+from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension
 
 _F8 = types.float64
@@ -165,15 +167,10 @@ def _locate_nodes(kin, grids, hooks, count):
         g = 0
         while g + 1 < grids.first.size and n >= grids.first[g + 1]:
             g += 1
-        local = n - grids.first[g]
-        step_x = grids.step_x[g]
-        step_y = grids.step_y[g]
-        spacing = grids.spacing[g]
-        where[0, q] = grids.x0[g] + (local // step_x) * spacing
-        where[1, q] = grids.y0[g] + (local % step_x // step_y) * spacing
-        where[2, q] = grids.z0[g] + (local % step_y) * spacing
+        x = node_position(record(grids, g), n)
         for axis in range(3):
-            where[3 + axis, q] = where[axis, q]
+            where[axis, q] = x[axis]
+            where[3 + axis, q] = x[axis]
 
 
 @subkernel

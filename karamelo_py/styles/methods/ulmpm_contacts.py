@@ -13,14 +13,7 @@ from karamelo_py.scene.lattice import Lattice, numbered
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.methods.base import Method
-
-DIRECTIONS = ("x", "y", "z")
-
-
-def force_on(solid: Solid) -> str:
-    """Stem of the names under which the contact force on a solid is published."""
-    return f"ContactForce_{solid.id}"
+from karamelo_py.styles.methods.base import DIRECTIONS, Method, force_on
 
 
 def fields(hub: Hub) -> list[int]:
