@@ -228,7 +228,7 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
         _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count)
 
 
-@kernel
+@subkernel
 def _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count):
     """Friction of the chosen nodes along their wall."""
     programs = hooks.programs[h]

@@ -126,6 +126,15 @@ class SeenMass(NamedTuple):
         return basis.steep_edge
 
 
+class Centre(NamedTuple):
+    """Sum of mass times position at a node, for the gap between solids."""
+
+    array: Any
+
+    shape = vector
+    kept = False
+
+
 class Led(NamedTuple):
     """What rigid points give a node: mass, momentum and the force on them, as in `Nodes.sums`."""
 
@@ -171,6 +180,18 @@ def _shared_mass(led, law, mass):
     return lambda led, law, mass: mass - mass
 
 
+def loaded_for(nodal, kin, array, p):
+    """The vector of a point, where there is a nodal array for it; else ()."""
+    return () if nodal is None else load_vector(kin, array, p)
+
+
+@by_type(loaded_for)
+def _loaded_for(nodal, kin, array, p):
+    if isinstance(nodal, types.NoneType):
+        return lambda nodal, kin, array, p: ()
+    return lambda nodal, kin, array, p: load_vector(kin, array, p)
+
+
 def led_mass(led, law, mass):
     """(mass,) of rigid points, which have sums of their own if `led`; () of others."""
     return (mass,) if led is not None and constrained_velocity.defined(type(law)) else ()
@@ -192,7 +213,8 @@ def _mass(w, p):
 def _(quantity, w, p, like):
     v = load_vector(w.kin, w.points.v, p)
     led = led_mass(field(w.nodes.fields, Led), law_of(w, p), _own_mass(w, p))
-    return _mass(w, p), v, _moment(w, p, like), led
+    x = loaded_for(field(w.nodes.fields, Centre), w.kin, w.places.y, p)
+    return _mass(w, p), v, _moment(w, p, like), led, x
 
 
 @shared
@@ -207,10 +229,11 @@ def momentum_part(w, stencil, k, weight, mass, v, moment):
 @scattered.on(MassMomentum)
 def _(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-    mass, v, moment, led = load
+    mass, v, moment, led, x = load
     part = momentum_part(w, stencil, k, weight, mass, v, moment)
     accumulate(w.nodes.sums, i, MASS, (weight * mass,) + part)
     accumulate_led(field(w.nodes.fields, Led), i, weight, led, v)
+    accumulate_optional(field(w.nodes.fields, Centre), i, scale(weight * mass, x))
     accumulate_optional(field(w.nodes.fields, Normal), i, scale(mass, leading(gradient, v)))
     accumulate_optional(field(w.nodes.fields, SeenMass), i, (weight * mass * mass,))
 

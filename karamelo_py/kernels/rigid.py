@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import kernel, over_blocks, point_function
+from karamelo_py.compiler.compile import entered, over_blocks, point_function
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
@@ -34,7 +34,7 @@ class RigidBodies(NamedTuple):
     slots: np.ndarray  # (r,) slots of forces and torques
 
 
-@kernel
+@entered
 def _lead(kin, nodes, led, spans, dt, kept):
     """Nodes that see rigid points take their velocity; the force of that comes to stand in `led`.
 
@@ -58,7 +58,7 @@ def _lead(kin, nodes, led, spans, dt, kept):
                 nodes.update[n, of_change(kin) + k] = 0
 
 
-@kernel
+@entered
 def _lead_velocity(kin, nodes, led, spans):
     """The same of the velocity that deforms the points."""
     for s in range(1, 1 + spans[0, 0]):
@@ -78,7 +78,7 @@ def _(laws, contact, s, points, led):
     return None
 
 
-@kernel
+@entered
 def _sum_forces(basis, kin, grids, places, points, led, force, torque, values):
     d = dimension(kin)
     for p in range(points.mass.size):
@@ -116,7 +116,7 @@ def _of_block(block, s, led):
 _sum_forces_of_blocks = over_blocks(_of_block)
 
 
-@kernel
+@entered
 def _clear(slots, values):
     for slot in slots:
         values[slot : slot + 3] = 0.0

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import kernel
+from karamelo_py.compiler.compile import subkernel
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.points.kinematics import dimension
 
 FRICTION = 3  # the program of the coefficient, behind those of the components
 
 
-@kernel
+@subkernel
 def rub(kin, nodes, programs, n, mu, dt, kept, reaction):
     """Give node `n` the friction of its wall; add the force to `reaction` (d,).
 
@@ -49,7 +49,7 @@ def rub(kin, nodes, programs, n, mu, dt, kept, reaction):
             reaction[c] -= mass * taken / dt
 
 
-@kernel
+@subkernel
 def stick(kin, nodes, programs, n):
     """Nor does the velocity that deforms slide, where friction stopped the node.
 
