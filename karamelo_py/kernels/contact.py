@@ -26,8 +26,6 @@ import numpy as np
 
 from karamelo_py.compiler.compile import entered, point_function, subkernel
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels.arrays import MASS, TIMESTEP, of_change
-from karamelo_py.kernels.p2g import Normal
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
 from karamelo_py.kernels.p2g import Centre, Normal
@@ -189,8 +187,7 @@ def _excess(contact, d, nodes, pair, where):
 
 
 @subkernel
-def _take(contact, control, a, i, n, k, impulse, per_mass):
-def _take(contact, values, a, i, n, k, impulse, per_mass, x):
+def _take(contact, control, a, i, n, k, impulse, per_mass, x):
     """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
     if not _held(contact, n, k):
@@ -311,8 +308,7 @@ def _rub(contact, d, nodes, pair, friction, push, size, share):
 
 
 @subkernel
-def _touch_pair(contact, d, nodes, control, i, j, place, share):
-def _touch_pair(contact, d, nodes, values, i, j, place, share, where):
+def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
     pair = _pair(contact, d, nodes, _node(contact, place, i), _node(contact, place, j))
@@ -334,10 +330,8 @@ def _touch_pair(contact, d, nodes, values, i, j, place, share, where):
         impulse = push * _outward(nodes, pair, k) / size
         if rub > 0:
             impulse += rub * _slide(contact, nodes, pair, k, push / size)
-        _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a)
-        _take(contact, control, b, j, pair.m, k, impulse, pair.per_b)
-        _take(contact, values, a, i, pair.n, k, -impulse, pair.per_a, where.x)
-        _take(contact, values, b, j, pair.m, k, impulse, pair.per_b, where.x)
+        _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a, where.x)
+        _take(contact, control, b, j, pair.m, k, impulse, pair.per_b, where.x)
         if contact.pair[a, b] >= 0:
             values[contact.pair[a, b] + k] -= impulse / kick
         if contact.pair[b, a] >= 0:
@@ -345,8 +339,7 @@ def _touch_pair(contact, d, nodes, values, i, j, place, share, where):
 
 
 @subkernel
-def _touch_place(contact, kin, nodes, control, place, count):
-def _touch_place(contact, kin, nodes, values, place, count, where):
+def _touch_place(contact, kin, nodes, control, place, count, where):
     """Resolve contact where `count` fields meet."""
     d = dimension(kin)
     contact.partners[:count] = 1  # whether a single pair approaches, it looks itself
@@ -357,8 +350,7 @@ def _touch_place(contact, kin, nodes, values, place, count, where):
         _clear_change(contact, d, count)
         for i in range(count):
             for j in range(i + 1, count):
-                _touch_pair(contact, d, nodes, control, i, j, place, _share(contact, i, j))
-                _touch_pair(contact, d, nodes, values, i, j, place, _share(contact, i, j), where)
+                _touch_pair(contact, d, nodes, control, i, j, place, _share(contact, i, j), where)
         for i in range(count):
             n = _node(contact, place, i)
             for k in range(d):
@@ -367,7 +359,6 @@ def _touch_place(contact, kin, nodes, values, place, count, where):
 
 
 @entered
-def _touch_nodes(contact, kin, nodes, spans, control):
 def _keep_rigid(contact, kin, nodes, spans):
     """Rigid bodies have their velocity, whatever acts on the nodes."""
     for s in range(1, 1 + spans[0, 0]):
@@ -380,7 +371,7 @@ def _keep_rigid(contact, kin, nodes, spans):
 
 
 @entered
-def _touch_nodes(contact, kin, grids, nodes, spans, values):
+def _touch_nodes(contact, kin, grids, nodes, spans, control):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
     fields = contact.slot.size
     values = control.values
@@ -397,10 +388,9 @@ def _touch_nodes(contact, kin, grids, nodes, spans, values):
                 continue
             count = _meet(contact, nodes, n)
             if count > 1:
-                _touch_place(contact, kin, nodes, control, n % contact.stride, count)
                 grid = record(grids, n // contact.stride)
                 where = Where(node_position(grid, n), grid.h, values[DT])
-                _touch_place(contact, kin, nodes, values, n % contact.stride, count, where)
+                _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
     for c in range(len(contact.copies)):
         for k in range(3):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
@@ -472,9 +462,8 @@ def _stay_nodes(contact, kin, nodes, spans, step):
 
 @touch.on(SeparateFields)
 def _(contact, s):
-    _touch_nodes(contact, s.kin, s.nodes, s.spans, s.control)
     _keep_rigid(contact, s.kin, s.nodes, s.spans)
-    _touch_nodes(contact, s.kin, s.grids, s.nodes, s.spans, s.control.values)
+    _touch_nodes(contact, s.kin, s.grids, s.nodes, s.spans, s.control)
 
 
 @touch_velocity.on(SeparateFields)

@@ -16,7 +16,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.p2g import Led
-from karamelo_py.kernels.step import step_size, touch, touch_velocity
+from karamelo_py.kernels.step import kick, touch, touch_velocity
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import node_position
@@ -125,7 +125,7 @@ def _clear(slots, values):
 @touch.on(RigidBodies)
 def _(contact, s):
     led = field(s.nodes.fields, Led)
-    _lead(s.kin, s.nodes, led, s.spans, step_size(s), s.control.clock[0].kept)
+    _lead(s.kin, s.nodes, led, s.spans, kick(s), s.control.clock[0].kept)
     _clear(contact.slots, s.control.values)
     _sum_forces_of_blocks(s, led)
 
