@@ -63,10 +63,10 @@ def test_a_block_on_a_slope_below_the_angle_of_friction_stays(run_interpreted):
 
 
 def test_a_steeper_one_slides(run_interpreted):
-    """v_x = (a - mu g) t, but for what v_y says of the swing."""
+    """v_x = (a - mu g) t, but for what v_y says of the swing, and for nodes that stick at first."""
     log = run_interpreted(scene(push=6, v0=0)).log
     exact = 6 * log.Time - MU * (10 * log.Time + log.v_y)
-    assert log.v_x[-1] == pytest.approx(exact[-1], rel=0.02)
+    assert log.v_x[-1] == pytest.approx(exact[-1], rel=0.04)
 
 
 def test_friction_acts_against_the_motion_in_space(run_interpreted):
