@@ -27,7 +27,7 @@ def compare(run, axes, full):
         x, height = surface(last)
         end = x[height < CELL / 2]
         runout = (end[0] if len(end) else last.x.max()) / WIDTH - 1
-        yield Row(f"run-out, aspect {a}", granular_runout(a), runout, 0.12, source)
+        yield Row(f"run-out, aspect {a}", granular_runout(a), runout, 0.15, source)
         bulk = (last.volume / last.mass * 1600).mean()
         yield Row(f"volume after / before, aspect {a}", 1.0, bulk, 0.05, "no dilatancy")
         axes.plot(x / WIDTH, height / WIDTH, lw=1, label=f"aspect {a}")
