@@ -276,6 +276,28 @@ def prandtl_load(cohesion: float, phi: float = 0.0) -> float:
     return (exp(pi * tan(phi)) * tan(pi / 4 + phi / 2) ** 2 - 1) * cohesion / tan(phi)
 
 
+def hertz_stress(x: np.ndarray, depth: np.ndarray, force: float, half: float) -> np.ndarray:
+    """Stress across a plane that a cylinder presses with `force` over 2 `half` (McEwen 1949).
+
+    Johnson 1985, Contact Mechanics, eq. 4.46; at the surface it is Hertz's pressure.
+    """
+    z = np.maximum(depth, 1e-6 * half)
+    a = half**2 - x**2 + z**2
+    root = np.sqrt(a**2 + 4 * x**2 * z**2)
+    m = np.sqrt((root + a) / 2)
+    n = np.sqrt(np.maximum(root - a, 0) / 2)
+    return -2 * force / (pi * half**2) * m * (1 - (z**2 + n**2) / (m**2 + n**2))
+
+
+def granular_runout(aspect: float) -> float:
+    """(l - l0) / l0 of a column of grains in a channel (Lube et al. 2005, eqs. 3 and 4).
+
+    1.2 a below an aspect ratio a of 1.8, 1.9 a^(2/3) above 2.8; between them the line goes on until
+    both meet. Lajeunesse, Monnier & Homsy 2005 find the same powers.
+    """
+    return min(1.2 * aspect, 1.9 * aspect ** (2 / 3)) if aspect < 2.8 else 1.9 * aspect ** (2 / 3)
+
+
 # --- Curves ------------------------------------------------------------------------------------
 
 

@@ -58,19 +58,27 @@ def test_blocks_separate_freely(run_interpreted, scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_collision(run_interpreted, scheme):
-    """Equal bars exchange their velocities; momentum is kept, forces are equal and opposite."""
+    """Equal bars exchange their velocities; momentum is kept, forces are equal and opposite.
+
+    They meet when the gap is closed, and are apart 2 L / c later. The node at the surface has an
+    eighth of the mass of a bar of four cells, and loses its motion: this much of the energy is
+    missing, half as much with cells half as large.
+    """
     out = "log_modify(custom, step, time, va_x, vb_x, k, e, ContactForce_a_x, ContactForce_b_x)"
-    script = bars(0.15, "dt_factor(0.5)", "set_output(5)", out, "run_time(1.5)", scheme=scheme)
+    script = bars(0.15, "dt_factor(0.5)", "set_output(5)", out, "run_time(1)", scheme=scheme)
     log = run_interpreted(script).log
-    assert log.va_x[-1] == pytest.approx(-0.1, abs=0.01 if scheme != "usl" else 0.02)
+    touching = log.Time[log.ContactForce_a_x < 0]
+    assert touching[0] == pytest.approx(0.75, abs=0.03)  # 5 steps of 0.005
+    assert touching[-1] == pytest.approx(0.83, abs=0.03 if scheme != "usl" else 0.05)
+    assert log.va_x[-1] == pytest.approx(-0.1, abs=0.025 if scheme != "usl" else 0.05)
     assert np.abs(log.va_x + log.vb_x).max() < 1e-15
     assert np.abs(log.ContactForce_a_x + log.ContactForce_b_x).max() < 1e-12
     # The push lasts for 2 L/c with rho c v: c = 10, both bars move at 0.1.
     assert log.ContactForce_a_x.min() == pytest.approx(-1, rel=0.4)
     assert log.ContactForce_a_x.max() == 0
     assert (log.ContactForce_a_x[-5:] == 0).all(), "no force once they are apart"
-    energy = log.k + log.e
-    assert energy[-1] == pytest.approx(energy[0], rel=0.05 if scheme != "usl" else 0.2)
+    lost = 1 - (log.k + log.e)[-1] / log.k[0]
+    assert 0 < lost < (0.17 if scheme != "usl" else 0.75)
 
 
 def three(order: str = "abc", scheme: str = "musl") -> str:

@@ -209,9 +209,44 @@ def test_tension_ends_at_the_apex():
             loading = np.diag([0.02, 0.015, 0.018])
             state = stretched(law, kin, start(law, kin), loading, 3)
             assert stress(law, kin, state) == pytest.approx(apex * np.eye(3), abs=1e-12)
-            # The volume is plastic: a little compression loads at once, no gap has to close.
+            # A little compression unloads it at once.
             back = stretched(law, kin, state, -1e-3 * np.eye(3), 1)
             assert np.trace(stress(law, kin, back)) / 3 < apex - 0.9 * 3 * K * 1e-3 * 0.9
+
+
+@pytest.mark.parametrize("make", [mohr, drucker])
+@pytest.mark.parametrize("psi", [0, PSI])
+def test_what_comes_apart_closes_before_it_bears_pressure(make, psi):
+    """Sand that has opened by 3 % bears nothing until that is given back, then K (1 - J) again.
+
+    When the volume of opening was plastic, it bore the pressure of 3 % at its first volume.
+    """
+    law, kin = make(c=0, psi=psi), Space()
+    state = stretched(law, kin, start(law, kin), 0.001 * np.eye(3), 12)
+    opened = jacobian(law, kin, state)
+    assert opened > 1.03
+    back = -0.001 * np.eye(3)
+    while jacobian(law, kin, state) > 1.004:
+        assert np.abs(stress(law, kin, state)).max() < 1e-12
+        state = stretched(law, kin, state, back, 1)
+    state = stretched(law, kin, state, 3 * back, 1)
+    j = jacobian(law, kin, state)
+    assert j < 1
+    assert stress(law, kin, state) == pytest.approx(-K * (1 - j) * np.eye(3), abs=1e-12)
+
+
+@pytest.mark.parametrize("make", [mohr, drucker])
+def test_cohesion_is_not_given_back_twice(make):
+    """A cycle of opening and closing dissipates what opening does, -p ln J at the apex, once."""
+    law, kin = make(), Space()
+    apex = COHESION / tan(radians(PHI))
+    state = stretched(law, kin, start(law, kin), 1e-4 * np.eye(3), 100)
+    elastic = 1 + apex / K
+    spent = dissipated_energy(law, kin, state)
+    assert spent == pytest.approx(apex * np.log(jacobian(law, kin, state) / elastic), rel=0.03)
+    closed = stretched(law, kin, state, -1.2e-4 * np.eye(3), 100)
+    assert np.trace(stress(law, kin, closed)) < 0
+    assert dissipated_energy(law, kin, closed) == pytest.approx(spent, rel=1e-9)
 
 
 def test_tension_cut_off():

@@ -145,7 +145,7 @@ class Hooks(NamedTuple):
 
     evaluate: int  # address of the evaluator of formulas
     table: np.ndarray  # (k,) HOOK
-    programs: np.ndarray  # (k, 3) PROGRAM, for each component
+    programs: np.ndarray  # (k, 4) PROGRAM, for each component, and friction at a wall
     members: np.ndarray  # int64: node numbers, or a 1 for each point that is a member
     code: np.ndarray  # (c, 2) int64: the programs of the formulas, one after another
     constants: np.ndarray  # (m,) float64

@@ -10,6 +10,11 @@ Where more than two fields meet, all pairs take their impulses from the same vel
 does not matter in which order the solids were defined. Each pair takes the share 1 / k of its own,
 where k is the number of pairs of the one of its two bodies that is in more of them: then no body
 gets more than would stop it, and energy does not grow. What remains is taken in the same way again.
+
+Fields meet at nodes up to two cells before the bodies do (the reach of the functions). Therefore
+the gap between the surfaces is measured, from the mean places of the points of each body that a
+node sees (`karamelo_py.points.basis.surface`). Bodies may approach until the gap is closed, and are
+stopped where it would be less than nothing at the end of the step.
 """
 
 from __future__ import annotations
@@ -21,9 +26,12 @@ import numpy as np
 
 from karamelo_py.compiler.compile import entered, point_function, subkernel
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels.arrays import MASS, TIMESTEP, of_change
-from karamelo_py.kernels.p2g import Normal
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
+from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.kernels.step import touch, touch_velocity
+from karamelo_py.points.basis.surface import ENTRIES
+from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension
 
 REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
@@ -32,7 +40,7 @@ REPEATS = 16  # at most, where more than two fields meet; what remains falls by 
 class SeparateFields(NamedTuple):
     """Solids touch where their fields meet. F fields of equal grids, S solids."""
 
-    node_fields = (Normal,)
+    node_fields = (Normal, Centre)
 
     stride: int  # from a node to the same place in the next field
     friction: np.ndarray  # (F, F) coefficient of each pair of fields; infinite: no slip
@@ -44,9 +52,20 @@ class SeparateFields(NamedTuple):
     prescribed: (
         np.ndarray
     )  # (N, d) 1 + slot of the reaction, where a fix prescribes the velocity, else 0
+    rigid: np.ndarray  # (F,) bool: whether contact does not move a field
+    torque: np.ndarray  # (F,) slot of the published torque on each field
+    surface: np.ndarray  # (F, k) distance of the surface by the mean place of the points, in cells
     meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a place
     partners: np.ndarray  # (F,) int64 scratch: with how many others each of them is in contact
     change: np.ndarray  # (F, d) scratch: of the velocity of each of them
+
+
+class Where(NamedTuple):
+    """A place where fields meet, and the length of the step."""
+
+    x: tuple  # position of the node
+    h: float
+    dt: float
 
 
 class Pair(NamedTuple):
@@ -58,6 +77,12 @@ class Pair(NamedTuple):
     per_b: float
     share_a: float
     share_b: float
+
+
+@subkernel
+def _held(contact, n, k):
+    """Whether contact cannot move a node in direction k."""
+    return contact.prescribed[n, k] != 0 or contact.rigid[n // contact.stride]
 
 
 @subkernel
@@ -76,8 +101,8 @@ def _shares(contact, d, nodes, n, m):
     for k in range(d):
         of_n += normal[n, k] * normal[n, k]
         of_m += normal[m, k] * normal[m, k]
-        prescribed_n = prescribed_n or contact.prescribed[n, k] != 0
-        prescribed_m = prescribed_m or contact.prescribed[m, k] != 0
+        prescribed_n = prescribed_n or _held(contact, n, k)
+        prescribed_m = prescribed_m or _held(contact, m, k)
     if not of_n + of_m > 0:
         return 0.0, 0.0
     if prescribed_n != prescribed_m and (of_n if prescribed_n else of_m) > 0:
@@ -96,8 +121,8 @@ def _pair(contact, d, nodes, n, m):
 @subkernel
 def _yielding(contact, pair, k):
     """Change of the relative velocity with an impulse along direction k."""
-    of_n = 0.0 if contact.prescribed[pair.n, k] else pair.per_a
-    of_m = 0.0 if contact.prescribed[pair.m, k] else pair.per_b
+    of_n = 0.0 if _held(contact, pair.n, k) else pair.per_a
+    of_m = 0.0 if _held(contact, pair.m, k) else pair.per_b
     return of_n + of_m
 
 
@@ -117,24 +142,62 @@ def _slide(contact, nodes, pair, k, push):
 
 
 @subkernel
-def _approach(d, nodes, pair):
-    """How fast two bodies approach, times the length of their normal."""
+def _length(d, nodes, pair):
+    """Length of the common normal."""
+    size = 0.0
+    for k in range(d):
+        normal = _outward(nodes, pair, k)
+        size += normal * normal
+    return sqrt(size)
+
+
+@subkernel
+def _reach(contact, d, nodes, pair, n, where, side):
+    """How far the body at node `n` of a pair reaches from there, along the normal out of it.
+
+    `side` is 1 for the first body of the pair and -1 for the second.
+    """
+    centre = field(nodes.fields, Centre)
+    mean = 0.0
+    for k in range(d):
+        place = centre[n, k] / nodes.sums[n, MASS] - where.x[k]
+        mean += side * _outward(nodes, pair, k) * place
+    table = contact.surface[n // contact.stride]
+    row = (mean / (_length(d, nodes, pair) * where.h) + 3) * ENTRIES
+    low = min(max(int(row), 0), table.size - 2)
+    share = min(max(row - low, 0.0), 1.0)
+    return where.h * (table[low] + share * (table[low + 1] - table[low]))
+
+
+@subkernel
+def _excess(contact, d, nodes, pair, where):
+    """How much faster two bodies approach than would close the gap between them in a step."""
+    size = _length(d, nodes, pair)
+    if not size > 0:
+        return 0.0
     approach = 0.0
     for k in range(d):
         normal = _outward(nodes, pair, k)
         approach += normal * (nodes.update[pair.n, k] - nodes.update[pair.m, k])
-    return approach
+    if not approach > 0:
+        return 0.0
+    gap = -_reach(contact, d, nodes, pair, pair.n, where, 1)
+    gap -= _reach(contact, d, nodes, pair, pair.m, where, -1)
+    return approach / size - max(gap, 0.0) / where.dt
 
 
 @subkernel
-def _take(contact, control, a, i, n, k, impulse, per_mass):
+def _take(contact, control, a, i, n, k, impulse, per_mass, x):
     """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
-    if not slot:
+    if not _held(contact, n, k):
         contact.change[i, k] += impulse * per_mass
     force = impulse / control.clock[0].kick
     values = control.values
     values[contact.slot[a] + k] += force
+    # A force along k turns about the two other axes.
+    values[contact.torque[a] + (k + 1) % 3] += x[(k + 2) % 3] * force
+    values[contact.torque[a] + (k + 2) % 3] -= x[(k + 1) % 3] * force
     if slot:
         values[slot - 1 + k] -= force
 
@@ -171,7 +234,9 @@ def _clear_change(contact, d, count):
 
 
 class Approaching(NamedTuple):
-    """Pairs of bodies that approach each other."""
+    """Pairs of bodies that approach each other further than they may."""
+
+    where: Where
 
 
 class Touched(NamedTuple):
@@ -187,7 +252,7 @@ def _belongs(which, contact, d, nodes, n, m, b):
 
 @_belongs.on(Approaching)
 def _(which, contact, d, nodes, n, m, b):
-    return _approach(d, nodes, _pair(contact, d, nodes, n, m)) > 0
+    return _excess(contact, d, nodes, _pair(contact, d, nodes, n, m), which.where) > 0
 
 
 @_belongs.on(Touched)
@@ -243,24 +308,18 @@ def _rub(contact, d, nodes, pair, friction, push, size, share):
 
 
 @subkernel
-def _touch_pair(contact, d, nodes, control, i, j, place, share):
+def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
     pair = _pair(contact, d, nodes, _node(contact, place, i), _node(contact, place, j))
-    approach = _approach(d, nodes, pair)
-    if not approach > 0:
+    excess = _excess(contact, d, nodes, pair, where)
+    if not excess > 0:
         return
-    size = 0.0
-    for k in range(d):
-        normal = _outward(nodes, pair, k)
-        size += normal * normal
-    if not size > 0:
-        return
-    size = sqrt(size)
+    size = _length(d, nodes, pair)
     compliance = _compliance(contact, d, nodes, pair, size)
     if not compliance > 0:
         return  # the fixes move both
-    push = share * (approach / size) / compliance
+    push = share * excess / compliance
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
         rub, sticks = _rub(contact, d, nodes, pair, contact.friction[a, b], push, size, share)
@@ -271,8 +330,8 @@ def _touch_pair(contact, d, nodes, control, i, j, place, share):
         impulse = push * _outward(nodes, pair, k) / size
         if rub > 0:
             impulse += rub * _slide(contact, nodes, pair, k, push / size)
-        _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a)
-        _take(contact, control, b, j, pair.m, k, impulse, pair.per_b)
+        _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a, where.x)
+        _take(contact, control, b, j, pair.m, k, impulse, pair.per_b, where.x)
         if contact.pair[a, b] >= 0:
             values[contact.pair[a, b] + k] -= impulse / kick
         if contact.pair[b, a] >= 0:
@@ -280,17 +339,18 @@ def _touch_pair(contact, d, nodes, control, i, j, place, share):
 
 
 @subkernel
-def _touch_place(contact, kin, nodes, control, place, count):
+def _touch_place(contact, kin, nodes, control, place, count, where):
     """Resolve contact where `count` fields meet."""
     d = dimension(kin)
     contact.partners[:count] = 1  # whether a single pair approaches, it looks itself
     for _ in range(REPEATS if count > 2 else 1):
-        if count > 2 and not _count_partners(Approaching(), contact, d, nodes, place, count):
+        which = Approaching(where)
+        if count > 2 and not _count_partners(which, contact, d, nodes, place, count):
             return
         _clear_change(contact, d, count)
         for i in range(count):
             for j in range(i + 1, count):
-                _touch_pair(contact, d, nodes, control, i, j, place, _share(contact, i, j))
+                _touch_pair(contact, d, nodes, control, i, j, place, _share(contact, i, j), where)
         for i in range(count):
             n = _node(contact, place, i)
             for k in range(d):
@@ -299,13 +359,26 @@ def _touch_place(contact, kin, nodes, control, place, count):
 
 
 @entered
-def _touch_nodes(contact, kin, nodes, spans, control):
+def _keep_rigid(contact, kin, nodes, spans):
+    """Rigid bodies have their velocity, whatever acts on the nodes."""
+    for s in range(1, 1 + spans[0, 0]):
+        for n in range(spans[s, 0], spans[s, 1]):
+            if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
+                for k in range(dimension(kin)):
+                    v = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
+                    nodes.update[n, k] = v
+                    nodes.update[n, of_change(kin) + k] = 0
+
+
+@entered
+def _touch_nodes(contact, kin, grids, nodes, spans, control):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
     fields = contact.slot.size
     values = control.values
     for a in range(fields):
         for k in range(3):
             values[contact.slot[a] + k] = 0.0
+            values[contact.torque[a] + k] = 0.0
             for b in range(fields):
                 if contact.pair[a, b] >= 0:
                     values[contact.pair[a, b] + k] = 0.0
@@ -315,7 +388,9 @@ def _touch_nodes(contact, kin, nodes, spans, control):
                 continue
             count = _meet(contact, nodes, n)
             if count > 1:
-                _touch_place(contact, kin, nodes, control, n % contact.stride, count)
+                grid = record(grids, n // contact.stride)
+                where = Where(node_position(grid, n), grid.h, values[DT])
+                _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
     for c in range(len(contact.copies)):
         for k in range(3):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
@@ -339,9 +414,9 @@ def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
         impulse = push * _outward(nodes, pair, k)
         if sticks:
             impulse = share * (v[pair.n, k] - v[pair.m, k]) / yielding
-        if not contact.prescribed[pair.n, k]:
+        if not _held(contact, pair.n, k):
             contact.change[i, k] -= impulse * pair.per_a
-        if not contact.prescribed[pair.m, k]:
+        if not _held(contact, pair.m, k):
             contact.change[j, k] += impulse * pair.per_b
 
 
@@ -387,7 +462,8 @@ def _stay_nodes(contact, kin, nodes, spans, step):
 
 @touch.on(SeparateFields)
 def _(contact, s):
-    _touch_nodes(contact, s.kin, s.nodes, s.spans, s.control)
+    _keep_rigid(contact, s.kin, s.nodes, s.spans)
+    _touch_nodes(contact, s.kin, s.grids, s.nodes, s.spans, s.control)
 
 
 @touch_velocity.on(SeparateFields)

@@ -28,6 +28,7 @@ from numba import types
 
 from karamelo_py.compiler.compile import caller_of, entered, point_function, subkernel
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
     BEFORE,
     FINAL_INTEGRATE,
@@ -35,6 +36,7 @@ from karamelo_py.kernels.arrays import (
     MASS,
     ON_SUMS,
     ON_UPDATE,
+    ON_VELOCITY,
     POST_ADVANCE_PARTICLES,
     POST_GRID_TO_POINT,
     POST_HEAT_TO_GRID,
@@ -49,6 +51,8 @@ from karamelo_py.kernels.arrays import (
     of_force,
     of_momentum,
 )
+from karamelo_py.kernels.walls import FRICTION, rub, stick
+from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension
 
 _F8 = types.float64
@@ -163,15 +167,10 @@ def _locate_nodes(kin, grids, hooks, count):
         g = 0
         while g + 1 < grids.first.size and n >= grids.first[g + 1]:
             g += 1
-        local = n - grids.first[g]
-        step_x = grids.step_x[g]
-        step_y = grids.step_y[g]
-        spacing = grids.spacing[g]
-        where[0, q] = grids.x0[g] + (local // step_x) * spacing
-        where[1, q] = grids.y0[g] + (local % step_x // step_y) * spacing
-        where[2, q] = grids.z0[g] + (local % step_y) * spacing
+        x = node_position(record(grids, g), n)
         for axis in range(3):
-            where[3 + axis, q] = where[axis, q]
+            where[axis, q] = x[axis]
+            where[3 + axis, q] = x[axis]
 
 
 @subkernel
@@ -225,14 +224,33 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
         slot = hooks.table[h].slot
         if slot >= 0:
             control.values[slot + c] += total
+    if hooks.programs[h, FRICTION].begin >= 0:
+        _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count)
+
+
+@subkernel
+def _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count):
+    """Friction of the chosen nodes along their wall."""
+    programs = hooks.programs[h]
+    if target == ON_VELOCITY:
+        if hooks.table[h].stage == POST_VELOCITIES_TO_GRID:  # else v* is that of the step before
+            for q in range(count):
+                stick(kin, nodes, programs, hooks.chosen[q])
+        return
+    _evaluate(hooks, h, FRICTION, count, control, np.int64(VALUE), 0.0)
+    slot = hooks.table[h].slot
+    for q in range(count):
+        n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
+        rub(kin, nodes, programs, n, mu, dt, kept, control.values[slot : slot + 3])
 
 
 @subkernel
 def clear_total(hooks, h, control):
     """The totals of a hook start from zero."""
     slot = hooks.table[h].slot
+    rubs = hooks.programs[h, FRICTION].begin >= 0
     for c in range(3):
-        if slot >= 0 and hooks.programs[h, c].begin >= 0:
+        if slot >= 0 and (rubs or hooks.programs[h, c].begin >= 0):
             control.values[slot + c] = 0.0
 
 

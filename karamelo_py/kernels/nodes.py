@@ -11,7 +11,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_optional
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.g2p import NodalMean, NodalStress
-from karamelo_py.kernels.p2g import Normal, SeenMass
+from karamelo_py.kernels.p2g import Centre, Led, Normal, SeenMass
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
 
@@ -116,6 +116,8 @@ def _(task, kin, nodes, n, dt):
     clear_optional(field(nodes.fields, Normal), n)
     clear_optional(field(nodes.fields, SeenMass), n)
     clear_optional(field(nodes.fields, NodalStress), n)
+    clear_optional(field(nodes.fields, Led), n)
+    clear_optional(field(nodes.fields, Centre), n)
 
 
 @at_node.on(ClearVelocity)

@@ -21,7 +21,7 @@ from karamelo_py.compiler.tuples import (
     scale,
     subtract,
 )
-from karamelo_py.kernels.arrays import MASS, of_force
+from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, of_force
 from karamelo_py.kernels.g2p import (
     AveragedStress,
     FBar,
@@ -35,7 +35,12 @@ from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, Updated, add_force, force_stress
 from karamelo_py.points.kinematics import add_pressure, stretching_mean, zero_symmetric
-from karamelo_py.points.laws import jacobian, kirchhoff_stress, specific_volume
+from karamelo_py.points.laws import (
+    constrained_velocity,
+    jacobian,
+    kirchhoff_stress,
+    specific_volume,
+)
 from karamelo_py.points.transfers import Moment, add_momentum, gradient_weight, zero_moment
 from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
@@ -121,6 +126,28 @@ class SeenMass(NamedTuple):
         return basis.steep_edge
 
 
+class Centre(NamedTuple):
+    """Sum of mass times position at a node, for the gap between solids."""
+
+    array: Any
+
+    shape = vector
+    kept = False
+
+
+class Led(NamedTuple):
+    """What rigid points give a node: mass, momentum and the force on them, as in `Nodes.sums`."""
+
+    array: Any
+
+    kept = False
+
+    @staticmethod
+    def shape(kin):
+        """The components of the sums of a node."""
+        return SUMS_WIDTH[kin.dimension]
+
+
 @point_function()
 def load_of(quantity, w, p, like):
     """What a point brings to the nodes."""
@@ -137,13 +164,57 @@ def _moment(w, p, like):
 
 
 @shared
-def _mass(w, p):
+def _own_mass(w, p):
     return of_present(p, w.points.mass[p])
+
+
+def shared_mass(led, law, mass):
+    """The mass that a point gives to the sums of all solids: of rigid points none, if `led`."""
+    return 0 * mass if led is not None and constrained_velocity.defined(type(law)) else mass
+
+
+@by_type(shared_mass)
+def _shared_mass(led, law, mass):
+    if isinstance(led, types.NoneType) or not constrained_velocity.defined(law.instance_class):
+        return lambda led, law, mass: mass
+    return lambda led, law, mass: mass - mass
+
+
+def loaded_for(nodal, kin, array, p):
+    """The vector of a point, where there is a nodal array for it; else ()."""
+    return () if nodal is None else load_vector(kin, array, p)
+
+
+@by_type(loaded_for)
+def _loaded_for(nodal, kin, array, p):
+    if isinstance(nodal, types.NoneType):
+        return lambda nodal, kin, array, p: ()
+    return lambda nodal, kin, array, p: load_vector(kin, array, p)
+
+
+def led_mass(led, law, mass):
+    """(mass,) of rigid points, which have sums of their own if `led`; () of others."""
+    return (mass,) if led is not None and constrained_velocity.defined(type(law)) else ()
+
+
+@by_type(led_mass)
+def _led_mass(led, law, mass):
+    if isinstance(led, types.NoneType) or not constrained_velocity.defined(law.instance_class):
+        return lambda led, law, mass: ()
+    return lambda led, law, mass: (mass,)
+
+
+@shared
+def _mass(w, p):
+    return shared_mass(field(w.nodes.fields, Led), law_of(w, p), _own_mass(w, p))
 
 
 @load_of.on(MassMomentum)
 def _(quantity, w, p, like):
-    return _mass(w, p), load_vector(w.kin, w.points.v, p), _moment(w, p, like)
+    v = load_vector(w.kin, w.points.v, p)
+    led = led_mass(field(w.nodes.fields, Led), law_of(w, p), _own_mass(w, p))
+    x = loaded_for(field(w.nodes.fields, Centre), w.kin, w.places.y, p)
+    return _mass(w, p), v, _moment(w, p, like), led, x
 
 
 @shared
@@ -158,9 +229,11 @@ def momentum_part(w, stencil, k, weight, mass, v, moment):
 @scattered.on(MassMomentum)
 def _(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-    mass, v, moment = load
+    mass, v, moment, led, x = load
     part = momentum_part(w, stencil, k, weight, mass, v, moment)
     accumulate(w.nodes.sums, i, MASS, (weight * mass,) + part)
+    accumulate_led(field(w.nodes.fields, Led), i, weight, led, v)
+    accumulate_optional(field(w.nodes.fields, Centre), i, scale(weight * mass, x))
     accumulate_optional(field(w.nodes.fields, Normal), i, scale(mass, leading(gradient, v)))
     accumulate_optional(field(w.nodes.fields, SeenMass), i, (weight * mass * mass,))
 
@@ -279,6 +352,24 @@ def _(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, u = load
     accumulate(field(w.nodes.fields, Series), i, len(u), scale(weight * mass, u))
+
+
+def accumulate_led(array, i, weight, led, v):
+    """Give a node the mass and momentum of a rigid point."""
+    if len(led):
+        accumulate(array, i, MASS, scale(weight * led[0], (1.0, *v)))
+
+
+@by_type(accumulate_led)
+def _accumulate_led(array, i, weight, led, v):
+    if len(led) == 0:
+        return lambda array, i, weight, led, v: None
+
+    def give(array, i, weight, led, v):
+        part = weight * led[0]
+        accumulate(array, i, MASS, (part,) + scale(part, v))
+
+    return give
 
 
 def accumulate_optional(array, i, values):

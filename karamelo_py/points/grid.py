@@ -60,3 +60,12 @@ def inside(grid, kin, x):
         # So written, NaN lies outside.
         within = (a >= -grid.slack) & (a <= end + grid.slack) & within
     return within
+
+
+@shared
+def node_position(grid, n):
+    """(x, y, z) of node `n` of the grid."""
+    local = n - grid.first
+    x = grid.x0 + (local // grid.step_x) * grid.spacing
+    y = grid.y0 + (local % grid.step_x // grid.step_y) * grid.spacing
+    return x, y, grid.z0 + (local % grid.step_y) * grid.spacing

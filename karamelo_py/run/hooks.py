@@ -10,6 +10,7 @@ from karamelo_py.compiler.compile import address_of
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 from karamelo_py.kernels.arrays import HOOK, PROGRAM, Hooks, NoHooks
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
+from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import told
 from karamelo_py.scene.hub import Hub
 
@@ -67,7 +68,8 @@ class _Builder:
         uses = int(hook.uses_before), int(hook.uses_share)
         self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
         programs = [self._program(formula) for formula in fix.formulas]
-        self.programs.append(programs + [NO_PROGRAM] * (3 - len(programs)))
+        programs += [NO_PROGRAM] * (FRICTION - len(programs))
+        self.programs.append([*programs, self._program(fix.wall_friction)])
         self.on_points |= not hook.on_nodes
 
     def _members(self, group: Any, hook: CompiledHook) -> tuple[int, int]:

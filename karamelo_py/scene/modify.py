@@ -63,6 +63,9 @@ class Fix:
     holds_nodes
         Whether it prescribes velocities of the nodes of its group in ``post_update_grid_state``,
         in the directions in which it has a formula: contact does not move them.
+    wall_friction
+        Formula of the coefficient of friction along the wall that a fix makes which holds nodes, in
+        the directions in which it has no formula; None for walls without.
     point_fields
         The fields of points that it declares (:mod:`karamelo_py.compiler.fields`); `Force` if it
         sets forces on points in ``initial_integrate``.
@@ -86,6 +89,7 @@ class Fix:
     point_by_point = False
     for_method = False
     holds_nodes = False
+    wall_friction: Any = None
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
     needs_all_points = False

@@ -84,6 +84,10 @@ class VelocityNodes(Fix):
         vx, vy, vz, as many as the domain has dimensions: numbers or formulas of x0, y0, z0, time
         and published values. NULL leaves a component free. With ``leq`` or ``geq`` in front of it
         the velocity is an upper or a lower bound: nodes that keep within it are free.
+    mu
+        Coefficient of friction (Coulomb): a number or a formula. In the directions that are NULL
+        the wall is at rest, and nodes that it holds or bounds rub along it, with a force of at most
+        mu times that across it. Nodes that are held, not bounded, rub where they pull, too.
 
     Example
     -------
@@ -91,27 +95,48 @@ class VelocityNodes(Fix):
     fix(roller, velocity_nodes, left, 0, NULL)
     fix(piston, velocity_nodes, top, NULL, -0.1*sin(2*PI*time))
     fix(floor, velocity_nodes, bottom, NULL, geq0)
+    fix(rough, velocity_nodes, bottom, NULL, geq0, mu=0.3)
 
     Notes
     -----
-    Publishes the reaction, the force that holds the nodes, as ID_x, ID_y, ID_z. Where two such
-    fixes hold a node in one direction, the later one decides, and has the rest of the reaction.
+    Publishes the reaction, the force that holds the nodes, as ID_x, ID_y, ID_z, friction among it.
+    Where two such fixes hold a node in one direction, the later one decides, and has the rest of
+    the reaction.
 
     See Also
     --------
     velocity_particles, initial_velocity_nodes, compute reaction
     """
 
-    syntax = "group, vx[, vy[, vz]]"
+    syntax = "group, vx[, vy[, vz]][, mu=mu]"
     published = ("x", "y", "z")
     holds_nodes = True
 
     post_update_grid_state = node_hook(prescribe, uses_before=True)
     post_velocities_to_grid = node_hook(hold, publishes=False)
 
-    def __init__(self, hub: Hub, group: NodeGroup, *velocity: Velocity | None):
+    def __init__(
+        self,
+        hub: Hub,
+        group: NodeGroup,
+        *velocity: Velocity | None,
+        mu: Expression | None = None,
+    ):
         super().__init__(hub, group)
         self.formulas: tuple[Any, ...] = per_direction(hub, "v", velocity)
+        self.wall_friction = mu
+        if mu is not None and mu.is_constant and not mu.constant >= 0:
+            raise ScriptError(
+                f"the coefficient of friction is {mu.constant:g}",
+                argument="mu",
+                expected="a number of at least 0",
+            )
+        if mu is not None and None not in self.formulas:
+            raise ScriptError(
+                "nodes that are held in all directions cannot rub",
+                argument="mu",
+                expected="NULL for the directions along the wall, or no mu",
+            )
         self.bound = self._one_bound()
         if self.bound:
             most = self.bound == "leq"

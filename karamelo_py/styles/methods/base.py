@@ -17,6 +17,18 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.methods.domains import initial_shape
 
+DIRECTIONS = ("x", "y", "z")
+
+
+def force_on(solid: Solid) -> str:
+    """Stem of the names under which the force on a solid is published."""
+    return f"ContactForce_{solid.id}"
+
+
+def torque_on(solid: Solid) -> str:
+    """The same of the torque."""
+    return f"ContactTorque_{solid.id}"
+
 
 class NoContact(NamedTuple):
     """Solids act on each other by sharing nodes, or not at all."""

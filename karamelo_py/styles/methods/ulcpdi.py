@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from karamelo_py.styles.methods.cpdi import Convected
+from karamelo_py.styles.methods.ulmpm import ULMPM
 
 
-class ULCPDI(Convected):
+class ULCPDI(Convected, ULMPM):
     """CPDI: every point has a domain that deforms with it, and sees the nodes around its corners.
 
     All solids share one grid. A body does not break between points, however far it stretches, and

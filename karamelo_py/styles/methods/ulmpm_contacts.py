@@ -8,19 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.contact import SeparateFields
+from karamelo_py.points.basis.surface import surface_table
+from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice, numbered
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.methods.base import Method
-
-DIRECTIONS = ("x", "y", "z")
-
-
-def force_on(solid: Solid) -> str:
-    """Stem of the names under which the contact force on a solid is published."""
-    return f"ContactForce_{solid.id}"
+from karamelo_py.styles.methods.base import DIRECTIONS, Method, force_on, torque_on
 
 
 def fields(hub: Hub) -> list[int]:
@@ -82,22 +77,26 @@ class ULMPMContacts(Method):
     def welcome(self, hub: Hub, solid: Solid) -> None:
         """Publish the contact force."""
         hub.values.publish_vector(force_on(solid), DIRECTIONS)
+        hub.values.publish_vector(torque_on(solid), DIRECTIONS)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """Contact where the fields of two solids meet."""
         count, d = len(lattices), hub.domain.dimension
         nodes = sum(lattice.node_count for lattice in lattices)
-        first: dict[int, int] = {}
-        copies = []
-        for solid, field in zip(hub.solids.values(), fields(hub), strict=True):
-            slot = hub.values.slot(force_on(solid) + "_x")
-            if first.setdefault(field, slot) != slot:
-                copies.append((first[field], slot))
+        h = hub.domain.h
+        first: dict[int, Solid] = {}
+        copies: list[list[int]] = []
+        solids = hub.solids.values()
+        for solid, field in zip(solids, fields(hub), strict=True):
+            if first.setdefault(field, solid) is not solid:
+                for stem in (force_on, torque_on):
+                    of_both = (stem(first[field]), stem(solid))
+                    copies.append([hub.values.slot(name + "_x") for name in of_both])
         return SeparateFields(
             stride=lattices[0].node_count,
             friction=np.zeros((count, count)),
             pair=np.full((count, count), -1, np.int64),
-            slot=np.array([first[k] for k in range(count)], np.int64),
+            slot=np.array([hub.values.slot(f"{force_on(first[k])}_x") for k in range(count)]),
             copies=np.array(copies, np.int64).reshape(-1, 2),
             # Pages that nothing is written to cost no memory.
             touched=np.zeros((nodes, count), np.int32),
@@ -105,6 +104,13 @@ class ULMPMContacts(Method):
             meeting=np.zeros(count, np.int64),
             partners=np.zeros(count, np.int64),
             change=np.zeros((count, d)),
+            rigid=np.array(
+                [can(first[k].material.law, constrained_velocity) for k in range(count)]
+            ),
+            torque=np.array([hub.values.slot(f"{torque_on(first[k])}_x") for k in range(count)]),
+            surface=np.array(
+                [surface_table(self.basis, first[k].half_size.mean() / h) for k in range(count)]
+            ),
         )
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:

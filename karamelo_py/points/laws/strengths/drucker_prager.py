@@ -10,7 +10,12 @@ from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import contract
 from karamelo_py.points.laws.strengths import pressure_response
-from karamelo_py.points.laws.strengths.frictional import frictional, surface
+from karamelo_py.points.laws.strengths.frictional import (
+    frictional,
+    lowest_pressure,
+    surface,
+    tension_bound,
+)
 from karamelo_py.points.laws.strengths.soils import angles, residual
 
 
@@ -108,14 +113,17 @@ class DruckerPrager(NamedTuple):
 frictional(DruckerPrager)
 
 
+@tension_bound.on(DruckerPrager)
+def _(strength, lowest):
+    return max(lowest, -strength.tension)
+
+
 @pressure_response.on(DruckerPrager)
 def _(strength, kin, s, p, K, strain):
     cohesion, friction, dilation = surface(strength, strain)
     zero = real(0, p)
     trial = sqrt(real(0.5, p) * contract(kin, s, s))
-    lowest = -strength.tension
-    if friction > 0:
-        lowest = max(lowest, -cohesion / friction)
+    lowest = lowest_pressure(strength, strain)
     f = trial - cohesion - friction * p
     root = trial
     if f > 0:

@@ -1,13 +1,19 @@
 """What strengths that depend on pressure share: cohesion and friction, perhaps softening; memory.
 
-The memory is (equivalent plastic strain, plastic volume ratio).
+The memory is (equivalent plastic strain, plastic volume ratio, volume ratio of separation).
+
+Beyond the largest tension that the strength bears, points come apart: the volume that they gain is
+not bulk, and is given back before they bear pressure again (Dunatunga & Kamrin 2015, "Continuum
+modelling and simulation of granular flows through their many phases", J. Fluid Mech. 779, section
+3.3; Tampubolon et al. 2017, "Multi-species simulation of porous sand and water mixtures", ACM
+Trans. Graph. 36(4), section 4.3.4). What plastic flow by shear gains (dilatancy) stays.
 """
 
 from __future__ import annotations
 
-from math import log, sqrt
+from math import inf, log, sqrt
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.tuples import plus, scale, subtract
 from karamelo_py.points.kinematics import contract
 from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
@@ -36,34 +42,62 @@ def surface(strength, strain):
     return cohesion, friction, min(strength.dilation, friction)
 
 
+@shared
+def lowest_pressure(strength, strain):
+    """The pressure below which nothing is borne, -cohesion / friction or a bound of its own."""
+    cohesion, friction, _ = surface(strength, strain)
+    return tension_bound(strength, -cohesion / friction if friction > 0 else real(-inf, strain))
+
+
+@point_function()
+def tension_bound(strength, lowest):
+    """The lowest pressure, of a strength whose yield surface ends at `lowest`."""
+
+
+@tension_bound.otherwise
+def _(strength, lowest):
+    return lowest
+
+
 def frictional(strength: type) -> None:
     """Give `strength` (with a field ``G`` and those of `surface`) memory, and response."""
-    remembers(strength, ep=0.0, Jp=1.0)
+    remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
 
     @elastic_ratio.on(strength)
     def _(strength, memory, j):
-        return j / memory[1]
+        return j / (memory[1] * memory[2])
 
     @with_elastic_ratio.on(strength)
     def _(strength, memory, j, elastic):
-        return (memory[0], j / elastic)
+        return (memory[0], j / (elastic * memory[2]), memory[2])
 
     @respond.on(strength)
     def _(strength, law, kin, s, strain, j, memories, dt):
         memory, heat = memories.strength, memories.heat
         trial = elastic_trial(kin, strength.G, s, strain)
+        one = real(1, j)
         elastic = elastic_ratio(strength, memory, j)
         warm = plus(real(0, j), thermal_pressure(law.temperature, heat))
         p = pressure(law.eos, elastic, memories.energy, heat) + warm
+        if memory[2] > one and p > 0:
+            # What had come apart closes before it bears pressure.
+            apart = max(one, j / (memory[1] * ratio_at_pressure(law.eos, -warm, heat)))
+            memory = (memory[0], memory[1], apart)
+            elastic = elastic_ratio(strength, memory, j)
+            p = pressure(law.eos, elastic, memories.energy, heat) + warm
         K = bulk_modulus(law.eos, elastic, memories.energy, heat)
+        lowest = lowest_pressure(strength, memory[0])
         new, reached = pressure_response(strength, kin, trial, p, K, memory[0])
         plastic = scale(real(0.5, j) / strength.G, subtract(trial, new))
         increment = sqrt(real(2 / 3, j) * contract(kin, plastic, plastic))
-        memory = (memory[0] + increment, memory[1])
+        memory = (memory[0] + increment, memory[1], memory[2])
         work = contract(kin, new, plastic)
         if reached != p:
             # The volume that bears the new pressure is elastic; the rest is plastic.
             after = ratio_at_pressure(law.eos, reached - warm, heat)
-            memory = with_elastic_ratio(strength, memory, j, after)
+            if p < lowest and reached - lowest <= real(1e-6, p) * (lowest - p):
+                memory = (memory[0], memory[1], j / (memory[1] * after))
+            else:
+                memory = with_elastic_ratio(strength, memory, j, after)
             work -= reached * log(elastic / after)
         return new, memory, work

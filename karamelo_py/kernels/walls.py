@@ -1,0 +1,64 @@
+"""Coulomb friction at walls: nodes that a fix holds across a wall rub along it.
+
+The force of the wall on a node has the parts that the fix prescribes, across the wall, and along it
+at most mu times as much, against the motion: as much as stops it, if that is less. The wall is at
+rest in the directions in which nothing is prescribed.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from karamelo_py.compiler.compile import subkernel
+from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
+from karamelo_py.points.kinematics import dimension
+
+FRICTION = 3  # the program of the coefficient, behind those of the components
+
+
+@subkernel
+def rub(kin, nodes, programs, n, mu, dt, kept, reaction):
+    """Give node `n` the friction of its wall; add the force to `reaction` (d,).
+
+    `programs` are those of the hook that has held the node: what it changed v and v* by, of which
+    points that keep the share `kept` of their velocity take both, is the impulse across the wall.
+    """
+    d = dimension(kin)
+    mass = nodes.sums[n, MASS]
+    across = 0.0
+    along = 0.0
+    for c in range(d):
+        star = nodes.update[n, c]
+        if programs[c].begin < 0:
+            along += star * star
+            continue
+        v = nodes.sums[n, of_momentum(kin) + c] / mass
+        free = v + dt * nodes.sums[n, of_force(kin) + c] / mass
+        now = star - nodes.update[n, of_change(kin) + c]
+        impulse = star - free + kept * (v - now)
+        across += impulse * impulse
+    if not along > 0:
+        return
+    speed = sqrt(along)
+    stop = min(mu * sqrt(across), speed)
+    for c in range(d):
+        if programs[c].begin < 0:
+            taken = nodes.update[n, c] * (stop / speed)
+            nodes.update[n, c] -= taken
+            nodes.update[n, of_change(kin) + c] -= taken
+            reaction[c] -= mass * taken / dt
+
+
+@subkernel
+def stick(kin, nodes, programs, n):
+    """Nor does the velocity that deforms slide, where friction stopped the node.
+
+    Where it is mapped apart from v*, stress would else do work on a slip that there is not.
+    """
+    d = dimension(kin)
+    for c in range(d):
+        if programs[c].begin < 0 and nodes.update[n, c] != 0:
+            return
+    for c in range(d):
+        if programs[c].begin < 0:
+            nodes.velocity[n, c] = 0

@@ -1,0 +1,72 @@
+"""Where the surface of a body is, from what a node knows of the body's points."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.points.basis import entry, locate, support
+from karamelo_py.points.grid import Grid
+from karamelo_py.points.kinematics import Line
+
+CELLS = 16  # of the line on which functions are looked at
+ENTRIES = 256  # of a table, over a cell
+
+
+def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places, in cells from a node, and the weights that it gives to a point there.
+
+    Parameters
+    ----------
+    basis
+        The basis; of those whose points have domains the hat functions are averaged over a domain.
+    half
+        Half the size of a point, in cells.
+    """
+    x = np.arange(-3 * ENTRIES, 3 * ENTRIES + 1) / ENTRIES
+    if getattr(basis, "shape", ()):
+        hats = np.maximum(1 - np.abs(x), 0)
+        box = np.ones(max(round(2 * half * ENTRIES), 1) | 1)
+        return x, np.convolve(hats, box / len(box), mode="same")
+    middle = CELLS // 2
+    line = Grid(
+        0.0, 0.0, 0.0, 1.0, 1.0, 1.0, CELLS, 1, 1, float(CELLS), 0.0, 0.0, 0.0, 1, 1, 0
+    )  # fmt: skip
+    weights = np.zeros(len(x))
+    for q, place in enumerate(x):
+        stencil = locate(basis, Line(), line, (middle + float(place),))
+        for k in range(support(basis, Line())):
+            node, weight, _ = entry(basis, Line(), line, stencil, k)
+            weights[q] += weight if node == middle else 0
+    return x, weights
+
+
+def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
+    """Distance of a plane surface from a node, by the mean place of the body's points that it sees.
+
+    Points of equal mass stand in layers below the surface, the first half of their size from it;
+    both distances are in cells, along the outward normal. Row k belongs to a mean of
+    k / ENTRIES - 3 (after Nairn 2013, "Modeling imperfect interfaces in the material point method
+    using multimaterial methods", CMES 92(3), section 4, who takes a power law).
+
+    Parameters
+    ----------
+    basis, half
+        See `profile`.
+    """
+    means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
+    if type(basis).nodes_per_cell > 1:
+        # The functions of the nodes differ: no gap is known, and fields touch as they meet.
+        return np.full(len(means), 3.0)
+    x, weights = profile(basis, half)
+    surfaces = np.arange(-2.5, 2.5, 0.5 / ENTRIES)
+    layers = np.arange(half, 8, 2 * half)
+    places = surfaces[:, None] - layers
+    seen = np.interp(places, x, weights)
+    known = seen.sum(axis=1) > 0
+    mean = (seen * places).sum(axis=1)[known] / seen.sum(axis=1)[known]
+    mean = np.maximum.accumulate(mean)
+    # Once a body fills the reach of a node its mean stays: the first surface at which it does.
+    mean, first = np.unique(np.round(mean, 9), return_index=True)
+    return np.interp(means, mean, surfaces[known][first])

@@ -1,0 +1,93 @@
+"""Friction at walls that fix velocity_nodes makes: the momentum that it takes, and sticking."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+MU = 0.3
+SCENE = """
+method(METHOD)
+scheme(SCHEME)
+dimension(2, -1, 3, 0, 1, 0.25)
+region(box, block, 0, 1, 0, 0.5)
+material(soft, linear, 1000, 1e6, 0.3)
+solid(block, region, box, 2, soft, 0.25, 0)
+region(floor, block, INF, INF, -0.01, 0.01)
+group(floor, nodes, region, floor, all)
+fix(floor, velocity_nodes, floor, NULL, geq0, mu=0.3)
+fix(weight, body_force, all, PUSH, -10)
+fix(v, initial_velocity_particles, all, V0, 0)
+compute(v, average_velocity, all)
+set_output(5)
+log_modify(custom, step, time, v_x, v_y, floor_x, floor_y)
+run_time(0.2)
+"""
+
+
+def scene(method="ulmpm, FLIP, linear, 1", scheme="musl", push=0, v0=1):
+    """A block of 500 kg and 1 m on a floor, under its weight, which sets it swinging."""
+    text = SCENE.replace("METHOD", method).replace("SCHEME", scheme)
+    return text.replace("PUSH", str(push)).replace("V0", str(v0))
+
+
+@pytest.mark.parametrize(
+    "method, scheme",
+    [
+        ("ulmpm, FLIP, linear, 1", "musl"),
+        ("ulmpm, FLIP, cubic-spline, 1", "musl"),
+        ("ulmpm, APIC, quadratic-spline", "musl"),
+        ("tlmpm, FLIP, linear, 0.99", "usl"),
+    ],
+)
+def test_friction_takes_mu_times_what_the_wall_gives(run_interpreted, method, scheme):
+    """While all nodes slide, momentum along the wall falls by mu times what it rises across.
+
+    v_x = v_0 - mu (g t + v_y), whatever the block swings by. A node here and there that sticks
+    while the block swings rubs less: 1 % of the momentum lost; to ten digits logged the force is mu
+    times the reaction in all steps in which none does.
+    """
+    log = run_interpreted(scene(method, scheme)).log
+    lost = MU * (10 * log.Time + log.v_y)
+    assert 1 - log.v_x == pytest.approx(lost, abs=0.01 * lost[-1])
+    ratio = log.floor_x[log.floor_y > 0] / log.floor_y[log.floor_y > 0]
+    assert np.median(ratio) == pytest.approx(-MU, rel=1e-8)
+    assert ratio.min() >= -MU * (1 + 1e-8)
+
+
+def test_a_block_on_a_slope_below_the_angle_of_friction_stays(run_interpreted):
+    """tan = 0.2 < mu: it shears a little, and swings; free, it would be at 0.4 m/s."""
+    log = run_interpreted(scene(push=2, v0=0)).log
+    assert np.abs(log.v_x).max() < 0.05
+    assert log.v_x[-1] < 0.02
+
+
+def test_a_steeper_one_slides(run_interpreted):
+    """v_x = (a - mu g) t, but for what v_y says of the swing, and for nodes that stick at first."""
+    log = run_interpreted(scene(push=6, v0=0)).log
+    exact = 6 * log.Time - MU * (10 * log.Time + log.v_y)
+    assert log.v_x[-1] == pytest.approx(exact[-1], rel=0.04)
+
+
+def test_friction_acts_against_the_motion_in_space(run_interpreted):
+    """Both components fall alike, together by mu times what the wall gives."""
+    text = scene().replace(
+        "dimension(2, -1, 3, 0, 1, 0.25)", "dimension(3, -1, 1, -1, 1, 0, 1, 0.5)"
+    )
+    text = text.replace("block, 0, 1, 0, 0.5", "block, -0.5, 0, -0.5, 0, 0, 0.5")
+    text = text.replace("soft, 0.25", "soft, 0.5").replace(
+        "INF, INF, -0.01", "INF, INF, INF, INF, -0.01"
+    )
+    text = text.replace("NULL, geq0", "NULL, NULL, geq0").replace("0, -10)", "0, 0, -10)")
+    text = text.replace("all, 1, 0)", "all, 1, 1, 0)").replace("v_y, floor_x", "v_y, v_z, floor_x")
+    log = run_interpreted(text.replace("run_time(0.2)", "run_time(0.1)")).log
+    assert log.v_x == pytest.approx(log.v_y, abs=1e-8)
+    lost = MU / np.sqrt(2) * (10 * log.Time + log.v_z)
+    assert 1 - log.v_x == pytest.approx(lost, abs=0.02 * lost[-1])
+
+
+def test_mistakes(run_interpreted):
+    held = scene().replace("NULL, geq0, mu", "0, 0, mu")
+    assert "held in all directions cannot rub" in run_interpreted(held, status=1).err
+    negative = scene().replace("mu=0.3", "mu=-1")
+    assert "a number of at least 0" in run_interpreted(negative, status=1).err
