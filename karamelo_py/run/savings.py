@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.points.laws import Absent, can, plastic_strain
+from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
 from karamelo_py.points.laws.thermoelastic import Thermoelastic
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.regions.cylinder import Cylinder
@@ -114,9 +115,7 @@ def _idle_parts(hub: Hub, simulation: Any) -> Iterator[Saving]:
                 f"the temperature of material {material.id} changes nothing but its column T",
                 "leave the temperature out",
             )
-        numbers = strength._asdict()
-        same = numbers.get("B") == 0 and "C" not in numbers and isinf(numbers.get("Tm", 0))
-        if type(strength).__name__.endswith("JohnsonCook") and same:
+        if isinstance(strength, JohnsonCook) and strength.B == 0 and not any(_factors(strength)):
             yield Saving(
                 f"the strength of {material.id} neither hardens nor depends on rate or heat",
                 f"strength(..., plastic, {strength.G:g}, {strength.A:g})",
@@ -129,9 +128,16 @@ def _yields(strength: NamedTuple) -> bool:
     )
 
 
+def _factors(strength: NamedTuple) -> tuple[bool, bool]:
+    """Whether a strength has factors of the rate and of the temperature."""
+    names = ("rate", "softening")
+    return tuple(not isinstance(getattr(strength, n, Absent()), Absent) for n in names)
+
+
 def _feels_heat(parts: dict[str, Any]) -> bool:
     """Whether the strength, the pressure or the damage depends on the temperature."""
-    softens = not isinf(getattr(parts["strength"], "Tm", np.inf))
+    strength = parts["strength"]
+    softens = _factors(strength)[1] or not isinf(getattr(strength, "Tm", np.inf))
     pressures = getattr(parts["eos"], "thermal", 0), getattr(parts["temperature"], "alpha", 1)
     presses = any(number != 0 for number in pressures)
     damage = parts.get("damage", Absent())
