@@ -142,7 +142,7 @@ def _affine_noise(s: Foreseen) -> Iterator[Failure]:
 def _cell_crossing(s: Foreseen) -> Iterator[Failure]:
     if s.moves and isinstance(s.basis, BernsteinQuadratic):
         yield Failure(
-            "cell crossing",
+            "points that cross cells",
             "the gradients of Bernstein-quadratic functions jump at cell faces, and points that "
             "cross one feel false forces as large as their stress",
             "method tlmpm, or quadratic-spline in the place of the basis",
@@ -153,7 +153,7 @@ def _numerical_fracture(s: Foreseen) -> Iterator[Failure]:
     strain = max(s.impact if len(s.hub.solids) > 1 else 0.0, s.sag)
     if s.moves and isinstance(s.basis, Linear) and s.solids(*ELASTIC) and strain > STRETCH:
         yield Failure(
-            "numerical fracture",
+            "bodies that break without reason",
             f"bodies will strain by about {strain:.1g} (from their speed and weight), and with "
             "linear functions points that lie a cell apart no longer hold together",
             "method tlmpm or ulcpdi, or a spline in the place of the basis",
@@ -163,7 +163,7 @@ def _numerical_fracture(s: Foreseen) -> Iterator[Failure]:
 def _vanishing_domains(s: Foreseen) -> Iterator[Failure]:
     if isinstance(s.basis, CPGIMPDiagonal) and s.turn > TURN:
         yield Failure(
-            "vanishing domains",
+            "boxes in a turn",
             f"bodies will turn by about {s.turn:.2g} rad, and boxes of the size |F_ii| shrink with "
             "the cosine of that",
             "the variant stretch in the place of diagonal",
@@ -178,7 +178,7 @@ def _hourglass(s: Foreseen) -> Iterator[Failure]:
     ]
     if not s.moves and isinstance(s.basis, Linear) and s.d > 1 and single:
         yield Failure(
-            "hourglass",
+            "hourglasses",
             f"one point a cell (solid '{single[0]}') with linear functions that never move feels "
             "no hourglass: its nodes may go to and fro without any force",
             f"{2**s.d} points a cell, or Bernstein-quadratic in the place of the basis",
@@ -188,7 +188,7 @@ def _hourglass(s: Foreseen) -> Iterator[Failure]:
 def _lost_spin(s: Foreseen) -> Iterator[Failure]:
     if isinstance(s.transfer, PIC) and s.turn > TURN:
         yield Failure(
-            "lost angular momentum",
+            "angular momentum",
             "PIC takes a per cent or more of the angular momentum of a turning body in every step",
             "APIC, or FLIP, in the place of PIC",
         )
