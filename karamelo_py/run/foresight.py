@@ -134,7 +134,7 @@ def _affine_noise(s: Foreseen) -> Iterator[Failure]:
         yield Failure(
             "affine noise",
             f"{s.words} with {s.method.basis_name} functions gains energy, since the velocity that "
-            "deforms the points leaves their moments out: by a sixth to a half in a turn in space",
+            "deforms the points leaves their moments out (a disk in space by a sixth in a turn)",
             cure,
         )
 
