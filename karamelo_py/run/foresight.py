@@ -121,7 +121,7 @@ class Foreseen:
             if isinstance(fix, BodyForce) and self.waves > 0:
                 for k, formula in enumerate(fix.formulas[: self.d]):
                     if formula is not None:
-                        g = np.abs(formula.evaluate_points(self.hub.values, x, x)).max()
+                        g = abs(formula.evaluate_points(self.hub.values, x, x).mean())
                         size = max(np.ptp(s.x0[:, k]) for s in self.hub.solids.values())
                         most = max(most, float(g * size / self.waves**2))
         return most
