@@ -193,6 +193,21 @@ def test_xpic_of_the_first_order_is_pic(state_interpreted, scheme):
         assert np.array_equal(array, states[1][name]), name
 
 
+@pytest.mark.parametrize(
+    ("order", "loss"), [(1, 4.08e-2), (2, 2.77e-3), (3, 6.56e-4), (5, 1.91e-4), (10, 4.0e-5)]
+)
+def test_what_xpic_takes_of_the_angular_momentum_in_a_step(run_interpreted, order, loss):
+    """The table of docs/methods.md: a disk with four cells in the radius, linear functions.
+
+    That it falls with the order, and that order 1 is PIC's 1 - sum m |v_pic| r / L, is exact; the
+    numbers are the program's own, for the table.
+    """
+    text = spinning("APIC", 1, h="0.05").replace("set_dt(0.005)", "set_dt(1e-9)")
+    text = text.replace(TRANSFERS["APIC"], f"XPIC, linear, {order}")
+    momentum = run_interpreted(text).log.L_z
+    assert 1 - momentum[1] / momentum[0] == pytest.approx(loss, rel=0.02)
+
+
 def test_flip_nearly_conserves_angular_momentum_and_pic_loses_it(run_interpreted):
     """PIC averages velocities over a cell in each step; FLIP only loses by its lumped masses.
 

@@ -13,50 +13,10 @@ from karamelo_py.kernels.step import ABOVE_LIMIT, SHRUNK
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError
 
 LAST_GOOD = "last_good.*.h5"
-
-
-def warn_about_precision(hub: Hub, simulation: Simulation) -> None:
-    """Say so when single precision cannot hold what a step adds to a position."""
-    if hub.settings.precision != "single":
-        return
-    x, v = np.abs(simulation.x).max(), np.abs(simulation.v).max()
-    step, spacing = float(v) * simulation.dt, float(np.spacing(np.float32(x)))
-    if 0 < step < 16 * spacing:
-        hub.warn(
-            f"a step moves points by {step:.2g} at most, and in single precision positions have "
-            f"a spacing of {spacing:.2g}: motion will be lost to rounding",
-            hint="precision(double), or a domain around the origin",
-        )
-
-
-def warn_about_groups(hub: Hub) -> None:
-    """Say so, once, where the solids have brought no nodes to a group that waited for them."""
-    for group in hub.groups.values():
-        if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
-            group.awaits_solids = False
-            hub.warn(f"group '{group.id}' holds no nodes; {NOTHING_THERE}", place=group.place)
-
-
-def warn_about_step(hub: Hub, simulation: Simulation) -> None:
-    """Say so before the first step when the step is above the stable limit."""
-    update, limit = hub.update, simulation.limit
-    if update.fixed_dt is not None and update.fixed_dt > limit * (1 + 1e-12):
-        hub.warn(
-            f"the step {update.fixed_dt:g} of set_dt is above the stable limit {limit:.4g}: "
-            "the run will most likely blow up, and be stopped then",
-            hint=f"set_dt({0.9 * limit:.3g}) or less, or leave set_dt out",
-        )
-    elif update.fixed_dt is None and update.dt_factor > 1:
-        hub.warn(
-            f"dt_factor {update.dt_factor:g} puts the step above the stable limit {limit:.4g}: "
-            "the run will most likely blow up, and be stopped then",
-            hint="dt_factor(0.9) or less",
-        )
 
 
 def stop(

@@ -14,7 +14,7 @@ from typing import Any
 from karamelo_py.compiler import cache
 from karamelo_py.kernels.step import DONE
 from karamelo_py.output.console import duration
-from karamelo_py.run import diagnosis
+from karamelo_py.run import diagnosis, foresight
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
@@ -78,6 +78,7 @@ class Runner:
         hub.rehearse()
         if hub.checking:
             report(hub, self.end_time)
+            foresight.warn(hub, hub.simulation, self.duration)
             raise Quit
         replay = hub.interpreter.replay
         if replay is not None and not replay.at_end:
@@ -97,6 +98,13 @@ class Runner:
             if name in self.hub.values:
                 self.hub.values.set(name, value)
         self.hub.runs.append(after)
+
+    @property
+    def duration(self) -> float:
+        """How long this run is to be, as far as that is known."""
+        simulation = self.hub.simulation
+        steps = inf if self.steps is None else self.steps * simulation.dt
+        return min(self.end_time - simulation.time, steps)
 
     def _check_condition(self) -> None:
         names = self.condition.names if self.condition is not None else frozenset()
@@ -119,9 +127,7 @@ class Runner:
             simulation.go_on(self.end_time)
         else:
             simulation.begin(self.end_time)
-        diagnosis.warn_about_groups(hub)
-        diagnosis.warn_about_step(hub, simulation)
-        diagnosis.warn_about_precision(hub, simulation)
+        foresight.warn(hub, simulation, self.duration)
         simulation.compile()
         began = simulation.step
         self._banner(simulation, going_on)

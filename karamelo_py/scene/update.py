@@ -39,6 +39,8 @@ class Update:
         Where the script says so.
     warned_of_bounces
         Whether the user knows that points were reflected.
+    foreseen
+        Names of the failures that the user was warned of.
     """
 
     remembers = ("warned_of_bounces",)
@@ -56,6 +58,7 @@ class Update:
         self.boundary = "error"
         self.boundary_place: Place | None = None
         self.warned_of_bounces = False
+        self.foreseen: set[str] = set()
 
     @property
     def words(self) -> str:

@@ -136,8 +136,7 @@ class Method:
                 f"and {registry.name_of('scheme', type(scheme))} is unstable: D of the affine "
                 "transfers vanishes at nodes, and there the moments push where there is next to no "
                 "mass",
-                hint="scheme(musl), or TPIC in the place of the transfer, or quadratic-spline in "
-                "that of the basis, or method tlmpm",
+                hint="scheme(musl), or quadratic-spline in the place of the basis, or method tlmpm",
             )
 
 

@@ -1,0 +1,307 @@
+"""What is known to fail before it runs: combinations, with the reason and the cure.
+
+A rule looks at a scene that is about to run and says what will go wrong, by the name that the
+documentation has for the failure. `karamelo-py check` tells it, and a run before its first step,
+once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.language import registry
+from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
+from karamelo_py.points.basis.cpgimp import CPGIMPDiagonal
+from karamelo_py.points.basis.linear import Linear
+from karamelo_py.points.laws import law_kind
+from karamelo_py.points.laws.eos.ideal_gas import IdealGas
+from karamelo_py.points.laws.eos.shock import Shock
+from karamelo_py.points.laws.linear import LinearElastic
+from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.thermoelastic import Thermoelastic
+from karamelo_py.points.transfers import Moment
+from karamelo_py.points.transfers.asflip import ASFLIP
+from karamelo_py.points.transfers.flip import FLIP
+from karamelo_py.points.transfers.pic import PIC
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.styles.fixes.body_force import BodyForce
+
+TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
+STRETCH = 0.3  # strain beyond which one is said to stretch
+ELASTIC = LinearElastic, NeoHookean, Thermoelastic
+
+
+class Failure(NamedTuple):
+    """What will go wrong, why, and what to write instead."""
+
+    name: str
+    reason: str
+    cure: str
+    place: Any = None
+
+
+class Foreseen:
+    """A scene before a run of `duration`: what rules ask of it."""
+
+    def __init__(self, hub: Hub, simulation: Simulation, duration: float):
+        self.hub, self.simulation = hub, simulation
+        # A run that a condition ends takes some hundred steps at least.
+        self.duration = duration if isfinite(duration) else 300 * simulation.dt
+        update = hub.update
+        self.transfer, self.method, self.scheme = update.transfer, update.method, update.scheme
+        self.basis = update.method.basis
+        self.moves = update.method.frame.moves
+        self.d = hub.domain.dimension
+        self.words = registry.name_of("transfer", type(self.transfer))
+
+    def solids(self, *laws: type) -> list[Any]:
+        """The solids with one of these laws, or parts of laws."""
+        return [s for s in self.hub.solids.values() if set(law_kind(s.material.law)) & set(laws)]
+
+    @property
+    def vanishing(self) -> bool:
+        """Whether points move through places at which D of the affine transfers vanishes."""
+        return self.moves and not self.basis.steady_moment
+
+    @cached_property
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N, d) positions and velocities of the points that there are."""
+        here = self.simulation.present
+        return self.simulation.x[here], self.simulation.v[here]
+
+    @cached_property
+    def turn(self) -> float:
+        """The angle by which the solid that turns most would turn in this run, if none held it."""
+        if self.d == 1 or self.hub.domain.axisymmetric:
+            return 0.0
+        largest = 0.0
+        mass, present = self.simulation.mass, self.simulation.present
+        for k in range(len(self.hub.solids)):
+            of = present & (self.simulation.solid_of == k)
+            m = mass[of][:, None]
+            if m.sum() > 0:
+                x, v = (
+                    np.pad(a[of] - (m * a[of]).sum(axis=0) / m.sum(), ((0, 0), (0, 3 - self.d)))
+                    for a in (self.simulation.x, self.simulation.v)
+                )
+                inertia = (m * x**2).sum()
+                spin = np.linalg.norm((m * np.cross(x, v)).sum(axis=0))
+                largest = max(largest, spin / inertia if inertia > 0 else 0.0)
+        return largest * self.duration
+
+    @cached_property
+    def waves(self) -> float:
+        """The speed of waves."""
+        return float(self.simulation.setup.control.clock[0].rate - np.abs(self.motion[1]).max())
+
+    @cached_property
+    def speed(self) -> float:
+        """The largest component of a velocity over the speed of waves."""
+        return float(np.abs(self.motion[1]).max()) / self.waves if self.waves > 0 else 0.0
+
+    @cached_property
+    def impact(self) -> float:
+        """Half of the largest difference of velocities over the speed of waves."""
+        apart = np.ptp(self.motion[1], axis=0).max() / 2
+        return float(apart) / self.waves if self.waves > 0 else 0.0
+
+    @cached_property
+    def sag(self) -> float:
+        """The strain of a solid under its own weight, g L / c^2."""
+        x, _ = self.motion
+        most = 0.0
+        for fix in self.hub.fixes.values():
+            if isinstance(fix, BodyForce) and self.waves > 0:
+                for k, formula in enumerate(fix.formulas[: self.d]):
+                    if formula is not None:
+                        g = abs(formula.evaluate_points(self.hub.values, x, x).mean())
+                        size = max(np.ptp(s.x0[:, k]) for s in self.hub.solids.values())
+                        most = max(most, float(g * size / self.waves**2))
+        return most
+
+
+def _affine_noise(s: Foreseen) -> Iterator[Failure]:
+    if not s.vanishing or Moment not in getattr(s.transfer, "point_fields", ()):
+        return
+    cure = "quadratic-spline in the place of the basis, or method tlmpm"
+    if not s.transfer.inverts_spread:
+        yield Failure(
+            "affine noise",
+            f"{s.words} with {s.method.basis_name} functions grows in a body that drifts, at any "
+            "step and with every scheme: turned inside out after a few dozen steps",
+            cure,
+        )
+    elif s.d == 3 or hasattr(s.transfer, "alpha"):
+        yield Failure(
+            "affine noise",
+            f"{s.words} with {s.method.basis_name} functions gains energy, since the velocity that "
+            "deforms the points leaves their moments out (a disk in space by a sixth in a turn)",
+            cure,
+        )
+
+
+def _cell_crossing(s: Foreseen) -> Iterator[Failure]:
+    if s.moves and isinstance(s.basis, BernsteinQuadratic):
+        yield Failure(
+            "points that cross cells",
+            "the gradients of Bernstein-quadratic functions jump at cell faces, and points that "
+            "cross one feel false forces as large as their stress",
+            "method tlmpm, or quadratic-spline in the place of the basis",
+        )
+
+
+def _numerical_fracture(s: Foreseen) -> Iterator[Failure]:
+    strain = max(s.impact if len(s.hub.solids) > 1 else 0.0, s.sag)
+    if s.moves and isinstance(s.basis, Linear) and s.solids(*ELASTIC) and strain > STRETCH:
+        yield Failure(
+            "bodies that break without reason",
+            f"bodies will strain by about {strain:.1g} (from their speed and weight), and with "
+            "linear functions points that lie a cell apart no longer hold together",
+            "method tlmpm or ulcpdi, or a spline in the place of the basis",
+        )
+
+
+def _vanishing_domains(s: Foreseen) -> Iterator[Failure]:
+    if isinstance(s.basis, CPGIMPDiagonal) and s.turn > TURN:
+        yield Failure(
+            "boxes in a turn",
+            f"bodies will turn by about {s.turn:.2g} rad, and boxes of the size |F_ii| shrink with "
+            "the cosine of that",
+            "the variant stretch in the place of diagonal",
+        )
+
+
+def _hourglass(s: Foreseen) -> Iterator[Failure]:
+    single = [
+        solid.id
+        for solid in s.hub.solids.values()
+        if 2 * np.max(solid.half_size) > 0.75 * solid.h  # one point a cell
+    ]
+    if not s.moves and isinstance(s.basis, Linear) and s.d > 1 and single:
+        yield Failure(
+            "hourglasses",
+            f"one point a cell (solid '{single[0]}') with linear functions that never move feels "
+            "no hourglass: its nodes may go to and fro without any force",
+            f"{2**s.d} points a cell, or Bernstein-quadratic in the place of the basis",
+        )
+
+
+def _lost_spin(s: Foreseen) -> Iterator[Failure]:
+    if isinstance(s.transfer, PIC) and s.turn > TURN:
+        yield Failure(
+            "angular momentum",
+            "PIC takes a per cent or more of the angular momentum of a turning body in every step",
+            "APIC, or FLIP, in the place of PIC",
+        )
+
+
+def _loose_points(s: Foreseen) -> Iterator[Failure]:
+    solids = s.solids(*ELASTIC)
+    if isinstance(s.transfer, ASFLIP) and s.moves and solids:
+        yield Failure(
+            "loose points",
+            f"ASFLIP moves points apart where they are not pressed together, and solid "
+            f"'{solids[0].id}' bears tension: its points lose their places (two rings that bounce "
+            "lose half of their energy)",
+            "AFLIP in the place of ASFLIP",
+        )
+
+
+def _lost_heat(s: Foreseen) -> Iterator[Failure]:
+    gases = s.solids(IdealGas)
+    flip = isinstance(s.transfer, FLIP) and s.transfer.alpha > 0.99
+    if gases and not flip:
+        yield Failure(
+            "lost heat",
+            f"the kinetic energy that {s.words} takes does not heat the gas of solid "
+            f"'{gases[0].id}': strong shocks lag behind (the front of a blast by a tenth)",
+            "FLIP with 1, and artificial viscosity",
+        )
+
+
+def _fast_shocks(s: Foreseen) -> Iterator[Failure]:
+    flip = isinstance(s.transfer, FLIP) and s.transfer.alpha > 0.99
+    spline = not isinstance(s.basis, Linear)
+    if s.moves and not (spline and not flip) and s.solids(Shock) and s.speed > 0.6:
+        yield Failure(
+            "fast shocks",
+            f"points move at {s.speed:.2g} times the speed of waves, and {s.words} with "
+            f"{s.method.basis_name} functions carries such a shock 1 to 3 % too fast",
+            "method(ulmpm, TPIC, quadratic-spline)",
+        )
+
+
+RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
+    _affine_noise,
+    _cell_crossing,
+    _numerical_fracture,
+    _vanishing_domains,
+    _hourglass,
+    _lost_spin,
+    _loose_points,
+    _lost_heat,
+    _fast_shocks,
+)
+
+
+def warn(hub: Hub, simulation: Simulation, duration: float) -> None:
+    """Tell what will go wrong in a run of `duration`; each failure once in a script."""
+    _warn_about_groups(hub)
+    _warn_about_step(hub, simulation)
+    _warn_about_precision(hub, simulation)
+    scene = Foreseen(hub, simulation, duration)
+    for rule in RULES:
+        for failure in rule(scene):
+            if failure.name not in hub.update.foreseen:
+                hub.update.foreseen.add(failure.name)
+                hub.warn(
+                    f"{failure.name}: {failure.reason}",
+                    place=failure.place or hub.update.method.place,
+                    hint=failure.cure,
+                )
+
+
+def _warn_about_precision(hub: Hub, simulation: Simulation) -> None:
+    """Say so when single precision cannot hold what a step adds to a position."""
+    if hub.settings.precision != "single":
+        return
+    x, v = np.abs(simulation.x).max(), np.abs(simulation.v).max()
+    step, spacing = float(v) * simulation.dt, float(np.spacing(np.float32(x)))
+    if 0 < step < 16 * spacing:
+        hub.warn(
+            f"a step moves points by {step:.2g} at most, and in single precision positions have "
+            f"a spacing of {spacing:.2g}: motion will be lost to rounding",
+            hint="precision(double), or a domain around the origin",
+        )
+
+
+def _warn_about_groups(hub: Hub) -> None:
+    """Say so, once, where the solids have brought no nodes to a group that waited for them."""
+    for group in hub.groups.values():
+        if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
+            group.awaits_solids = False
+            hub.warn(f"group '{group.id}' holds no nodes; {NOTHING_THERE}", place=group.place)
+
+
+def _warn_about_step(hub: Hub, simulation: Simulation) -> None:
+    """Say so before the first step when the step is above the stable limit."""
+    update, limit = hub.update, simulation.limit
+    if update.fixed_dt is not None and update.fixed_dt > limit * (1 + 1e-12):
+        hub.warn(
+            f"the step {update.fixed_dt:g} of set_dt is above the stable limit {limit:.4g}: "
+            "the run will most likely blow up, and be stopped then",
+            hint=f"set_dt({0.9 * limit:.3g}) or less, or leave set_dt out",
+        )
+    elif update.fixed_dt is None and update.dt_factor > 1:
+        hub.warn(
+            f"dt_factor {update.dt_factor:g} puts the step above the stable limit {limit:.4g}: "
+            "the run will most likely blow up, and be stopped then",
+            hint="dt_factor(0.9) or less",
+        )

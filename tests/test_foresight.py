@@ -1,0 +1,125 @@
+"""What is known to fail is told before the first step, with its cure."""
+
+from __future__ import annotations
+
+import pytest
+from conftest import INPUTS
+
+from karamelo_py.app.cli import main
+
+SCENE = """
+    method({method})
+    dimension(2, 0, 12, 0, 8, 1)
+    region(left, block, 2, 5, 2, 5)
+    region(right, block, 7, 10, 2, 5)
+    eos(air, ideal-gas, 1, 1.4, p=1)
+    eos(metal, shock, 1, 1, 1, 1.5, 0, 1, 0, 2, 0.2)
+    strength(none, fluid, 0)
+    material(rubber, neo-hookean, 1, 1, 0.3)
+    material(air, eos-strength, air, none)
+    material(metal, eos-strength, metal, none)
+    solid(left, region, left, {ppc}, {law}, 1, 0)
+    solid(right, region, right, {ppc}, {law}, 1, 0)
+    group(left, particles, region, left, all)
+    group(right, particles, region, right, all)
+    fix(u, initial_velocity_particles, left, {u})
+    fix(v, initial_velocity_particles, right, {v})
+    {more}
+    set_dt(0.01)
+    run({steps})
+"""
+QUIET = {
+    "method": "ulmpm, FLIP, quadratic-spline, 1", "ppc": 2, "law": "rubber", "u": "0, 0",
+    "v": "0, 0", "more": "", "steps": 1,
+}  # fmt: skip
+FAILURES = {
+    "affine noise": [
+        ({"method": "ulmpm, TPIC, linear"}, {"method": "ulmpm, TPIC, quadratic-spline"}),
+        (
+            {"method": "ulmpm, FLIP, linear, 1, gradient-enhanced"},
+            {"method": "tlmpm, TPIC, linear"},
+        ),
+        ({"method": "ulmpm, AFLIP, linear, 1"}, {"method": "ulmpm, APIC, linear"}),
+    ],
+    "points that cross cells": [
+        (
+            {"method": "ulmpm, FLIP, Bernstein-quadratic, 1"},
+            {"method": "tlmpm, FLIP, Bernstein-quadratic, 1"},
+        )
+    ],
+    "bodies that break without reason": [
+        ({"method": "ulmpm, FLIP, linear, 1", "v": "-1, 0"}, {"v": "-1, 0"}),
+        ({"method": "ulmpm, FLIP, linear, 1", "more": "fix(g, body_force, all, 0, -0.2)"}, {}),
+        (
+            {"method": "ulmpm, FLIP, linear, 1", "v": "-1, 0"},
+            {"method": "ulmpm, FLIP, linear, 1", "v": "-0.1, 0"},
+        ),
+    ],
+    "boxes in a turn": [
+        (
+            {"method": "ulmpm, FLIP, cpgimp, 1, diagonal", "u": "50*(3.5 - y), 50*(x - 3.5)"},
+            {"method": "ulmpm, FLIP, cpgimp, 1, stretch", "u": "50*(3.5 - y), 50*(x - 3.5)"},
+        ),
+        (
+            {"method": "ulmpm, FLIP, cpgimp, 1, diagonal", "u": "50*(3.5 - y), 50*(x - 3.5)"},
+            {"method": "ulmpm, FLIP, cpgimp, 1, diagonal", "u": "50*(x - 3.5), 0"},
+        ),
+    ],
+    "hourglasses": [
+        (
+            {"method": "tlmpm, FLIP, linear, 1", "ppc": 1},
+            {"method": "tlmpm, FLIP, linear, 1", "ppc": 2},
+        ),
+        (
+            {"method": "tlmpm, FLIP, linear, 1", "ppc": 1},
+            {"method": "tlmpm, FLIP, Bernstein-quadratic, 1", "ppc": 1},
+        ),
+    ],
+    "angular momentum": [
+        (
+            {"method": "ulmpm, PIC, quadratic-spline", "u": "50*(3.5 - y), 50*(x - 3.5)"},
+            {"method": "ulmpm, APIC, quadratic-spline", "u": "50*(3.5 - y), 50*(x - 3.5)"},
+        )
+    ],
+    "loose points": [
+        (
+            {"method": "ulmpm, ASFLIP, quadratic-spline, 1"},
+            {"method": "ulmpm, AFLIP, quadratic-spline, 1"},
+        )
+    ],
+    "lost heat": [
+        ({"law": "air", "method": "ulmpm, TPIC, quadratic-spline"}, {"law": "air"}),
+        (
+            {"law": "air", "method": "ulmpm, FLIP, quadratic-spline, 0.9"},
+            {"method": "ulmpm, FLIP, quadratic-spline, 0.9"},
+        ),
+    ],
+    "fast shocks": [
+        (
+            {"law": "metal", "method": "ulmpm, FLIP, linear, 1", "v": "-1, 0"},
+            {"law": "metal", "method": "ulmpm, TPIC, quadratic-spline", "v": "-1, 0"},
+        )
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "fails", "cured"),
+    [(name, *pair) for name, pairs in FAILURES.items() for pair in pairs],
+)
+def test_a_failure_is_told_and_its_cure_is_not(run_interpreted, name, fails, cured):
+    said = run_interpreted(SCENE.format(**(QUIET | fails))).err
+    assert f"warning: {name}: " in said
+    assert "hint: " in said
+    assert f"{name}: " not in run_interpreted(SCENE.format(**(QUIET | cured))).err
+
+
+def test_each_failure_is_told_once(run_interpreted):
+    script = SCENE.format(**(QUIET | {"method": "ulmpm, TPIC, linear"})) + "\n    run(1)\n"
+    assert run_interpreted(script).err.count("affine noise") == 1
+
+
+def test_check_tells_too(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["check", str(INPUTS / "in.spinning_disk"), "-var", "transfer", "PIC"]) == 0
+    assert "angular momentum: " in capsys.readouterr().err
