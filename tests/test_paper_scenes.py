@@ -35,13 +35,13 @@ def test_billet(run_interpreted):
 
 def test_cold_spray(run_interpreted):
     """All energy is kinetic, stored or spent; the ball is flattened, warm, and stops."""
-    result = tiny(run_interpreted, "cold_spray_axisymmetric", refine=0.3, ppc=1, T=8e-9)
+    result = tiny(run_interpreted, "cold_spray_axisymmetric", refine=0.3, ppc=1, T=16e-9)
     log = result.log
     total = log.kinetic + log.spent + log.stored
     # FLIP 0.99 takes a hundredth of what differs between points and grid in each step.
-    assert 0.9 < total[-1] / total[0] < 1.02
-    assert log.kinetic[-1] < 0.95 * log.kinetic[0]
-    assert -500 < log.drift_y[-1] < -350
+    assert 0.88 < total[-1] / total[0] < 1.02
+    assert log.kinetic[-1] < 0.75 * log.kinetic[0]
+    assert log.drift_y[-1] > -420
     assert 310 < log.flat_Tmax[-1] < 600
     # Adiabatic: cp times the rise is 0.9 of the plastic work; viscous work makes no heat.
     last = result.snapshots("cold_spray_axisymmetric")[-1]
