@@ -45,16 +45,21 @@ def scene(name: str) -> ModuleType:
 
 
 def runner(name: str, folder: Path, size: dict[str, Any]) -> Callable[..., Result]:
-    """``run(**variables)`` for a scene: the script by the command line, in a folder of its own."""
+    """``run(**variables)`` for a scene: the script by the command line, in a folder of its own.
 
-    def run(**variables: Any) -> Result:
+    ``run(scene=...)`` runs another one, to compare with.
+    """
+
+    def run(scene: str = name, **variables: Any) -> Result:
         words = {**size, **variables}
-        place = folder / "_".join([name, *(f"{k}={v}" for k, v in words.items())]).replace("/", "-")
+        place = folder / "_".join([scene, *(f"{k}={v}" for k, v in words.items())]).replace(
+            "/", "-"
+        )
         rmtree(place, ignore_errors=True)  # a longer run before may have left later snapshots
         place.mkdir(parents=True)
         options = [part for k, v in words.items() for part in ("-var", k, str(v))]
         command = [sys.executable, "-m", "karamelo_py.app.cli"]
-        command += [str(INPUTS / f"in.{name}"), *options]
+        command += [str(INPUTS / f"in.{scene}"), *options]
         done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
         if done.returncode:
             sys.exit(f"{' '.join(command[3:])}\n{done.stderr}")

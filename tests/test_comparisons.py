@@ -12,13 +12,14 @@ from comparisons.row import Row
 
 def found(run_script, name: str, full: bool) -> list[Row]:
     """The rows of a scene, run in this process."""
-    size = {} if full else scene(name).SMALL
+    comparison = scene(name)
+    size = {} if full else comparison.SMALL
 
-    def run(**variables):
-        return run_scene(run_script, name, None, **{**size, **variables})
+    def run(scene=name, **variables):
+        return run_scene(run_script, scene, None, **{**size, **variables})
 
     figure, axes = plt.subplots()
-    rows = list(scene(name).compare(run, axes, full))
+    rows = list(comparison.compare(run, axes, full))
     plt.close(figure)
     return rows
 

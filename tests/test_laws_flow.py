@@ -301,3 +301,34 @@ def _advanced(tables, states, dl):
         advance(record(tables[2], 0), Space(), states[2], dl, 1e-3),
         advance(record(tables[3], 0), Space(), states[3], dl, 1e-3),
     )
+
+
+def test_a_scene_of_a_formula_and_curves(run_interpreted):
+    """In single precision, with a table of curves of different lengths: all say the same line."""
+    laws = {
+        "f": "formula, 80, 0.4 + 0.5*ep",
+        "t": "tabulated, 80, 0, 0.4, 1, 0.9",
+        "u": "tabulated, 80, 0, 0.4, 0.5, 0.65, 1, 0.9",
+        "p": "plastic, 80, 0.4, 0.5",
+    }
+    lines = ["precision(single)", "method(ulmpm, FLIP, linear, 1)",
+             "dimension(2, 0, 0.5, 0, 0.3, 0.1)", "eos(bulk, linear, 8, 160)"]  # fmt: skip
+    for k, (name, law) in enumerate(laws.items()):
+        lines += [
+            f"region({name}, block, 0.1*{k}, 0.1*{k + 1}, 0.1, 0.2)",
+            f"strength({name}, {law})",
+            f"material({name}, eos-strength, bulk, {name})",
+            f"solid({name}, region, {name}, 1, {name}, 0.1)",
+        ]
+    lines += [
+        "region(everywhere, block, INF, INF, INF, INF)",
+        "group(nodes, nodes, region, everywhere, all)",
+        "fix(pull, velocity_nodes, nodes, x0, 0)",
+        "dump(end, all, particle, 1000, end.*.LAMMPS, ep, s11)",
+        "set_dt(0.001)",
+        "run(20)",
+    ]
+    end = run_interpreted("\n".join(lines)).dump("end.20.LAMMPS")
+    assert end.ep[0] > 0.005
+    assert end.ep == pytest.approx(end.ep[3], rel=1e-5)
+    assert end.s11 == pytest.approx(end.s11[3], rel=1e-5)

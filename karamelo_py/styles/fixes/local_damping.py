@@ -9,6 +9,7 @@ from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, node_hook
 from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.methods.ulmpm_contacts import ULMPMContacts
 
 
 def brake(mass, v, v_star, force, value, before, dt, share):
@@ -47,6 +48,10 @@ class LocalDamping(Fix):
     constant speed, are not braked, and their reactions are those of the scene. Publishes the sum of
     what it adds as ID_x, ID_y, ID_z.
 
+    In method ulmpm/contacts it acts before solids push each other, so that bodies in contact stick
+    like by friction, anywhere between 1 - alpha and 1 + alpha of the load: there alpha has to go
+    to 0, as 0.8*max(1 - time/T, 0) does.
+
     See Also
     --------
     body_force, edge_traction, run_while
@@ -61,3 +66,13 @@ class LocalDamping(Fix):
         super().__init__(hub, group)
         share = alpha if isinstance(alpha, Expression) else Expression(alpha)
         self.formulas = (share,) * hub.domain.dimension
+
+    def defined(self) -> None:
+        """Warn where rest would not be that without damping."""
+        alpha = self.formulas[0]
+        lasts = alpha.is_constant and alpha.constant > 0
+        if lasts and isinstance(self.hub.update.method, ULMPMContacts):
+            self.hub.warn(
+                "bodies that touch come to rest anywhere near their balance while damping acts",
+                hint="an alpha that goes to 0: 0.8*max(1 - time/T, 0)",
+            )

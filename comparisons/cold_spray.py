@@ -1,0 +1,45 @@
+"""Copper ball on copper at 500 m/s, a quarter in space: strain and heat beside axisymmetry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from comparisons.row import Row
+
+SOURCE = "in.cold_spray_axisymmetric"
+SAME = {"ppc": 2, "refine": 25 / 40}  # cells of 1.6 um, too
+ENERGY = 2 / 3 * np.pi * 10e-6**3 * 8960 * 500**2 * 1e9  # of the ball at first, in nJ
+SMALL = None  # tests/test_paper_scenes.py runs it axisymmetric
+
+
+def weighted(points, column, of):
+    """Mean over the points of a solid by mass."""
+    there = points.type == of
+    return np.average(points[column][there], weights=points.mass[there])
+
+
+def compare(run, axes, full):
+    """Mean and largest plastic strain and temperature, shape, energies."""
+    plane, space = run(scene="cold_spray_axisymmetric", **SAME), run()
+    flat, solid = plane.log, space.log
+    a = plane.snapshots("cold_spray_axisymmetric")[-1]
+    b = space.snapshots("cold_spray")[-1]
+    for column, name, zero in (
+        ("ep", "plastic strain", 0.0),
+        ("T", "rise of temperature (K)", 298.0),
+    ):
+        there, here = weighted(a, column, 2) - zero, weighted(b, column, 2) - zero
+        yield Row(f"mean {name} of the ball", there, here, 0.05, SOURCE)
+    yield Row("largest plastic strain", flat.worst_Epmax[-1], solid.worst_Epmax[-1], 0.25, SOURCE)
+    rise = flat.flat_Tmax[-1] - 298
+    yield Row("largest rise of temperature (K)", rise, solid.flat_Tmax[-1] - 298, 0.1, SOURCE)
+    yield Row("top above the block (um)", flat.height[-1], solid.height[-1], 0.05, SOURCE)
+    yield Row("plastic work (nJ)", flat.spent[-1], solid.spent[-1], 0.05, SOURCE)
+    for log, what in ((flat, "axisymmetric"), (solid, "in space")):
+        # The transfer loses a hundredth of what differs between points and grid in each step.
+        total = (log.kinetic[-1] + log.spent[-1] + log.stored[-1]) / ENERGY
+        yield Row(f"energy at the end over that at first, {what}", (0.85, 1), total, 0.0, "balance")
+    r = np.hypot(b.x, b.y)
+    axes.scatter(1e6 * a.x, 1e6 * a.y, c=a["T"], s=0.5, vmin=298, vmax=500)
+    axes.scatter(-1e6 * r, 1e6 * b.z, c=b["T"], s=0.1, vmin=298, vmax=500)
+    axes.set(xlabel="in space | axisymmetric, radius (um)", ylabel="height (um)", aspect="equal")

@@ -1,0 +1,47 @@
+"""Tool that cuts steel at 50 m/s: force of the cut beside Merchant's, energy, chip."""
+
+from __future__ import annotations
+
+from math import atan, cos, pi, sin, sqrt
+
+import numpy as np
+
+from comparisons.row import Row
+
+YIELD = 0.98  # GPa, at first
+HARD = 0.98 + 2.0 * 0.85**0.83  # at the strain at which it breaks in shear, 0.05 + 0.8
+SMALL = None  # tests/test_paper_scenes.py runs it
+
+
+def merchant(stress, rake):
+    """Force over the area of the cut without friction, `stress` von Mises' (Merchant 1945).
+
+    tau cos(rake) / (sin(phi) cos(phi - rake)), on the plane phi = 45 degrees + rake/2 least.
+    """
+    angle = atan(rake)
+    phi = pi / 4 + angle / 2
+    return stress / sqrt(3) * cos(angle) / (sin(phi) * cos(phi - angle))
+
+
+def compare(run, axes, full):
+    """The published grid takes an hour: a quarter of it, and half of it in full."""
+    for refine in (1 / 4, 1 / 2) if full else (1 / 4,):
+        result = run(refine=refine, T=5e-6)
+        log = result.log
+        cells = f", {320 * refine:.0f} cells"
+        cutting = log.Time > 1e-6
+        force = -log.force[cutting].mean()
+        ends = merchant(YIELD, 0.1), merchant(HARD, 0.1)
+        yield Row(f"cutting force (GPa){cells}", ends, force, 0.1, "Merchant 1945")
+        work = np.trapezoid(-log.force * 1e9 * 0.15e-3 * 50, log.Time)
+        spent = (log.Ek[-1] + log.Es[-1] + log.lost[-1]) / work
+        yield Row(f"energy over work of the tool{cells}", (0.7, 1.0), spent, 0.05, "balance")
+        last = result.snapshots("machining")[-1]
+        cut = (last.y0 > 0.1e-3) & (last.x0 > 1e-3 - 50 * 5e-6)
+        broken = np.average(last.damage[cut] > 0.99, weights=last.mass[cut])
+        yield Row(f"broken share of what was cut{cells}", (0.02, 1), broken, 0.0, "chips come off")
+        below = last.y0 < 0.05e-3
+        deep = np.average(last.damage[below] > 0.99, weights=last.mass[below])
+        yield Row(f"broken share deep below the cut{cells}", 0.0, deep, 0.01, "the piece holds")
+    axes.scatter(1e3 * last.x, 1e3 * last.y, c=last.ep, s=1, vmax=2)
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal", xlim=(0, 1.2), ylim=(0, 0.6))
