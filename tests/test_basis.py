@@ -34,6 +34,7 @@ from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import along
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
+from karamelo_py.points.basis.surface import ENTRIES, profile, surface_table
 from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import Axisymmetric, Line, diagonal
@@ -456,3 +457,22 @@ def after_box(basis, kin, grid, place, dl):
                 u = scale(weight, diagonal(kin, dl))
                 new = carry(basis, kin, new, place, corner, u)
     return new
+
+
+@pytest.mark.parametrize("basis", [Linear(), QuadraticSpline(), CubicSpline()], ids=str)
+@pytest.mark.parametrize("half", [0.5, 0.25, 1 / 6])
+def test_the_surface_of_a_body_follows_from_the_mean_place_of_its_points(basis, half):
+    """Layers of points below a plane surface, at random distances from the node: to 1 % of a cell.
+
+    From where the node sees the first layer to half of its reach: once the body fills that, its
+    mean place tells nothing.
+    """
+    table = surface_table(basis, half)
+    x, weights = profile(basis, half)
+    reach = np.abs(x[weights > 1e-9]).max()
+    for place in np.random.default_rng(1).uniform(half - reach + 0.05, reach / 2, 20):
+        layers = place - half - 2 * half * np.arange(20)
+        seen = np.interp(layers, x, weights)
+        mean = (seen * layers).sum() / seen.sum()
+        found = np.interp(mean, np.arange(len(table)) / ENTRIES - 3, table)
+        assert found == pytest.approx(place, abs=0.01)

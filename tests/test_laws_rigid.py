@@ -24,7 +24,7 @@ fix(v, initial_velocity_particles, tool, 0.5, 0, NULL)
 compute(va, average_velocity, tool)
 compute(vb, average_velocity, block)
 dump(end, all, particle, 100000, end.*.LAMMPS, x, x0, vx, vy, s11, volume, ienergy)
-log_modify(custom, step, time, va_x, vb_x)
+log_modify(custom, step, time, va_x, vb_x, ContactForce_a_x, ContactTorque_a_z)
 run_time(3)
 """
 
@@ -43,6 +43,9 @@ def test_a_tool_pushes_a_block(run_interpreted, method):
     assert last.x[tool] == pytest.approx(last.x0[tool] + 1.25, rel=1e-8)
     assert last.s11[tool].tolist() == [0] * 16 and last.ienergy[tool].tolist() == [0] * 16
     assert last.volume[tool] == pytest.approx(np.full(16, 1 / 16))
+    # The force acts at half of the height, and pushes the tool back.
+    force, torque = result.log.ContactForce_a_x, result.log.ContactTorque_a_z
+    assert force.min() < -0.1 and torque == pytest.approx(-force / 2, abs=1e-9)
     assert result.log.vb_x.max() > 0.45 and last.x[~tool].min() > last.x[tool].max() - 0.05
 
 
