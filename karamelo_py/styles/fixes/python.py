@@ -39,8 +39,14 @@ class PythonFunction:
                 place=argument.place,
                 expected="module.function, of a module beside the script or an installed one",
             )
-        sys.path.insert(0, str(hub.interpreter.folder.absolute()))
+        folder = hub.interpreter.folder.absolute()
+        sys.path.insert(0, str(folder))
         try:
+            # Another script of this process may have had a module of this name beside it.
+            known = sys.modules.get(module)
+            if known is not None and (folder / f"{module}.py").is_file():
+                if getattr(known, "__file__", None) != str(folder / f"{module}.py"):
+                    del sys.modules[module]
             found = import_module(module)
         except Exception as error:  # a module may fail in any way
             raise ScriptError(
