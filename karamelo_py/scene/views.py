@@ -413,3 +413,22 @@ class PieceView(PointsView):
     def position(self) -> np.ndarray:
         """(n, d) positions; read only."""
         return self._gather(self._place)
+
+    def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
+        """See `PointsView.set_velocity_gradient`."""
+        simulation, points, rows = self._simulation, self._block.points, self._rows
+        s, d = simulation.setup, simulation.setup.kin.dimension
+        kept = field(points.fields, Moment)
+        if kept is None:
+            return
+        step = simulation.hub.domain.h / 16
+        given = np.zeros((d * d, len(rows)), kept.dtype)
+        here = slice(component * d, component * d + d)
+        given[here] = np.nan_to_num(gradient(s.frame.moves, step)).T
+        if not s.transfer.keeps_gradient:
+            places = points.x[simulation.now] if points.home is None else points.home
+            where = np.ascontiguousarray(places[:, rows])
+            moment = np.zeros_like(given)
+            export_velocity_moment(s.basis, s.kin, s.grids, points.grid[rows], where, given, moment)
+            given = moment
+        kept[here, rows] = given[here]
