@@ -41,6 +41,17 @@ def compare(run, axes, full):
     yield Row("distance of the slip surfaces (m)", 0.0, distance(FAILURE, still), 2.5, SOURCE)
     # A slice that turns like a rigid body slips on a circle (Fellenius 1936).
     yield Row("distance from a circle over radius", 0.0, roundness(still), 0.01, "rotation")
+    if full:
+        # Nothing of this is published: softening widens the slide, and leaves it where it was.
+        soft = run(c_residual=8e3).snapshots("slump")[-1]
+        further = soft.x[soft.y > GROUND + 0.6].max() / last.x[slid].max()
+        yield Row(
+            "toe with cohesion that falls to 8 kPa, over that", (1, 1.1), further, 0.0, "softer"
+        )
+        line = slip(soft)
+        name = "distance of the slip surfaces with it (m)"
+        yield Row(name, 0.0, distance(FAILURE, line), 2.5, SOURCE)
+        axes.plot(*line.T, "C2", lw=0.8, label="the same, softening")
     axes.scatter(last.x, last.y, s=0.3, c=np.minimum(last.ep, 1), cmap="Greys")
     axes.plot(*top.T, "C0", label="computed surface")
     axes.plot(*still.T, "C1", label="computed: moved by less than 2 m")
