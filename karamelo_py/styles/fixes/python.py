@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -19,6 +20,10 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError, nearest
 
 MOMENTS = tuple(STAGES)
+
+
+def _is_of(module: Any, path: Path) -> bool:
+    return module is not None and getattr(module, "__file__", None) == str(path)
 
 
 class PythonFunction:
@@ -43,10 +48,9 @@ class PythonFunction:
         sys.path.insert(0, str(folder))
         try:
             # Another script of this process may have had a module of this name beside it.
-            known = sys.modules.get(module)
-            if known is not None and (folder / f"{module}.py").is_file():
-                if getattr(known, "__file__", None) != str(folder / f"{module}.py"):
-                    del sys.modules[module]
+            beside = folder / f"{module}.py"
+            if beside.is_file() and not _is_of(sys.modules.get(module), beside):
+                sys.modules.pop(module, None)
             found = import_module(module)
         except Exception as error:  # a module may fail in any way
             raise ScriptError(
