@@ -11,7 +11,7 @@ from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, OutputFile
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import Curve
-from karamelo_py.output.quantity import Quantity
+from karamelo_py.output.quantity import Logged, Quantity
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.units import LENGTHS, MASSES, TIMES, Units
 from karamelo_py.scene.hub import Hub
@@ -169,7 +169,7 @@ def log(hub: Hub, every: Every) -> None:
     set_output(hub, every)
 
 
-def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Quantity) -> None:
+def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Logged) -> None:
     """Choose the columns of the log.
 
     Parameters

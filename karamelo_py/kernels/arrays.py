@@ -195,6 +195,26 @@ CLOCK = np.dtype(
         ("wrong", np.int64),  # 1 when a point went wrong
         ("over_limit", np.int64),  # steps above the stable limit, one after another
         ("watch_limit", np.int64),  # whether to stop because of them
+        ("watch_energy", np.int64),  # whether the work of all loads is known: see kernels.watch
+        ("level", np.float64),  # share of the present stored energy in that of the velocities
+        ("work", np.float64),  # of the fixes so far
+        ("kinetic", np.float64),  # sums over the points
+        ("stored", np.float64),  # with what is dissipated
+        ("stored_before", np.float64),  # one step earlier
+        ("stored_at", np.int64),  # the step of that
+        ("looks", np.int64),  # number of looks at the balance
+        ("balance", np.float64),  # kinetic + stored + dissipated - work
+        ("first_balance", np.float64),
+        ("first_work", np.float64),
+        ("sum_of_balance", np.float64),  # of a window of looks
+        ("first_mean", np.float64),  # mean of the first window
+        ("largest_mean", np.float64),
+        ("largest_energy", np.float64),  # of kinetic, stored and work
+        ("supplied", np.float64),  # largest work so far, of either sign
+        ("energy_floor", np.float64),  # round-off of energies
+        ("windows", np.int64),  # in which the balance has grown, one after another
+        ("growth", np.float64),  # in the last window, of the largest energy
+        ("grown", np.float64),  # since the first window
     ]
 )
 TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values

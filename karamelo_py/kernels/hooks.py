@@ -175,10 +175,11 @@ def _locate_nodes(kin, grids, hooks, count):
 
 @subkernel
 def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, count, share):
-    """Act on the chosen nodes; add to the published totals."""
+    """Act on the chosen nodes; add to the published totals; return the work that is done."""
     step_back = min(control.clock[0].last_dt, control.values[TIME])  # nothing was before time 0
     _locate_nodes(kin, grids, hooks, count)
     d = dimension(kin)
+    work = 0.0
     for c in range(d):
         if hooks.programs[h, c].begin < 0:
             continue
@@ -198,13 +199,14 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
             else:
                 v = nodes.velocity[n, c]
                 star = v
-            old = v
+            old, old_star = v, star
+            old_force = nodes.sums[n, of_force(kin) + c]
             v, star, force, part = _call_node_function(
                 hooks.table[h].address,
                 mass,
                 v,
                 star,
-                nodes.sums[n, of_force(kin) + c],
+                old_force,
                 hooks.scratch[VALUE, q],
                 hooks.scratch[BEFORE, q],
                 dt,
@@ -214,9 +216,12 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
             if target == ON_UPDATE:
                 # Points that keep their velocity take the change v* - v: another v is an impulse.
                 total += kept * mass * (old - v) / dt
+            # Impulse times the mean of the velocities before and after it.
             if target == ON_SUMS:
+                work += dt * (force - old_force) * (v + 0.5 * dt * (force + old_force) / mass)
                 nodes.sums[n, of_force(kin) + c] = force
             elif target == ON_UPDATE:
+                work += 0.5 * mass * (star - old_star + kept * (old - v)) * (v + star)
                 nodes.update[n, c] = star
                 nodes.update[n, of_change(kin) + c] = star - v
             else:
@@ -226,6 +231,7 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
             control.values[slot + c] += total
     if hooks.programs[h, FRICTION].begin >= 0:
         _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count)
+    return work
 
 
 @subkernel
@@ -256,11 +262,12 @@ def clear_total(hooks, h, control):
 
 @entered
 def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept):
-    """Call the node functions of `stage` on the members that have mass.
+    """Call the node functions of `stage` on the members that have mass; return their work.
 
     `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
     """
     dt = float(dt)
+    work = 0.0
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
@@ -288,16 +295,17 @@ def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept
                     hooks.chosen[count] = n
                     count += 1
                     if count == BLOCK:
-                        _apply_at_nodes(
+                        work += _apply_at_nodes(
                             target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
                         )
                         count = np.int64(0)
             if counting:
                 share = 1.0 / max(heavy, 1)
             elif count > 0:
-                _apply_at_nodes(
+                work += _apply_at_nodes(
                     target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
                 )
+    return work
 
 
 class Motion(NamedTuple):
@@ -355,6 +363,9 @@ def _(what, kin, hooks, control, dt, h, count):
                 dt,
                 control.clock[0].kick,
             )
+            speed = float(v[c, p])
+            work = 0.5 * float(what.mass[p]) * (velocity * velocity - speed * speed)
+            control.clock[0].work += work
             v[c, p] = velocity
             # As far as a point moves, its corners do.
             for corner in range(what.corners):

@@ -73,6 +73,7 @@ from karamelo_py.kernels.sweep import (
     sweep_points,
 )
 from karamelo_py.kernels.visit import deformation_of
+from karamelo_py.kernels.watch import look
 from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows, inverse_stretch_squared
 from karamelo_py.points.grid import inside
@@ -265,7 +266,9 @@ def _(hooks, stage, target, s):
 @at_nodes.on(Hooks)
 def _(hooks, stage, target, s):
     kept = s.control.clock[0].kept
-    node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), kept)
+    s.control.clock[0].work += node_hooks(
+        stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), kept
+    )
 
 
 @shared
@@ -652,7 +655,7 @@ def _begin(scheme, visits, mode, s):
 
 # --- loop -------------------------------------------------------------------------------------
 
-DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK = range(5)
+DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK, GAINED = range(6)
 PATIENCE = 50  # steps above the stable limit before a run is stopped
 SMALLEST = 1e-6  # share of the first stable step at which a run is stopped: it would never end
 
@@ -661,9 +664,9 @@ def run_steps(scheme, visits, mode, s, hooks, count):
     """Take up to `count` steps, as far as the end time; say why it stopped.
 
     Returns DONE, STOPPED (a point went wrong), ABOVE_LIMIT (the step is above the stable limit),
-    SHRUNK (the stable step has become next to nothing) or SORT: the points must be sorted before
-    one can have left the surroundings of its tile. When that is depends on the points only, never
-    on where a run is interrupted.
+    SHRUNK (the stable step has become next to nothing), GAINED (energy from nowhere) or SORT: the
+    points must be sorted before one can have left the surroundings of its tile. When that is
+    depends on the points only, never on where a run is interrupted.
     """
     s, hooks = hold(s), hold(hooks)
     values = s.control.values
@@ -676,6 +679,8 @@ def run_steps(scheme, visits, mode, s, hooks, count):
         if not step(scheme, visits, mode, s, hooks, not last):
             return STOPPED
         finish(s.control)
+        if not look(s):
+            return GAINED
         if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
             return ABOVE_LIMIT
         if clock.limit < SMALLEST * clock.first_limit:

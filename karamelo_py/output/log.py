@@ -86,7 +86,7 @@ class Log(Rhythmic):
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
         for number in numbers:
-            if isinstance(number, int):
+            if isinstance(number, int | str):
                 cells.append(str(number))
             else:
                 # A blank keeps the place of the minus sign; the first column starts at the margin

@@ -11,6 +11,7 @@ from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import POINT_SEEDS
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
+LIMIT = "limit"  # the log shows the name of what limits the step
 PER_POINT = frozenset(POINT_SEEDS)
 
 
@@ -28,6 +29,8 @@ class Quantity:
         What the script says.
     formula
         The formula to evaluate when `name` is a formula written on the spot.
+    words
+        Whether it may be the word ``limit``, whose content is a word.
 
     Raises
     ------
@@ -35,11 +38,14 @@ class Quantity:
         If nothing of that name exists, or it is not a single number.
     """
 
-    def __init__(self, hub: Scene, name: str, formula: Any = None):
+    def __init__(self, hub: Scene, name: str, formula: Any = None, words: bool = False):
         self.hub = hub
         self.name = name
         self.formula = formula
         self._told = False  # whether the user knows of a NaN
+        self.is_word = words and name == LIMIT and name not in self.names(hub)
+        if self.is_word:
+            return
         if formula is None and name not in self.names(hub):
             close = nearest(name, self.names(hub))
             raise ScriptError(
@@ -58,12 +64,12 @@ class Quantity:
             )
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Quantity:
+    def from_script(cls, hub: Scene, argument: Argument, words: bool = False) -> Quantity:
         """The quantity that a script's argument means; errors mark the argument."""
         text = argument.text.strip().strip('"')
         try:
-            if text in cls.names(hub):
-                return cls(hub, text)
+            if text in cls.names(hub) or (words and text == LIMIT):
+                return cls(hub, text, words=words)
             return cls(hub, text, argument.value(hub))
         except ScriptError as error:
             if error.place is None:
@@ -89,8 +95,10 @@ class Quantity:
         """The name as it heads a column: as Karamelo writes it, and without blanks."""
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
-    def read(self) -> float | int:
-        """The number now; of the first that is none the user is told."""
+    def read(self) -> float | int | str:
+        """The number now, or the word; of the first that is no number the user is told."""
+        if self.is_word:
+            return self.hub.simulation.ruling_limit
         number = self._number()
         if math.isnan(number) and not self._told:
             self._told = True
@@ -122,6 +130,15 @@ class Quantity:
         if self.name in variables:
             return variables[self.name]
         return float(self.hub.values.get(self.name))
+
+
+class Logged(Quantity):
+    """For signatures: a quantity, or the word ``limit``."""
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Quantity:
+        """See `Quantity.from_script`."""
+        return Quantity.from_script(hub, argument, words=True)
 
 
 def _variables(hub: Scene) -> dict[str, Any]:

@@ -9,34 +9,46 @@ import numpy as np
 
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block
-from karamelo_py.kernels.step import ABOVE_LIMIT, SHRUNK
+from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, SHRUNK, STOPPED
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.watch import IN_ALL, cause_of_gain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError
 
 LAST_GOOD = "last_good.*.h5"
 
 
+def trouble(hub: Hub, simulation: Simulation, status: int) -> tuple[str, str]:
+    """What went wrong in a step, and what can be done."""
+    if status == ABOVE_LIMIT:
+        return _above_limit(hub, simulation)
+    if status == SHRUNK:
+        return _shrunk(hub, simulation)
+    if status == GAINED:
+        return _gained(hub, simulation)
+    message, hint = _wrong_point(hub, simulation)
+    message = f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}"
+    clock = simulation.setup.control.clock[0]
+    if clock.watch_energy and clock.grown > IN_ALL:
+        cause, cure = cause_of_gain(hub, simulation)
+        message += f", after energy had come from nowhere. Known to do that here: {cause}"
+        hint = cure
+    return message, hint
+
+
 def stop(
     hub: Hub, simulation: Simulation, status: int, snapshot: list, place: Place | None
 ) -> NoReturn:
     """Return to the last good state, write it, and raise what the user should know."""
-    step, time = simulation.step, simulation.time
-    if status == ABOVE_LIMIT:
-        message, hint = _above_limit(hub, simulation)
-        _write_last_good(hub)
-    elif status == SHRUNK:
-        message, hint = _shrunk(hub, simulation)
-        _write_last_good(hub)
-    else:
-        message, hint = _wrong_point(hub, simulation)
+    step = simulation.step
+    message, hint = trouble(hub, simulation, status)
+    if status in (GAINED, STOPPED):
         simulation.restore(snapshot)
-        if step > simulation.step:
+        if status == STOPPED and step > simulation.step:
             simulation.advance(step - simulation.step)
-        message = f"step {step + 1}, time {time:.6g}: {message}"
-        _write_last_good(hub)
+    _write_last_good(hub)
     name = LAST_GOOD.replace("*", str(simulation.step))
     if hub.output.writes:
         hint += f". The last good state is in {name}; karamelo-py SCRIPT -restart {name} goes on"
@@ -53,6 +65,19 @@ def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     fastest = int(np.argmax(speeds))
     message += f" ({_named(hub, simulation, fastest)} moves at {speeds[fastest]:.4g})"
     return message, f"set_dt({0.5 * limit:.3g}) or less, or leave set_dt out"
+
+
+def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+    clock = simulation.setup.control.clock[0]
+    given = abs(clock.first_balance) + clock.supplied
+    cause, cure = cause_of_gain(hub, simulation)
+    times = (clock.balance - clock.first_balance) / given if given > 0 else np.inf
+    message = (
+        f"step {simulation.step}, time {simulation.time:.6g}: {times:.3g} times the energy that "
+        "there was at the start and that loads have brought has come from nowhere "
+        f"(kinetic + stored + dissipated - work). Known to do that here: {cause}"
+    )
+    return message, cure
 
 
 def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
@@ -140,7 +165,7 @@ def _smaller_step(hub: Hub, simulation: Simulation) -> str:
     if simulation.above_limit():
         return (
             f"the step {simulation.dt:.4g} is above the stable limit {simulation.limit:.4g}: "
-            "set_dt to less, or leave set_dt out and dt_factor at 0.9"
+            "set_dt to less, or leave set_dt and dt_factor out"
         )
     fixed = hub.update.fixed_dt is not None
     return "use a smaller step (set_dt)" if fixed else "use a smaller dt_factor"

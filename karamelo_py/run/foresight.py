@@ -299,7 +299,7 @@ def _warn_about_step(hub: Hub, simulation: Simulation) -> None:
             "the run will most likely blow up, and be stopped then",
             hint=f"set_dt({0.9 * limit:.3g}) or less, or leave set_dt out",
         )
-    elif update.fixed_dt is None and update.dt_factor > 1:
+    elif update.fixed_dt is None and (update.dt_factor or 0) > 1:
         hub.warn(
             f"dt_factor {update.dt_factor:g} puts the step above the stable limit {limit:.4g}: "
             "the run will most likely blow up, and be stopped then",

@@ -45,6 +45,7 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.run.stable import sparse
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
@@ -129,9 +130,8 @@ def stable_courant(hub: Hub) -> float:
     two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
     if min(two, one) == 1:
         return 1.0
-    sparse = any(2 * np.max(solid.half_size) > 0.75 * solid.h for solid in hub.solids.values())
     # Nodes between the corners of cells make the highest frequency higher.
-    return (one if sparse else two) * (0.7 if basis.nodes_per_cell > 1 else 1)
+    return (one if sparse(hub) else two) * (0.7 if basis.nodes_per_cell > 1 else 1)
 
 
 def stable_conduction(hub: Hub) -> float:

@@ -17,6 +17,8 @@ from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.savings import savings
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.stable import ruling_limit, words_of_share
+from karamelo_py.run.watch import not_watched, unknown_work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 
@@ -45,6 +47,9 @@ def report(hub: Hub, end_time: float = inf) -> None:
     nodes = int(np.sum(s.spans[1 : 1 + s.spans[0, 0], 1] - s.spans[1 : 1 + s.spans[0, 0], 0]))
     say(f"tiles          {used} of {tiles.count} hold points, {near} in use ({nodes} nodes)")
     say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
+    say(f"               {words_of_share(hub)}")
+    say(f"limited by     {ruling_limit(simulation)}")
+    say(f"energy         {'is watched' if not (why := unknown_work(hub)) else not_watched(why)}")
     say(f"threads        {simulation.threads}")
     say("")
     say(f"{'':<34}numbers     bytes")

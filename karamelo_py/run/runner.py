@@ -12,18 +12,21 @@ from math import inf, isfinite
 from typing import Any
 
 from karamelo_py.compiler import cache
-from karamelo_py.kernels.step import DONE
+from karamelo_py.kernels.step import DONE, STOPPED
 from karamelo_py.output.console import duration
 from karamelo_py.run import diagnosis, foresight
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.stable import ruling_limit, words_of_share
+from karamelo_py.run.watch import grown_little, tell_of_growth
 from karamelo_py.scene import boundary
 from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Pause, Quit, ScriptError
 
 CHUNK = 100  # steps between two looks at the run, and between two snapshots, at most
+HALVINGS = 5  # at most, in a run
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
 
 
@@ -56,12 +59,16 @@ class Runner:
         end_time: float = inf,
         condition: Any = None,
         until: bool = False,
+        halve: bool = False,
     ):
         self.hub = hub
         self.steps = steps
         self.end_time = end_time
         self.condition = condition
         self.until = until
+        self.halve = halve
+        self.halvings = 0
+        self.told_of_growth = False
         self.place = hub.place
         self.spent = {"compilation": 0.0, "steps": 0.0, "output": 0.0}
         self.interrupted = 0  # the signal
@@ -165,17 +172,22 @@ class Runner:
             target = min(output.next_step(step), last_step, step + chunk)
             if self.condition is not None:
                 target = step + 1
-            if step - kept >= CHUNK or kept == first_step < step:
+            due = step - kept >= CHUNK or kept == first_step < step
+            if due and grown_little(simulation):
                 snapshot, kept = simulation.snapshot(), step
             begun, compiled = time.perf_counter(), self.spent["compilation"]
             status = simulation.advance(int(target) - step)
             elapsed = time.perf_counter() - begun - (self.spent["compilation"] - compiled)
             self.spent["steps"] += elapsed
             if status != DONE:
-                if not boundary.delete_leaving(hub, simulation, snapshot):
+                if status == STOPPED and boundary.delete_leaving(hub, simulation, snapshot):
+                    snapshot, kept = simulation.snapshot(), simulation.step
+                elif not self._try_half(simulation, status, snapshot):
                     diagnosis.stop(hub, simulation, status, snapshot, self.place)
-                snapshot, kept = simulation.snapshot(), simulation.step
+                chunk = 1
                 continue
+            if not self.told_of_growth:
+                self.told_of_growth = tell_of_growth(hub, simulation)
             boundary.tell_of_bounces(hub, simulation)
             if compiled < self.spent["compilation"]:
                 # A rate that counts compilation would promise hours.
@@ -193,6 +205,21 @@ class Runner:
                     simulation.time,
                     self._fraction(simulation, first_step, first_time),
                 )
+
+    def _try_half(self, simulation: Simulation, status: int, snapshot: list) -> bool:
+        """Go back to the last good state with half the step, where the script asks for that."""
+        if not self.halve or self.halvings == HALVINGS:
+            return False
+        message, _ = diagnosis.trouble(self.hub, simulation, status)
+        self.halvings += 1
+        simulation.restore(snapshot)
+        simulation.halve_step(self.halvings)
+        self.hub.warn(
+            f"{message}. Back to step {simulation.step}, time {simulation.time:.6g}, with "
+            f"1/{2**self.halvings} of the step",
+            place=self.place,
+        )
+        return True
 
     def _goes_on(self) -> bool:
         values = self.hub.values
@@ -298,6 +325,7 @@ class Runner:
                 "bytes per particle": bytes_per_point(simulation),
                 "dt": simulation.dt,
                 "stable dt": simulation.limit,
+                "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,
                 **({"units": str(hub.output.units)} if hub.output.units else {}),

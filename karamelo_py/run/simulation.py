@@ -43,6 +43,7 @@ from karamelo_py.kernels.step import (
     sweep,
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, Visit, sweep_nodes
+from karamelo_py.kernels.watch import ROUND_OFF, begin_to_look
 from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, law_kind, with_stress
 from karamelo_py.points.laws.plastic_rate import without_rate
@@ -54,7 +55,9 @@ from karamelo_py.run.lowering import (
     stable_courant,
     thread_count,
 )
+from karamelo_py.run.stable import ruling_limit, share_of_limit
 from karamelo_py.run.trial import try_parts
+from karamelo_py.run.watch import unknown_work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
 from karamelo_py.script.errors import ScriptError
@@ -171,6 +174,7 @@ class Simulation:
         self.hooks: Hooks | NoHooks = NoHooks()
         self._first: PythonHooks | None = None
         self._first_fixes: list = []
+        self._watched = -1  # the version whose balance of energy is followed
         self.mapped = False  # whether the nodes show a state of this simulation
 
     def fits(self, hub: Hub) -> bool:
@@ -332,11 +336,12 @@ class Simulation:
         clock = self.setup.control.clock[0]
         clock.fixed_dt = update.fixed_dt or 0.0
         clock.courant = stable_courant(self.hub)
-        clock.dt_factor = update.dt_factor
+        clock.dt_factor = share_of_limit(self.hub)
         clock.end_time = end_time
         clock.over_limit = 0
         # Twice: initial values may be formulas of dt, and dt follows the fastest point.
         self._choose_dt()
+        begun_before = len(self._begun)
         self._prepare_hooks()
         update.method.begin(self.hub, self.setup.contact)
         self._choose_dt()
@@ -350,6 +355,31 @@ class Simulation:
             clock.first_limit = self.limit
         clock.watch_limit = int(not self.above_limit())
         clock.over_limit = 0
+        self._watch_energy(begun_before)
+
+    def halve_step(self, times: int) -> None:
+        """From here on in this run the step is that of its start, halved so many `times`."""
+        clock = self.setup.control.clock[0]
+        clock.fixed_dt = (self.hub.update.fixed_dt or 0.0) / 2**times
+        clock.dt_factor = share_of_limit(self.hub) / 2**times
+        choose_dt(self.setup.control)
+        clock.watch_limit = int(not self.above_limit())
+        clock.over_limit = 0
+
+    def _watch_energy(self, begun_before: int) -> None:
+        """Begin to watch the balance of energy, or go on where nothing was set since."""
+        s = self.setup
+        clock = s.control.clock[0]
+        clock.watch_energy = int(not unknown_work(self.hub))
+        set_anew = len(self._begun) > begun_before or bool(self._first_fixes)
+        anew = self._watched != self.version or set_anew
+        self._watched = self.version
+        if clock.watch_energy:
+            mass = sum(float(block.points.mass.sum()) for block in s.blocks)
+            clock.energy_floor = ROUND_OFF * mass * float(clock.rate) ** 2
+            # Velocities belong to half a step before, stresses to the share strained before.
+            level = 0.5 + getattr(self.hub.update.scheme, "strained_before", 0.0)
+            begin_to_look(s, level, anew)
 
     def go_on(self, end_time: float) -> None:
         """In place of `begin`: go on with a run whose state was put into the arrays."""
@@ -386,6 +416,11 @@ class Simulation:
     def limit(self) -> float:
         """The stable step of the present state."""
         return float(self.setup.control.clock[0].limit)
+
+    @property
+    def ruling_limit(self) -> str:
+        """The name of what limits the step now."""
+        return ruling_limit(self)
 
     def above_limit(self) -> bool:
         """Whether the chosen step is above the stable limit already."""

@@ -69,6 +69,9 @@ class Fix:
     point_fields
         The fields of points that it declares (:mod:`karamelo_py.compiler.fields`); `Force` if it
         sets forces on points in ``initial_integrate``.
+    conserves
+        Whether its hooks in Python bring no energy: what they do to points and nodes stores it,
+        passes it on or takes it away. Otherwise the energy of the scene is not watched.
     needs_all_points
         Whether no point may be deleted (boundary delete) while it acts.
     acts_last
@@ -94,6 +97,7 @@ class Fix:
     node_fields: tuple[type, ...] = ()
     needs_all_points = False
     acts_last = False
+    conserves = False
     friction: float | None = None
     solids: tuple = ()
     id: str = ""

@@ -9,8 +9,6 @@ from karamelo_py.schemes.musl import MUSL
 from karamelo_py.script.errors import Place
 from karamelo_py.script.values import Values
 
-DEFAULT_DT_FACTOR = 0.9
-
 
 class Update:
     """What method, scheme, set_dt and dt_factor chose, and the clock.
@@ -32,7 +30,7 @@ class Update:
     fixed_dt
         The constant step of set_dt, or None: the step follows the fastest point.
     dt_factor
-        Share of the stable step that is taken.
+        Share of the stable step that the script asks for, or None: the program chooses.
     boundary
         What happens to points that reach the edge of the domain: error, delete or reflect.
     boundary_place
@@ -54,7 +52,7 @@ class Update:
         self.thermal = False
         self.anti_locking = False
         self.fixed_dt: float | None = None
-        self.dt_factor = DEFAULT_DT_FACTOR
+        self.dt_factor: float | None = None
         self.boundary = "error"
         self.boundary_place: Place | None = None
         self.warned_of_bounces = False

@@ -23,6 +23,9 @@ least_nodes
     the smallest number of nodes a direction of the grid must have;
 steady_moment
     whether D of the affine transfers stays away from zero everywhere;
+gradient_jumps
+    whether gradients jump at the faces of cells (not, where a class does not say): points that move
+    from cell to cell then feed energy to a body, the less the smaller the step;
 steep_edge
     whether |grad N|^2 / N exceeds 2 / h^2 a direction where a weight vanishes: usl then limits what
     light nodes do to the strain.

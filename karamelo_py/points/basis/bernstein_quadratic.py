@@ -28,6 +28,7 @@ class BernsteinQuadratic(NamedTuple):
     steady_moment = False  # D of the affine transfers vanishes at the corners of cells
     steep_edge = True
     in_lanes = True
+    gradient_jumps = True
 
 
 @along.on(BernsteinQuadratic)

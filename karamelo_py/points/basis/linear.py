@@ -24,6 +24,7 @@ class Linear(NamedTuple):
 
     steady_moment = False  # D of the affine transfers vanishes at the nodes
     steep_edge = True
+    gradient_jumps = True
     in_lanes = True
 
 

@@ -147,6 +147,11 @@ def dissipated_energy(law, kin, state):
     """Energy that is gone, per reference volume; left out by laws that dissipate nothing."""
 
 
+@dissipated_energy.otherwise
+def _(law, kin, state):
+    return specific_volume(law) - specific_volume(law)
+
+
 @number
 @point_function()
 def damage(law, kin, state):

@@ -1,0 +1,133 @@
+"""The watch over energy: sums over the points, every so many steps, inside the compiled loop.
+
+Kinetic plus stored plus dissipated energy less the work of the loads cannot grow. Velocities belong
+to the middles of steps and stresses to their ends, more or less by the scheme: the stored energy of
+two steps in a row gives that of the middle, to second order. Sums go through the points in the
+order of their tiles, the same on any number of threads.
+"""
+
+from __future__ import annotations
+
+from karamelo_py.compiler.compile import kernel, over_blocks, shared
+from karamelo_py.compiler.fields import load, load_vector
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import TIMESTEP
+from karamelo_py.points.kinematics import dimension
+from karamelo_py.points.laws import (
+    dissipated_energy,
+    energy_density,
+    initial_state,
+    specific_volume,
+)
+
+LOOK = 10  # steps between two looks
+LOOKS = 10  # looks that are averaged, in a window of 100 steps
+GROWTH = 0.01  # of the largest energy so far, in a window: more is told
+BOUND = 1.0  # of the energy that there was and that loads have brought: more stops the run
+ROUND_OFF = 1e-14  # of m c^2: energies below are noise
+OVERSHOOT = 1.0  # of the range of temperatures that sources allow: more stops the run
+
+
+@kernel
+def _sum_energies(kin, points, laws, clock):
+    kinetic = 0.0
+    stored = 0.0
+    for p in range(points.mass.size):
+        law = record(laws, points.material[p])
+        mass = points.mass[p]
+        state = load(points.state, p, initial_state(law, kin, mass))
+        v = load_vector(kin, points.v, p)
+        squared = 0.0
+        for k in range(dimension(kin)):
+            squared += float(v[k]) * float(v[k])
+        kinetic += 0.5 * float(mass) * squared
+        energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
+        stored += float(mass) * float(specific_volume(law)) * float(energy)
+    clock.kinetic += kinetic
+    clock.stored += stored
+
+
+def _sum(block, s):
+    _sum_energies(s.kin, block.points, block.laws, s.control.clock[0])
+
+
+_sum_blocks = over_blocks(_sum)
+
+
+@shared
+def sum_energies(s):
+    """Kinetic, and stored plus dissipated energy of all points, into the clock."""
+    clock = s.control.clock[0]
+    clock.kinetic = 0.0
+    clock.stored = 0.0
+    _sum_blocks(s)
+
+
+@kernel
+def judge(control):
+    """Take the present sums into account; whether energy keeps within its bound."""
+    clock = control.clock[0]
+    at_middle = clock.level * clock.stored + (1 - clock.level) * clock.stored_before
+    balance = clock.kinetic + at_middle - clock.work
+    if clock.looks == 0:
+        clock.first_balance = balance
+        clock.first_work = clock.work
+    clock.looks += 1
+    clock.balance = balance
+    clock.supplied = max(clock.supplied, abs(clock.work - clock.first_work))
+    clock.largest_energy = max(
+        clock.largest_energy, abs(clock.kinetic), abs(clock.stored), clock.supplied
+    )
+    # Means of windows: a single look shows the shortest waves, too.
+    clock.sum_of_balance += balance
+    if clock.looks % LOOKS == 0:
+        mean = clock.sum_of_balance / LOOKS
+        clock.sum_of_balance = 0.0
+        if clock.looks == LOOKS:
+            clock.first_mean = clock.largest_mean = mean
+        unit = max(clock.largest_energy, clock.energy_floor)
+        growth = (mean - clock.largest_mean) / unit
+        clock.windows = clock.windows + 1 if growth > GROWTH else 0
+        clock.growth = growth
+        clock.grown = (mean - clock.first_mean) / unit
+        clock.largest_mean = max(clock.largest_mean, mean)
+    given = abs(clock.first_balance) + clock.supplied
+    return not balance - clock.first_balance > max(BOUND * given, clock.energy_floor)
+
+
+@shared
+def begin_to_look(s, level, anew):
+    """Before a run: the stored energy of the present state, where a look is due after a step.
+
+    `level` is the share of a stored energy in that of the velocities' time. With `anew` the balance
+    starts from here.
+    """
+    clock = s.control.clock[0]
+    clock.level = level
+    if anew:
+        clock.looks = 0
+        clock.windows = 0
+        clock.growth = clock.grown = clock.supplied = 0.0
+        clock.sum_of_balance = clock.largest_energy = 0.0
+    step = int(s.control.values[TIMESTEP])
+    if step % LOOK == 0 and (anew or clock.stored_at != step):
+        sum_energies(s)
+        clock.stored_before = clock.stored
+        clock.stored_at = step
+
+
+@shared
+def look(s):
+    """Look at the energy where it is due; whether it keeps within its bound."""
+    clock = s.control.clock[0]
+    if clock.watch_energy == 0:
+        return True
+    phase = int(s.control.values[TIMESTEP]) % LOOK
+    if phase == 0:
+        sum_energies(s)
+        clock.stored_before = clock.stored
+        clock.stored_at = int(s.control.values[TIMESTEP])
+    elif phase == 1 and clock.stored_at == int(s.control.values[TIMESTEP]) - 1:
+        sum_energies(s)
+        return judge(s.control)
+    return True

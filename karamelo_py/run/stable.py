@@ -1,0 +1,103 @@
+"""Which step is taken: the program's own share of the stable step, and what limits that."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import DT
+from karamelo_py.kernels.laws import law_on
+from karamelo_py.points.laws import Absent, initial_state, wave_speed_squared
+from karamelo_py.scene.hub import Hub
+
+USUAL = 0.9
+DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
+
+
+def sparse(hub: Hub) -> bool:
+    """Whether a solid has about one point a cell and direction."""
+    return any(2 * np.max(solid.half_size) > 0.75 * solid.h for solid in hub.solids.values())
+
+
+def keeping_share(hub: Hub) -> float:
+    """The largest share of the stable step with which a drifting body keeps its energy.
+
+    Where points go from cell to cell, and keep their own velocities (FLIP and its kin), jumps of
+    the gradients feed energy to a body, about as the third power of the step. The numbers are those
+    of the energy table of the documentation: at most 10 % in 50 periods.
+    """
+    update = hub.update
+    alpha = getattr(update.transfer, "alpha", 0.0)
+    if not update.method.frame.moves or not alpha > 0.9:
+        return USUAL
+    jumps = getattr(update.method.basis, "gradient_jumps", False)
+    keeping = getattr(update.scheme, "keeping", ((USUAL, USUAL), (USUAL, USUAL)))
+    share = keeping[jumps][sparse(hub)]
+    if alpha > 0.99:
+        return share
+    return max(share, DAMPED) if sparse(hub) else USUAL
+
+
+def share_of_limit(hub: Hub) -> float:
+    """The share of the stable step that is taken: that of the script, or the program's own."""
+    asked = hub.update.dt_factor
+    return keeping_share(hub) if asked is None else asked
+
+
+def words_of_share(hub: Hub) -> str:
+    """What the share of the stable step is, and what it means."""
+    asked, keeping = hub.update.dt_factor, keeping_share(hub)
+    if hub.update.fixed_dt is not None:
+        share = hub.update.fixed_dt / hub.simulation.limit
+        words = f"{share:.3g} of the stable step, by set_dt"
+    elif asked is None:
+        return f"{keeping:g} of the stable step, the program's own"
+    else:
+        share = asked
+        words = f"{share:g} of the stable step, by dt_factor"
+    if share > 1:
+        return words + ": unstable"
+    if share > max(keeping, 1e-9) * (1 + 1e-9) and keeping < USUAL:
+        return words + f": above {keeping:g} a body that drifts gains energy"
+    return words
+
+
+def ruling_limit(simulation: Any) -> str:
+    """The name of what limits the step now.
+
+    ``set_dt`` and ``end`` (of the run) are no limits of stability; ``conduction`` is that of heat,
+    ``viscosity`` that of waves which viscosity slows down, ``speed`` that of points which move
+    faster than waves, ``light_nodes`` that of usl, and ``waves`` that of the others.
+    """
+    s = simulation.setup
+    clock = s.control.clock[0]
+    if clock.fixed_dt > 0:
+        return "set_dt"
+    if s.control.values[DT] < clock.dt_factor * clock.limit * (1 - 1e-9):
+        return "end"
+    if clock.heat_limit <= clock.limit:
+        return "conduction"
+    speed = max((float(np.abs(b.points.v).max(initial=0)) for b in s.blocks), default=0.0)
+    if speed > 0.5 * clock.rate:
+        return "speed"
+    waves = _speed_without_viscosity(simulation)
+    if 0 < waves < (clock.rate - speed) / 1.2:
+        return "viscosity"
+    return "light_nodes" if clock.courant < 1 else "waves"
+
+
+def _speed_without_viscosity(simulation: Any) -> float:
+    """Fastest wave in the undeformed materials without viscosity; 0 where none is viscous."""
+    fastest, viscous = 0.0, False
+    for solid in simulation.hub.solids.values():
+        law = law_on(solid.material.law, solid.h, solid.T0)
+        if not isinstance(getattr(law, "viscosity", Absent()), Absent):
+            law, viscous = law._replace(viscosity=Absent()), True
+        if getattr(getattr(law, "strength", None), "mu", 0) > 0:
+            law, viscous = law._replace(strength=law.strength._replace(mu=0.0)), True
+        kin = simulation.setup.kin
+        squared = wave_speed_squared(law, kin, initial_state(law, kin, 1.0))
+        fastest = max(fastest, sqrt(float(squared)))
+    return fastest if viscous else 0.0

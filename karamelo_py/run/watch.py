@@ -1,0 +1,111 @@
+"""Whether a scene's energy can be watched, and what a gain of energy comes from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.hooks import CompiledHook
+from karamelo_py.language import registry
+from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.run.stable import USUAL, keeping_share, sparse
+from karamelo_py.scene.hub import Hub
+from karamelo_py.styles.fixes.pairs import PairContact
+
+TOLD = 2  # windows of growth one after another, of which a run tells
+IN_ALL = 0.1  # of the largest energy: growth since the start that it tells of, too
+
+
+def not_watched(why: str) -> str:
+    """How to say that energy is not watched."""
+    return f"is not watched: nobody adds up the work of {why}"
+
+
+def unknown_work(hub: Hub) -> str:
+    """What does work that nobody adds up; empty where energy can be watched.
+
+    Compiled hooks on nodes and points have their work added up by the loops. Fixes in Python say
+    by `Fix.conserves` that they bring none.
+    """
+    for fix in hub.fixes.values():
+        acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
+        if acts and not fix.first_step_only and not fix.conserves:
+            return f"fix {fix.style} '{fix.id}'"
+    for solid in hub.solids.values():
+        if can(solid.material.law, constrained_velocity):
+            return f"rigid solid '{solid.id}'"
+        if hub.update.thermal and can(solid.material.law, initial_heat):
+            return "heat"
+    return ""
+
+
+def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
+    """What is known to feed energy in such a scene, the most likely first, and its cure."""
+    update, method = hub.update, hub.update.method
+    transfer = registry.name_of("transfer", type(update.transfer))
+    scheme = registry.name_of("scheme", type(update.scheme))
+    functions = f"{method.basis_name} functions"
+    moves, jumps = method.frame.moves, getattr(method.basis, "gradient_jumps", False)
+    share = simulation.dt / simulation.limit
+    keeping = keeping_share(hub)
+    smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
+    if share > 1 + 1e-9:
+        return (
+            f"the step is {share:.3g} times the stable one",
+            "leave set_dt and dt_factor out, or make them smaller",
+        )
+    if moves and jumps and update.transfer.inverts_spread:
+        return f"{transfer} with {functions} in the updated frame", f"FLIP, or {smooth}"
+    if moves and jumps and transfer == "TPIC":
+        return "TPIC with linear functions grows where a body moves through the grid", smooth
+    if update.anti_locking and moves:
+        return "averaged volumes (F-bar) in the updated frame", "leave anti_volumetric_locking out"
+    if keeping < USUAL and share > keeping * (1 + 1e-9):
+        points = " with one point a cell" if sparse(hub) else ""
+        return (
+            f"points that go from cell to cell: {transfer}, {functions} and {scheme}{points} at "
+            f"{share:.2g} of the stable step",
+            f"dt_factor({keeping:g}), scheme(usavg), or {smooth}",
+        )
+    if moves and _torn(hub):
+        return (
+            "points that are further apart than a cell (numerical fracture)",
+            "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm",
+        )
+    if hub.fixes and any(isinstance(fix, PairContact) for fix in hub.fixes.values()):
+        return "contact between points", "a smaller step, or method ulmpm/contacts"
+    return "a step that is too large", "dt_factor(0.3) or less, or scheme(usavg)"
+
+
+def _torn(hub: Hub) -> bool:
+    """Whether points have grown to what a cell cannot hold."""
+    grown = hub.fields.particle("volume") / hub.fields.reference_volume[hub.simulation.present]
+    return bool(np.nanmax(grown, initial=0.0) > 1.5)
+
+
+def tell_of_growth(hub: Hub, simulation: Any) -> bool:
+    """Warn where energy comes from nowhere; whether it did."""
+    clock = simulation.setup.control.clock[0]
+    fast = clock.windows >= TOLD
+    if not clock.watch_energy or not (fast or clock.grown > IN_ALL):
+        return False
+    cause, cure = cause_of_gain(hub, simulation)
+    much = (
+        f"{100 * clock.growth:.2g} % of the largest so far in the last hundred steps"
+        if fast
+        else f"{100 * clock.grown:.2g} % of the largest so far since the first hundred steps"
+    )
+    hub.warn(
+        f"step {simulation.step}, time {simulation.time:.6g}: energy comes from nowhere, "
+        f"{much} (kinetic + stored + dissipated - work). Known to do that here: {cause}",
+        hint=cure,
+    )
+    return True
+
+
+def grown_little(simulation: Any) -> bool:
+    """Whether the present state is a good one, as far as its energy tells."""
+    clock = simulation.setup.control.clock[0]
+    return not clock.watch_energy or (clock.windows < TOLD and clock.grown < IN_ALL)
