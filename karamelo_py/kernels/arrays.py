@@ -174,7 +174,8 @@ ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 CLOCK = np.dtype(
     [
         ("fixed_dt", np.float64),  # step of set_dt, or 0
-        ("dt_factor", np.float64),
+        ("dt_factor", np.float64),  # share of the stable step of waves
+        ("heat_factor", np.float64),  # of that of conduction
         ("end_time", np.float64),
         ("last_dt", np.float64),  # of the last step; of the present one before there was any
         ("kick", np.float64),  # how long the forces act: between the middles of the two steps
@@ -215,6 +216,14 @@ CLOCK = np.dtype(
         ("windows", np.int64),  # in which the balance has grown, one after another
         ("growth", np.float64),  # in the last window, of the largest energy
         ("grown", np.float64),  # since the first window
+        ("watch_heat", np.int64),  # whether all sources of heat are known
+        ("coldest", np.float64),  # that initial state, fixes and sources allow
+        ("hottest", np.float64),
+        ("T_low", np.float64),  # of the points at the last look
+        ("T_high", np.float64),
+        ("own_heat", np.float64),  # largest rise of a temperature by the work of its point
+        ("set_low", np.float64),  # what fixes have set at nodes
+        ("set_high", np.float64),
     ]
 )
 TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values

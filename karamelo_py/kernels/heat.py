@@ -325,9 +325,13 @@ def _(hooks, stage, target, s):
 @at_heat_nodes.on(Hooks)
 def _(hooks, stage, target, s):
     # Temperatures are always kept: FLIP, whatever the transfer of velocity.
+    clock = s.control.clock[0]
+    clock.set_low, clock.set_high = np.inf, -np.inf
     node_hooks(
         stage, target, Line(), s.grids, s.heat.nodes, s.spans, hooks, s.control, step_size(s), 1.0
     )
+    clock.coldest = min(clock.coldest, clock.set_low)
+    clock.hottest = max(clock.hottest, clock.set_high)
 
 
 def _supply(block, s, hooks):

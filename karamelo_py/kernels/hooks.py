@@ -222,6 +222,8 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
                 nodes.sums[n, of_force(kin) + c] = force
             elif target == ON_UPDATE:
                 work += 0.5 * mass * (star - old_star + kept * (old - v)) * (v + star)
+                clock = control.clock[0]
+                clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
                 nodes.update[n, c] = star
                 nodes.update[n, of_change(kin) + c] = star - v
             else:
@@ -383,6 +385,8 @@ def _(what, kin, hooks, control, dt, h, count):
     if hooks.programs[h, 1].begin >= 0:
         _evaluate(hooks, h, 1, count, control, np.int64(BEFORE), 0.0)
     total = 0.0
+    clock = control.clock[0]
+    rise = fall = 0.0
     for q in range(count):
         p = hooks.chosen[q]
         before = what.supply[0, p]
@@ -400,6 +404,13 @@ def _(what, kin, hooks, control, dt, h, count):
         what.supply[0, p] = supply
         what.temperature[0, p] = T
         total += supply - before
+        rate = (supply - before) / what.capacity[0, p] if what.capacity[0, p] > 0 else 0.0
+        rise, fall = max(rise, rate), min(fall, rate)
+        if share == 0:
+            clock.coldest, clock.hottest = min(clock.coldest, T), max(clock.hottest, T)
+    # What the fastest point takes, another may have got before.
+    clock.hottest += dt * rise
+    clock.coldest += dt * fall
     slot = hooks.table[h].slot
     if slot >= 0:
         control.values[slot] += total

@@ -73,7 +73,7 @@ from karamelo_py.kernels.sweep import (
     sweep_points,
 )
 from karamelo_py.kernels.visit import deformation_of
-from karamelo_py.kernels.watch import look
+from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows, inverse_stretch_squared
 from karamelo_py.points.grid import inside
@@ -217,9 +217,10 @@ def choose_dt(control):
     """
     clock = control.clock[0]
     limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
+    dt = min(clock.dt_factor * limit, clock.heat_factor * clock.heat_limit)
+    dt = clock.fixed_dt if clock.fixed_dt > 0 else dt
     limit = min(limit, clock.heat_limit)
     clock.limit = limit
-    dt = clock.fixed_dt if clock.fixed_dt > 0 else clock.dt_factor * limit
     clock.over_limit = clock.over_limit + 1 if dt > limit else 0
     remaining = clock.end_time - control.values[TIME]
     # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end, and
@@ -655,7 +656,7 @@ def _begin(scheme, visits, mode, s):
 
 # --- loop -------------------------------------------------------------------------------------
 
-DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK, GAINED = range(6)
+DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK, GAINED, HEATED = range(7)
 PATIENCE = 50  # steps above the stable limit before a run is stopped
 SMALLEST = 1e-6  # share of the first stable step at which a run is stopped: it would never end
 
@@ -664,9 +665,10 @@ def run_steps(scheme, visits, mode, s, hooks, count):
     """Take up to `count` steps, as far as the end time; say why it stopped.
 
     Returns DONE, STOPPED (a point went wrong), ABOVE_LIMIT (the step is above the stable limit),
-    SHRUNK (the stable step has become next to nothing), GAINED (energy from nowhere) or SORT: the
-    points must be sorted before one can have left the surroundings of its tile. When that is
-    depends on the points only, never on where a run is interrupted.
+    SHRUNK (the stable step has become next to nothing), GAINED (energy from nowhere), HEATED
+    (temperatures that no source explains) or SORT: the points must be sorted before one can have
+    left the surroundings of its tile. When that is depends on the points only, never on where a run
+    is interrupted.
     """
     s, hooks = hold(s), hold(hooks)
     values = s.control.values
@@ -681,6 +683,8 @@ def run_steps(scheme, visits, mode, s, hooks, count):
         finish(s.control)
         if not look(s):
             return GAINED
+        if not look_at_heat(s):
+            return HEATED
         if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
             return ABOVE_LIMIT
         if clock.limit < SMALLEST * clock.first_limit:

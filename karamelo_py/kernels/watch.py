@@ -1,4 +1,4 @@
-"""The watch over energy: sums over the points, every so many steps, inside the compiled loop.
+"""The watch over energy and temperatures: every so many steps, inside the compiled loop.
 
 Kinetic plus stored plus dissipated energy less the work of the loads cannot grow. Velocities belong
 to the middles of steps and stresses to their ends, more or less by the scheme: the stored energy of
@@ -8,7 +8,9 @@ order of their tiles, the same on any number of threads.
 
 from __future__ import annotations
 
-from karamelo_py.compiler.compile import kernel, over_blocks, shared
+from math import inf
+
+from karamelo_py.compiler.compile import entered, over_blocks, shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import TIMESTEP
@@ -16,8 +18,10 @@ from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.laws import (
     dissipated_energy,
     energy_density,
+    heat_capacity,
     initial_state,
     specific_volume,
+    temperature,
 )
 
 LOOK = 10  # steps between two looks
@@ -25,11 +29,13 @@ LOOKS = 10  # looks that are averaged, in a window of 100 steps
 GROWTH = 0.01  # of the largest energy so far, in a window: more is told
 BOUND = 1.0  # of the energy that there was and that loads have brought: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
+HEAT_NOISE = 1e-3  # of a temperature: what does not count where all are alike
 OVERSHOOT = 1.0  # of the range of temperatures that sources allow: more stops the run
 
 
-@kernel
-def _sum_energies(kin, points, laws, clock):
+@entered
+def _sum_energies(kin, points, laws, control):
+    clock = control.clock[0]
     kinetic = 0.0
     stored = 0.0
     for p in range(points.mass.size):
@@ -48,7 +54,7 @@ def _sum_energies(kin, points, laws, clock):
 
 
 def _sum(block, s):
-    _sum_energies(s.kin, block.points, block.laws, s.control.clock[0])
+    _sum_energies(s.kin, block.points, block.laws, s.control)
 
 
 _sum_blocks = over_blocks(_sum)
@@ -63,7 +69,7 @@ def sum_energies(s):
     _sum_blocks(s)
 
 
-@kernel
+@entered
 def judge(control):
     """Take the present sums into account; whether energy keeps within its bound."""
     clock = control.clock[0]
@@ -93,6 +99,51 @@ def judge(control):
         clock.largest_mean = max(clock.largest_mean, mean)
     given = abs(clock.first_balance) + clock.supplied
     return not balance - clock.first_balance > max(BOUND * given, clock.energy_floor)
+
+
+@entered
+def _range_of_heat(kin, points, laws, control):
+    clock = control.clock[0]
+    for p in range(points.mass.size):
+        law = record(laws, points.material[p])
+        mass = points.mass[p]
+        capacity = heat_capacity(law, mass)
+        if capacity > 0:
+            state = load(points.state, p, initial_state(law, kin, mass))
+            T = float(temperature(law, kin, state))
+            # So written, NaN is noticed.
+            clock.T_low = T if not clock.T_low <= T else clock.T_low
+            clock.T_high = T if not clock.T_high >= T else clock.T_high
+            work = dissipated_energy(law, kin, state) * specific_volume(law)
+            clock.own_heat = max(clock.own_heat, float(work) / float(capacity))
+
+
+def _range(block, s):
+    _range_of_heat(s.kin, block.points, block.laws, s.control)
+
+
+_range_blocks = over_blocks(_range)
+
+
+@shared
+def measure_heat(s):
+    """Lowest and highest temperature of all points, into the clock."""
+    clock = s.control.clock[0]
+    clock.T_low, clock.T_high, clock.own_heat = inf, -inf, 0.0
+    _range_blocks(s)
+
+
+@shared
+def look_at_heat(s):
+    """Whether all temperatures are between what fixes, sources and the initial state allow."""
+    clock = s.control.clock[0]
+    if clock.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
+        return True
+    measure_heat(s)
+    largest = max(abs(clock.coldest), abs(clock.hottest))
+    room = OVERSHOOT * (clock.hottest - clock.coldest + clock.own_heat) + HEAT_NOISE * largest
+    above = clock.hottest + clock.own_heat + room
+    return clock.T_low >= clock.coldest - room and clock.T_high <= above
 
 
 @shared

@@ -9,7 +9,7 @@ import numpy as np
 
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block
-from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, SHRUNK, STOPPED
+from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK, STOPPED
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.simulation import Simulation
@@ -28,6 +28,8 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> tuple[str, str]:
         return _shrunk(hub, simulation)
     if status == GAINED:
         return _gained(hub, simulation)
+    if status == HEATED:
+        return _heated(hub, simulation)
     message, hint = _wrong_point(hub, simulation)
     message = f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}"
     clock = simulation.setup.control.clock[0]
@@ -44,7 +46,7 @@ def stop(
     """Return to the last good state, write it, and raise what the user should know."""
     step = simulation.step
     message, hint = trouble(hub, simulation, status)
-    if status in (GAINED, STOPPED):
+    if status in (GAINED, HEATED, STOPPED):
         simulation.restore(snapshot)
         if status == STOPPED and step > simulation.step:
             simulation.advance(step - simulation.step)
@@ -78,6 +80,20 @@ def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         f"(kinetic + stored + dissipated - work). Known to do that here: {cause}"
     )
     return message, cure
+
+
+def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+    clock = simulation.setup.control.clock[0]
+    message = (
+        f"step {simulation.step}, time {simulation.time:.6g}: temperatures have come to be between "
+        f"{clock.T_low:.4g} and {clock.T_high:.4g}, where initial state, fixes and sources allow "
+        f"{clock.coldest:.4g} to {clock.hottest + clock.own_heat:.4g}"
+    )
+    share = simulation.dt / clock.heat_limit
+    if share > 1:
+        message += f": the step is {share:.3g} times the stable one of conduction"
+        return message, f"set_dt({0.9 * clock.heat_limit:.3g}) or less, or leave set_dt out"
+    return message, _smaller_step(hub, simulation)
 
 
 def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:

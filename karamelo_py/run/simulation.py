@@ -43,7 +43,7 @@ from karamelo_py.kernels.step import (
     sweep,
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, Visit, sweep_nodes
-from karamelo_py.kernels.watch import ROUND_OFF, begin_to_look
+from karamelo_py.kernels.watch import ROUND_OFF, begin_to_look, measure_heat
 from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, law_kind, with_stress
 from karamelo_py.points.laws.plastic_rate import without_rate
@@ -55,9 +55,9 @@ from karamelo_py.run.lowering import (
     stable_courant,
     thread_count,
 )
-from karamelo_py.run.stable import ruling_limit, share_of_limit
+from karamelo_py.run.stable import ruling_limit, shares_of_limits
 from karamelo_py.run.trial import try_parts
-from karamelo_py.run.watch import unknown_work
+from karamelo_py.run.watch import unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
 from karamelo_py.script.errors import ScriptError
@@ -336,7 +336,7 @@ class Simulation:
         clock = self.setup.control.clock[0]
         clock.fixed_dt = update.fixed_dt or 0.0
         clock.courant = stable_courant(self.hub)
-        clock.dt_factor = share_of_limit(self.hub)
+        clock.dt_factor, clock.heat_factor = shares_of_limits(self.hub)
         clock.end_time = end_time
         clock.over_limit = 0
         # Twice: initial values may be formulas of dt, and dt follows the fastest point.
@@ -361,7 +361,8 @@ class Simulation:
         """From here on in this run the step is that of its start, halved so many `times`."""
         clock = self.setup.control.clock[0]
         clock.fixed_dt = (self.hub.update.fixed_dt or 0.0) / 2**times
-        clock.dt_factor = share_of_limit(self.hub) / 2**times
+        shares = shares_of_limits(self.hub)
+        clock.dt_factor, clock.heat_factor = (share / 2**times for share in shares)
         choose_dt(self.setup.control)
         clock.watch_limit = int(not self.above_limit())
         clock.over_limit = 0
@@ -380,6 +381,10 @@ class Simulation:
             # Velocities belong to half a step before, stresses to the share strained before.
             level = 0.5 + getattr(self.hub.update.scheme, "strained_before", 0.0)
             begin_to_look(s, level, anew)
+        clock.watch_heat = int(self.hub.update.thermal and not unknown_heat(self.hub))
+        if clock.watch_heat and anew:
+            measure_heat(s)
+            clock.coldest, clock.hottest = clock.T_low, clock.T_high
 
     def go_on(self, end_time: float) -> None:
         """In place of `begin`: go on with a run whose state was put into the arrays."""

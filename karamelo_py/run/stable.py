@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -40,10 +40,13 @@ def keeping_share(hub: Hub) -> float:
     return max(share, DAMPED) if sparse(hub) else USUAL
 
 
-def share_of_limit(hub: Hub) -> float:
-    """The share of the stable step that is taken: that of the script, or the program's own."""
+def shares_of_limits(hub: Hub) -> tuple[float, float]:
+    """The shares of the stable steps of waves and of conduction that are taken.
+
+    That of the script, or the program's own.
+    """
     asked = hub.update.dt_factor
-    return keeping_share(hub) if asked is None else asked
+    return (keeping_share(hub), USUAL) if asked is None else (asked, asked)
 
 
 def words_of_share(hub: Hub) -> str:
@@ -53,6 +56,7 @@ def words_of_share(hub: Hub) -> str:
         share = hub.update.fixed_dt / hub.simulation.limit
         words = f"{share:.3g} of the stable step, by set_dt"
     elif asked is None:
+        keeping = USUAL if ruling_limit(hub.simulation) == "conduction" else keeping
         return f"{keeping:g} of the stable step, the program's own"
     else:
         share = asked
@@ -75,15 +79,17 @@ def ruling_limit(simulation: Any) -> str:
     clock = s.control.clock[0]
     if clock.fixed_dt > 0:
         return "set_dt"
-    if s.control.values[DT] < clock.dt_factor * clock.limit * (1 - 1e-9):
+    waves = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
+    of_waves, of_heat = clock.dt_factor * waves, clock.heat_factor * clock.heat_limit
+    if s.control.values[DT] < min(of_waves, of_heat) * (1 - 1e-9):
         return "end"
-    if clock.heat_limit <= clock.limit:
+    if of_heat < of_waves:
         return "conduction"
     speed = max((float(np.abs(b.points.v).max(initial=0)) for b in s.blocks), default=0.0)
     if speed > 0.5 * clock.rate:
         return "speed"
-    waves = _speed_without_viscosity(simulation)
-    if 0 < waves < (clock.rate - speed) / 1.2:
+    without = _speed_without_viscosity(simulation)
+    if 0 < without < (clock.rate - speed) / 1.2:
         return "viscosity"
     return "light_nodes" if clock.courant < 1 else "waves"
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.hooks import CompiledHook
+from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.temperatures import initial_heat
@@ -39,6 +39,15 @@ def unknown_work(hub: Hub) -> str:
         if hub.update.thermal and can(solid.material.law, initial_heat):
             return "heat"
     return ""
+
+
+def unknown_heat(hub: Hub) -> bool:
+    """Whether a fix in Python may bring heat."""
+    return any(
+        name in HEAT_STAGES and not isinstance(hook, CompiledHook)
+        for fix in hub.fixes.values()
+        for name, hook in fix.hooks().items()
+    )
 
 
 def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
