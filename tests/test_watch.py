@@ -1,0 +1,75 @@
+"""The watch over energy and temperatures: what it counts, what it tells, where it stops a run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import SCHEMES, block
+
+from karamelo_py.kernels.arrays import Control, new_clock
+from karamelo_py.kernels.watch import LOOKS, judge
+
+TRAVEL = "fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y0))"
+
+
+def watched(balances, work=None):
+    """The clock after looks at these balances; whether the last is within its bound."""
+    control = Control(np.zeros(3), new_clock())
+    clock = control.clock[0]
+    clock.level, clock.energy_floor = 0.5, 1e-12
+    within = True
+    for k, balance in enumerate(balances):
+        clock.work = work[k] if work is not None else 0.0
+        clock.kinetic = balance + clock.work
+        within = judge(control)
+    return clock, within
+
+
+def test_windows_that_grow_are_counted():
+    """Growth is of the mean of a window, relative to the largest energy so far."""
+    steady, within = watched([1.0] * 5 * LOOKS)
+    assert within and steady.windows == 0 and steady.grown == 0
+    waving, within = watched([1 + 0.2 * (-1) ** k for k in range(5 * LOOKS)])
+    assert within and waving.windows == 0
+    growing, within = watched([1.02 ** (k // LOOKS) for k in range(4 * LOOKS)])
+    assert within and growing.windows == 3
+    assert growing.growth == pytest.approx(0.02 / 1.02)
+
+
+def test_the_bound_is_what_there_was_and_what_loads_have_brought():
+    """Twice the energy at the start is too much, unless loads have done the work."""
+    assert watched([1.0, 1.99])[1]
+    assert not watched([1.0, 2.01])[1]
+    assert watched([1.0, 2.5], work=[0.0, 4.0])[1]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_work_of_gravity_is_added_up(run_interpreted, scheme):
+    """A body in free fall: its energy less the work of gravity stays, and nothing is told."""
+    lines = ["fix(g, body_force, all, 0, -1)", "set_dt(0.002)", "set_output(100)", "run(130)"]
+    result = run_interpreted(block(2, TRAVEL, *lines, scheme=scheme, size=(0.2, 0.1)))
+    assert "nowhere" not in result.out + result.err
+
+
+def test_a_step_above_the_limit_is_named(run_interpreted):
+    """A run that blows up stops, names step, cause and cure, and keeps the last good state."""
+    lines = ["dt_factor(1.9)", "set_output(100)", "run(400)"]
+    result = run_interpreted(block(2, TRAVEL, *lines, size=(0.3, 0.3)), status=1)
+    assert "error" in result.err + result.out
+    assert list(result.folder.glob("last_good.*"))
+
+
+def test_half_the_step_in_trouble(run_interpreted):
+    """The same run ends well with on_trouble=halve, and says what it did."""
+    lines = ["dt_factor(1.9)", "set_output(100)", "run(60, on_trouble=halve)"]
+    result = run_interpreted(block(2, TRAVEL, *lines, size=(0.3, 0.3)))
+    assert "with 1/2 of the step" in result.err + result.out
+
+
+def test_the_limit_has_a_name(run_interpreted):
+    """The log shows what rules the step."""
+    lines = ["set_output(1)", "log_modify(custom, step, limit)", "run(1)", "set_dt(1e-3)", "run(1)"]
+    result = run_interpreted(block(1, *lines))
+    rows = (result.folder / "log.mpm").read_text(encoding="utf-8").splitlines()
+    assert [row.split()[1] for row in rows[1:3]] == ["waves", "waves"]
+    assert rows[-1].split()[1] == "set_dt"
