@@ -301,6 +301,7 @@ class Simulation:
     def measured(self, known: bool) -> None:
         self.version += 1
         self._measured = self.version if known else -1
+        self._watched = self.version  # the clock tells how its balance has gone
 
     @property
     def begun(self) -> list[str]:
@@ -395,9 +396,10 @@ class Simulation:
         update, clock = self.hub.update, self.setup.control.clock[0]
         self._prepare_hooks()
         update.method.begin(self.hub, self.setup.contact)
-        said = update.fixed_dt or 0.0, update.dt_factor, end_time
-        if said != (clock.fixed_dt, clock.dt_factor, clock.end_time):
-            clock.fixed_dt, clock.dt_factor, clock.end_time = said
+        self._watched = self.version
+        said = update.fixed_dt or 0.0, *shares_of_limits(self.hub), end_time
+        if said != (clock.fixed_dt, clock.dt_factor, clock.heat_factor, clock.end_time):
+            clock.fixed_dt, clock.dt_factor, clock.heat_factor, clock.end_time = said
             choose_dt(self.setup.control)
 
     def _choose_dt(self) -> None:
