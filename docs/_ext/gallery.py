@@ -1,7 +1,7 @@
-"""The gallery: a page for each scene of inputs/, with its picture, what its head says, and the script.
+"""The gallery: a page for each scene of inputs/, with picture, what its head says, and the script.
 
-Pages are written to docs/gallery/generated before Sphinx reads its sources. A scene without a picture
-of its own shows that of the scene whose name its own begins with.
+Pages are written to docs/gallery/generated before Sphinx reads its sources. A scene without a
+picture of its own shows that of the scene whose name its own begins with.
 """
 
 from __future__ import annotations
