@@ -16,10 +16,16 @@ author = "the authors of karamelo-py"
 release = version = __version__
 copyright = author
 
-extensions = ["myst_parser", "reference_pages", "script_lexer"]
-myst_enable_extensions = ["colon_fence", "deflist"]
+extensions = ["myst_nb", "sphinx.ext.mathjax", "reference_pages", "gallery", "script_lexer"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build", "_ext"]
+
+# The tutorial is run by each build, which fails with it.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600
+nb_merge_streams = True
 
 html_theme = "furo"
 html_title = f"karamelo-py {release}"

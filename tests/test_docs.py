@@ -1,6 +1,7 @@
 """README, documentation and docstrings: what they show is right."""
 
 import inspect
+import json
 import re
 import subprocess
 import sys
@@ -231,11 +232,41 @@ def test_the_reference_is_written_for_every_style(tmp_path):
 
 
 def test_the_site_builds_without_warnings(tmp_path):
-    for module in ("sphinx", "myst_parser"):
+    for module in ("sphinx", "myst_nb", "ipykernel"):
         pytest.importorskip(module)
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
     # The theme of the site takes three times as long, and warns of nothing else.
     command += ["-D", "html_theme=basic", "-D", "html_use_index=0", "-D", "html_copy_source=0"]
+    command += ["-D", "nb_execution_mode=off"]  # test_the_tutorial_runs does
     command += ["-d", str(tmp_path / "doctrees"), str(ROOT / "docs"), str(tmp_path / "html")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.xdist_group("disks")
+def test_the_tutorial_runs(tmp_path, monkeypatch):
+    """Cell after cell, as the build of the site does; its own assertions hold."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    notebook = json.loads((ROOT / "docs" / "tutorial.ipynb").read_text("utf-8"))
+    cells = ["".join(c["source"]) for c in notebook["cells"] if c["cell_type"] == "code"]
+    assert len(cells) > 10
+    namespace: dict = {}
+    for cell in cells:
+        exec(cell, namespace)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_gallery_shows_every_scene(tmp_path):
+    """A page for each script of inputs/, with what its head says."""
+    sys.path.insert(0, str(ROOT / "docs" / "_ext"))
+    try:
+        from gallery import head_of, picture_of
+    finally:
+        sys.path.pop(0)
+    static = ROOT / "docs" / "_static"
+    for path in (ROOT / "inputs").glob("in.*"):
+        title, _ = head_of(path.read_text("utf-8"))
+        assert title, f"{path.name} says nothing of itself in its first lines"
+    assert picture_of("two_disks_2020", static) == picture_of("two_disks", static)
+    assert picture_of("nothing_like_it", static) is None

@@ -120,7 +120,8 @@ def _parser(command: str) -> CommandLine:
     parser = CommandLine(
         prog="karamelo-py",
         usage="karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [-log FILE] [-out FOLDER]\n"
-        "                          [-restart FILE] [--quiet] [--debug]\n"
+        "                          [-restart FILE]\n"
+        "                          [--trust-geometries] [--quiet] [--debug]\n"
         "       karamelo-py COMMAND ...",
         description=f"karamelo-py {__version__}: the material point method",
         epilog="karamelo-py COMMAND -h explains a command. karamelo-py SCRIPT is short for\n"
@@ -146,6 +147,10 @@ def _parser(command: str) -> CommandLine:
         script.add_argument(
             "--threads", type=threads_option, metavar="N",
             help="threads to use (default: all cores where the scene is large enough)",
+        )  # fmt: skip
+        script.add_argument(
+            "--trust-geometries", action="store_true",
+            help="let .geo files run programs and write files",
         )  # fmt: skip
         add_output_options(script)
         if name == "run":
@@ -196,6 +201,7 @@ def _run(options: argparse.Namespace) -> int:
     hub = Hub(Console(quiet=options.quiet))
     hub.settings.threads = options.threads
     hub.settings.debug = options.debug
+    hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking
     direct(hub, options)
     presets = dict(options.var)

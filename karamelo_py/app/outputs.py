@@ -38,6 +38,7 @@ def direct(hub: Hub, options: argparse.Namespace) -> None:
         hub.folder = options.out.absolute()
     if options.log is not None:
         hub.output.log.file = options.log
+        hub.output.log.is_asked_for = True
         if not hub.output.log.path.parent.is_dir() or hub.output.log.path.is_dir():
             raise ScriptError(
                 f"the log cannot be written to {options.log}",

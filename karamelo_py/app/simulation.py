@@ -114,6 +114,8 @@ class Simulation:
         Threads to use; all cores where the scene is large enough by default.
     verbose
         Show on the terminal what the command line shows.
+    trust_geometries
+        Let .geo files run programs and write files.
     variables
         Take the place of what the script assigns to them, as ``-var`` does.
 
@@ -145,10 +147,12 @@ class Simulation:
         out: str | PathLike | None = None,
         threads: int | None = None,
         verbose: bool = False,
+        trust_geometries: bool = False,
         **variables: Any,
     ):
         self.hub = hub = Hub(Console() if verbose else _Quiet())
         hub.settings.threads = threads
+        hub.settings.trusts = trust_geometries
         hub.pausing = True
         hub.output.log.rows = []
         hub.output.writes = out is not None

@@ -6,6 +6,7 @@ import inspect
 import math
 import os
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,6 +94,15 @@ class OutputFile:
         """The path of the file."""
         name = _file_name(argument)
         path = getattr(hub, "folder", Path()) / name
+        try:
+            os.fsencode(name)
+        except UnicodeEncodeError:
+            raise ScriptError(
+                f"{name} cannot be the name of a file here, where names of files are in "
+                f"{sys.getfilesystemencoding()}",
+                place=argument.place,
+                hint="the environment variable PYTHONUTF8=1, or another name",
+            ) from None
         if not path.parent.is_dir():
             parent = Path(name).parent
             raise ScriptError(

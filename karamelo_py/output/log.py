@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 from pathlib import Path
 from typing import TextIO
 
@@ -34,6 +35,7 @@ class Log(Rhythmic):
         self.hub = hub
         self.every: int | ByTime = 1
         self.file = Path(FILE)
+        self.is_asked_for = False  # the file, by a name that the user gives
         self.columns: list[Quantity] = []
         self.last_step: int | None = None
         self._file: TextIO | None = None
@@ -117,6 +119,13 @@ class Log(Rhythmic):
         path = self.path
         if not self.hub.output.writes:
             return
+        if not end and not self.is_asked_for and not _is_log(path):
+            raise ScriptError(
+                f"{path} is there, and no run has written it",
+                expected="a folder without such a file",
+                hint="-log FILE or -out FOLDER sends the log elsewhere; -log "
+                f"{self.file} overwrites it",
+            )
         try:
             # Line buffering: each line is in the file at once, also when the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
@@ -148,6 +157,31 @@ class Log(Rhythmic):
             raise ScriptError(
                 f"cannot write the log file {self.path}: {error.strerror or error}"
             ) from error
+
+
+def _is_log(path: Path) -> bool:
+    """Whether what is there, if anything, looks like a log: names, then numbers."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            lines = [file.readline(1 << 16) for _ in range(4)]
+    except FileNotFoundError:
+        return True
+    except UnicodeDecodeError:
+        return False
+    except OSError:
+        return True  # which opening it will tell
+    head, *rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip()] or [[]]
+    if not rows:
+        return not head or bool({"Step", "dt", "Time"} & set(head))
+    return all(row[0] == "#" or all(map(_is_number, row)) for row in rows)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _claim(file: TextIO) -> None:

@@ -198,6 +198,7 @@ def _place(x: np.ndarray) -> str:
 
 def _write_last_good(hub: Hub) -> None:
     """Write the present state: to a file to go on from, and to the outputs of the script."""
-    if hub.output.writes:
+    path = restart.path_of(hub, Path(LAST_GOOD))
+    if hub.output.writes and (not path.exists() or restart.is_restart(path)):
         restart.write(hub, Path(LAST_GOOD), within=True)
     hub.output.write(last=True)

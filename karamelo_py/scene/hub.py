@@ -91,6 +91,7 @@ class Settings:
         self.precision = "double"
         self.engine = "processor"
         self.debug = False
+        self.trusts = False  # .geo files, which may run programs
 
 
 class Hub:

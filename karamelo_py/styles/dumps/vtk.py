@@ -43,6 +43,12 @@ class VtkDump(TableDump):
                 expected="a file name with a * and the ending .vtu",
                 hint=f"{stem or 'points'}.*.vtu",
             )
+        if self.index.is_file() and b"VTKFile" not in self.index.read_bytes()[:200]:
+            raise ScriptError(
+                f"{self.index.name}, which would list the snapshots, is there and no such list",
+                argument="file",
+                expected="another name",
+            )
         self._series: list[tuple[float, str]] = []
 
     @property

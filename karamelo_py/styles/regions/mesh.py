@@ -56,7 +56,9 @@ class MeshRegion(Region):
         if group == EXTERIOR and exterior is None:
             group, exterior = None, EXTERIOR
         dimension = require_domain(hub).dimension
-        parts = elements_of(read(file, dimension), dimension, group, lower=group is not None)
+        parts = elements_of(
+            read(file, dimension, hub.settings.trusts), dimension, group, lower=group is not None
+        )
         corners = np.concatenate([split(elements) for elements in parts])
         lo, hi = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)

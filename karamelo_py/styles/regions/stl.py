@@ -51,7 +51,7 @@ class STL(Region):
                 expected="dimension(3, ...)",
                 hint="in 2D, region(ID, mesh, file) takes a mesh of triangles or quadrilaterals",
             )
-        mesh = read(file, 2)
+        mesh = read(file, 2, hub.settings.trusts)
         triangles = mesh.get_cells_type("triangle")
         if not len(triangles):
             raise ScriptError(

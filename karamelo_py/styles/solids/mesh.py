@@ -72,7 +72,9 @@ class MeshSolid(Solid):
         domain = require_domain(hub)
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.file = file
-        parts = elements_of(read(file, domain.dimension), domain.dimension, group)
+        parts = elements_of(
+            read(file, domain.dimension, hub.settings.trusts), domain.dimension, group
+        )
         if len(parts) > 1:
             both = " and ".join(part.shape.words for part in parts)
             raise ScriptError(

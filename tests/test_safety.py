@@ -1,0 +1,174 @@
+"""What is written and run only where the user says so: files of others, programs of geometries."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from scenes import block
+
+from karamelo_py import Simulation, SimulationError
+from karamelo_py.scene.meshes.reading import refuse_commands
+from karamelo_py.script.errors import ScriptError
+
+RUN = block(2, "fix(v, initial_velocity_particles, all, 0.1, 0)", "set_dt(0.001)", "run(2)")
+
+
+# --- files that no run has written --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["My notes\non many things\n", "a,b\nc,d\n", "\xff\xfe\x00"])
+def test_a_log_of_somebody_else(run_interpreted, tmp_path, text):
+    """A file that is no log stays, unless -log names it."""
+    (tmp_path / "run").mkdir()
+    path = tmp_path / "run" / "log.mpm"
+    path.write_bytes(text.encode("latin-1"))
+    result = run_interpreted(RUN, status=1)
+    assert "is there, and no run has written it" in result.err
+    assert path.read_bytes() == text.encode("latin-1")
+    run_interpreted(RUN, "-log", "log.mpm")
+    assert path.read_text().startswith("Step")
+
+
+@pytest.mark.parametrize("text", ["", "Step dt Time\n", "Step dt Time\n0 0.1 0\n# Step E\n1 2\n"])
+def test_a_log_of_an_earlier_run(run_interpreted, tmp_path, text):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "log.mpm").write_text(text)
+    assert run_interpreted(RUN).log.Step.tolist() == [0, 1, 2]
+
+
+def test_the_list_of_a_series(run_interpreted, tmp_path):
+    """A .pvd is written beside what the script names: it must be one of a run."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "p.pvd").write_text("notes")
+    script = RUN.replace("run(2)", "dump(d, all, vtk, 1, p.*.vtu, x)\nrun(2)")
+    result = run_interpreted(script, status=1)
+    assert "p.pvd, which would list the snapshots, is there" in result.err
+    (tmp_path / "run" / "p.pvd").unlink()
+    run_interpreted(script)
+    run_interpreted(script)  # over its own
+
+
+def test_nothing_is_written_elsewhere(run_interpreted, tmp_path):
+    """Only the folder of the run has new files."""
+    before = set(tmp_path.rglob("*"))
+    run_interpreted(RUN.replace("run(2)", "restart(1, r.h5)\nrun(2)"), "-out", "results")
+    new = {path.relative_to(tmp_path) for path in set(tmp_path.rglob("*")) - before}
+    assert {str(path) for path in new} == {
+        "run", "run/in.script", "run/results", "run/results/log.mpm", "run/results/r.h5",
+    }  # fmt: skip
+
+
+# --- geometries that do more than describe ------------------------------------------------------
+
+SQUARE = 'SetFactory("OpenCASCADE");\nRectangle(1) = {0.3, 0.3, 0, 0.3, 0.2};\n'
+ACTS = [
+    'SystemCall "touch hacked";',
+    'System "touch hacked";',
+    'NonBlockingSystemCall "touch hacked";',
+    'OnelabRun("touch", "touch hacked");',
+    'Printf("x") > "hacked";',
+    'Printf("x") >> "hacked";',
+    'Print "hacked.png";',
+    'Save "hacked.msh";',
+    'CreateDir "hacked";',
+    'Include "other.geo";',
+    'Merge "other.geo";',
+    'name = "other.geo";\nInclude Str(name);',
+    'Parse["SystemCall hacked"];',
+]
+
+
+@pytest.mark.parametrize("line", ACTS)
+def test_a_geometry_that_acts(run_interpreted, tmp_path, line):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "other.geo").write_text('\n\nSystemCall "touch hacked";\n')
+    (folder / "box.geo").write_text(SQUARE + line + "\n")
+    script = block(2).replace("region, box, 2,", "mesh, box.geo,")
+    result = run_interpreted(script, status=1)
+    assert "would run a program or write a file" in result.err
+    assert "--trust-geometries" in result.err
+    where = "other.geo, line 3" if '"other' in line and "name" not in line else "box.geo, line"
+    assert where in result.err
+    assert not list(folder.glob("hacked*"))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["// SystemCall\n", "/* Save\n Print */\n", 'Printf("SystemCall");\n', "SystemCalls = 1;\n"],
+)  # fmt: skip
+def test_a_geometry_that_only_speaks(tmp_path, text):
+    path = tmp_path / "a.geo"
+    path.write_text(SQUARE + text)
+    refuse_commands(path)
+
+
+def test_a_trusted_geometry(tmp_path, monkeypatch):
+    """The option lets it; in Python an argument does."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "box.geo"
+    path.write_text(SQUARE + 'Printf("made") > "made.txt";\nMesh.MeshSizeMax = 0.1;\n')
+    text = block(2).replace("region, box, 2,", "mesh, box.geo,")
+    with pytest.raises(SimulationError, match="--trust-geometries"):
+        Simulation(text)
+    assert not (tmp_path / "made.txt").exists()
+    Simulation(text, trust_geometries=True)
+    assert (tmp_path / "made.txt").exists()
+
+
+def test_all_shipped_geometries_only_describe():
+    from conftest import INPUTS
+
+    found = list(INPUTS.glob("*.geo"))
+    assert found
+    for path in found:
+        refuse_commands(path)
+
+
+def test_names_that_the_system_cannot_write(tmp_path):
+    """Where names of files are ASCII (UTF-8 is switched off) the name is told, not the author."""
+    (tmp_path / "in.a").write_text(
+        RUN.replace("run(2)", 'dump(d, all, hdf5, 1, "ß.h5", x)\nrun(2)')
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "karamelo_py.app.cli", "in.a"],
+        cwd=tmp_path, capture_output=True, text=True,
+        env={**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0",
+             "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    if done.returncode:  # a system without such names
+        assert "cannot be the name of a file here" in done.stderr
+        assert "tell the author" not in done.stderr
+
+
+# --- the first moment ---------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to one process")
+@pytest.mark.parametrize("after", [0.15, 0.3, 0.6])
+def test_ctrl_c_while_the_program_starts(tmp_path, after):
+    """One word and exit status 130, also in the midst of an import."""
+    (tmp_path / "in.a").write_text(RUN.replace("run(2)", "run(100000000)"))
+    process = subprocess.Popen(
+        [sys.executable, "-c", "import sys; from karamelo_py.app import start; "
+         "sys.argv[1:] = ['in.a']; print('begun', flush=True); sys.exit(start.main())"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert process.stdout.readline() == "begun\n"
+    time.sleep(after)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=120)
+    assert process.returncode == 130, err
+    assert "Traceback" not in err
+    assert "interrupted" in err
+
+
+def test_the_word_of_the_error():
+    """ScriptError and SimulationError are one family, so that either can be caught."""
+    assert issubclass(SimulationError, ScriptError)
