@@ -43,7 +43,7 @@ def test_help_of_a_style(capsys):
     status, out, _ = call(capsys, "help", "fix", "velocity_nodes")
     assert status == 0
     for part in (
-        "fix(ID, velocity_nodes, group, vx[, vy[, vz]])",
+        "fix(ID, velocity_nodes, group, vx[, vy[, vz]][, mu=mu])",
         "Prescribe the velocity of nodes",
         "the ID of a node group",
         "a number or a formula or NULL, any number of them",
