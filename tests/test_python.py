@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -234,3 +235,16 @@ def test_compiled(tmp_path, monkeypatch, capsys):
     [last] = read_dump(Path("d.20.txt"))
     assert sim.points["vy"] == pytest.approx(last.vy, rel=1e-5)
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.xdist_group("disks")
+def test_the_lines_of_the_readme(monkeypatch):
+    """They run as they stand, in the folder of README, and leave no file."""
+    root = Path(__file__).parents[1]
+    monkeypatch.chdir(root)
+    before = set(root.iterdir())
+    (lines,) = re.findall(r"```python\n(.*?)```", (root / "README.md").read_text("utf-8"), re.S)
+    said = {}
+    exec(lines, said)
+    assert said["sim"].log["Time"][-1] == 3.5
+    assert set(root.iterdir()) == before
