@@ -94,3 +94,25 @@ def test_what_is_held():
     assert held_type(held) == held
     assert held != held_type(typeof(setup()._replace(factor=1)))
     assert held_type(typeof((1, 2.0))) == typeof((1, 2.0))
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_classes_of_one_name_are_two():
+    """As a plug-in's may be: what is chosen by class must not be that of the other."""
+
+    def made():
+        class Tag(NamedTuple):
+            number: float
+
+        class Kit(NamedTuple):
+            tag: Tag
+            array: Any
+
+        return Kit(Tag(1.0), np.zeros(2))
+
+    one, other = (held_type(typeof(made())) for _ in range(2))
+    assert one != other
+    assert one.instance_class is not other.instance_class
+    with_tags = [held_type(typeof(Setup(True, tag, setup().pair, None, ()))) for tag in
+                 (made().tag, made().tag)]  # fmt: skip
+    assert with_tags[0] != with_tags[1]

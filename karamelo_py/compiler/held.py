@@ -22,19 +22,24 @@ from numba.core.types.containers import _HeterogeneousTuple
 from numba.extending import intrinsic, models, register_model, type_callable
 
 
+def _words(numba_type: Any) -> str:
+    """A type in words, with the modules of the classes in it; Numba's leave them out."""
+    if isinstance(numba_type, types.BaseTuple) and not isinstance(numba_type, _Held):
+        kind = getattr(numba_type, "instance_class", tuple)
+        inner = ", ".join(_words(item) for item in numba_type)
+        return f"{kind.__module__}.{kind.__qualname__}({inner})"
+    return str(numba_type)
+
+
 class _Held(_HeterogeneousTuple):
     """Numba type of a pointer to the items of a tuple."""
 
     def __init__(self, items: tuple, word: str):
         self.types = items
         self.count = len(items)
-        text = f"{word}({', '.join(str(item) for item in items)})"
+        text = f"{word}({', '.join(_words(item) for item in items)})"
         # Short, for it is part of the names of functions.
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
-
-    @property
-    def key(self):
-        return self.name
 
     @property
     def iterator_type(self):
@@ -43,6 +48,10 @@ class _Held(_HeterogeneousTuple):
 
 class HeldTuple(_Held):
     """A held tuple without names."""
+
+    @property
+    def key(self):
+        return self.types
 
     def __init__(self, items: tuple):
         super().__init__(items, "")
@@ -55,6 +64,10 @@ class HeldNamedTuple(_Held, types.BaseNamedTuple):
         self.fields = tuple(instance_class._fields)
         self.instance_class = instance_class
         super().__init__(items, f"{instance_class.__module__}.{instance_class.__qualname__}")
+
+    @property
+    def key(self):
+        return self.instance_class, self.types
 
 
 @register_model(HeldTuple)
@@ -134,7 +147,8 @@ def _by_name(context, builder, held, place, attribute):
 @lower_builtin("static_getitem", _Held, types.IntegerLiteral)
 def _by_number(context, builder, signature, arguments):
     place, number = arguments
-    return item_of(context, builder, signature.args[0], place, number)
+    held = signature.args[0]
+    return item_of(context, builder, held, place, number % len(held))
 
 
 def hold(value: Any) -> Any:

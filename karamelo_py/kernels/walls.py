@@ -40,7 +40,7 @@ def rub(kin, nodes, programs, n, mu, dt, kept, reaction):
     if not along > 0:
         return
     speed = sqrt(along)
-    stop = min(mu * sqrt(across), speed)
+    stop = min(max(mu, 0.0) * sqrt(across), speed)
     for c in range(d):
         if programs[c].begin < 0:
             taken = nodes.update[n, c] * (stop / speed)

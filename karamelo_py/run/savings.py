@@ -47,7 +47,13 @@ def savings(hub: Hub, simulation: Any) -> list[Saving]:
 
 
 def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
-    dt, limit = simulation.dt, simulation.limit
+    share, limit = hub.update.dt_factor, simulation.limit
+    if hub.update.fixed_dt is not None:
+        dt = simulation.dt
+    elif share is not None:
+        dt = share * limit  # not what the end of a short run makes of it
+    else:
+        return  # the program's own
     if not 0 < dt < SMALL_STEP * limit < np.inf:
         return
     times = f"{0.9 * limit / dt:.3g} times as many steps as the stable step asks for"

@@ -32,6 +32,9 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
     outside.
     """
     solids = list(hub.solids.values())
+    if not solids:
+        none = np.zeros(0, np.int64)
+        return Faces(none, none, none, np.zeros(0), np.zeros((0, hub.domain.dimension)))
     x0 = np.concatenate([solid.x0 for solid in solids])[ids]
     half = np.concatenate([solid.half_size for solid in solids])[ids]
     d = x0.shape[1]

@@ -50,6 +50,7 @@ class ForceParticles(Fix):
     def initial_integrate(self, points: PointsView) -> None:
         """Give the points their share, and publish the sum."""
         if not len(points.ids):
+            self.publish_components(np.zeros(points.position.shape[1]))
             return
         share = points.mass / points.mass.sum()
         force = np.zeros(points.position.shape)

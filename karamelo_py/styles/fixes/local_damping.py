@@ -13,12 +13,16 @@ from karamelo_py.styles.methods.ulmpm_contacts import ULMPMContacts
 
 
 def brake(mass, v, v_star, force, value, before, dt, share):
-    """v* loses a share of its change, against v; the total is the force that does so."""
-    against = value * abs(v_star - v)
-    if v == 0:
-        against = 0.0
-    elif v > 0:
-        against = -against
+    """v* loses a share of what the force changed it by, against v; the total is the force of that.
+
+    Where the step turns the node around, or a wall has stopped it, there is nothing to brake.
+    """
+    against = 0.0
+    if v * v_star > 0:
+        change = min(abs(v_star - v), abs(force) * dt / mass)
+        against = min(value * change, abs(v_star))
+        if v > 0:
+            against = -against
     return v, v_star + against, force, mass * against / dt
 
 

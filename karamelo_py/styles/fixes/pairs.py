@@ -31,7 +31,6 @@ class PairContact(Fix):
 
     published = ("x", "y", "z")
     point_fields = (Force,)
-    conserves = True
     needs_all_points = True  # they are searched by ranges of ids
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):

@@ -174,9 +174,11 @@ def _(strength, memory, increment, heat, dt):
     zero = real(0, increment)
     T = temperature_or(heat, strength.initial_temperature)
     near = real(1e-6, increment) * (increment + real(1e-4, increment))
-    there = value(strength, memory[0] + increment, increment / dt, T)
-    beyond = value(strength, memory[0] + increment + near, (increment + near) / dt, T)
+    # In double precision: the difference of the two is small.
+    here = 0.0 + memory[0] + increment
+    there = max(value(strength, here, increment / dt, T), 0.0)
+    beyond = max(value(strength, here + near, (0.0 + increment + near) / dt, T), 0.0)
     flow = max(real(there, increment), zero)
-    slope = (max(real(beyond, increment), zero) - flow) / near
+    slope = real((beyond - there) / near, increment)
     # A slope of -3 G is where there is no solution any more.
     return flow, max(slope, real(-2, slope) * strength.G)
