@@ -28,8 +28,23 @@ from ptx import compiled, compiled_visit, setup_of, visit_node, visits_of  # noq
 full = pytest.mark.full
 both = pytest.mark.parametrize("kinematics", ["plane", "space"])
 
-# What does not stay in registers, and why.
-EXCEPTIONS: dict[str, str] = {}
+FORMULA = "Numba for CUDA does not know numpy.floor, ceil, rint and trunc of a number"
+POWER = "calls the power of CUDA's library (x**y)"
+# What does not compile, or does not stay in registers, and why.
+EXCEPTIONS = {
+    "test_bases[ulmpm cpgimp det-plane]": POWER,
+    "test_bases[ulmpm cpgimp det-space]": POWER,
+    "test_heat[space]": POWER,
+    "test_bases[ulcpdi linear H8-space]": "more than the 255 registers of a thread, all in one",
+    **{f"test_laws[strength formula {k}-{d}]": FORMULA for k in (0, 1) for d in ("plane", "space")},
+}
+
+
+@pytest.fixture(autouse=True)
+def exception(request):
+    """Known exceptions fail; one that no longer does is told."""
+    if reason := EXCEPTIONS.get(request.node.name):
+        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
 
 
 def in_registers(made) -> bool:
@@ -48,13 +63,9 @@ def visits_stay_in_registers(script: str, in_stages: bool = False) -> None:
         assert in_registers(compiled_visit(visit, setup)), visit
 
 
-@pytest.mark.parametrize(
-    ("kinematics", "basis", "transfer"),
-    [("plane", "quadratic-spline", "MLS"), ("space", "linear", "FLIP")],
-)
-def test_step(kinematics, basis, transfer):
-    """Some of what follows."""
-    visits_stay_in_registers(scene(kinematics, "ulmpm", basis, "", transfer, "musl"))
+def test_step():
+    """One of what follows."""
+    visits_stay_in_registers(scene("plane", "ulmpm", "quadratic-spline", "", "MLS", "musl"))
 
 
 @full
@@ -89,7 +100,7 @@ def test_schemes(kinematics, name):
 @both
 def test_averaged_volumes(kinematics):
     script = scene(kinematics, "ulmpm", "linear", "", "FLIP", "musl")
-    visits_stay_in_registers(script.replace("region(", "anti_volumetric_locking(average)\nregion("))
+    visits_stay_in_registers(script.replace("region(", "anti_volumetric_locking(true)\nregion("))
 
 
 # --- laws: those of the examples in their manuals ---------------------------------------------
@@ -156,7 +167,7 @@ def test_heat(kinematics):
 def test_nodes(kinematics):
     """Every task at a node, with all fields that they know."""
     script = scene(kinematics, "ulmpm", "linear", "", "XPIC", "usl")
-    script = script.replace("region(", "anti_volumetric_locking(average)\nregion(")
+    script = script.replace("region(", "anti_volumetric_locking(true)\nregion(")
     setup, _ = setup_of(script)
     tasks = [kind for kind in vars(nodes).values() if hasattr(kind, "goes_through")]
     assert len(tasks) > 10
