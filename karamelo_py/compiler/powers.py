@@ -17,7 +17,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import by_type, choose, define, fma, real, shared
-from karamelo_py.compiler.lanes.numbers import Lanes, call_vector, element, vector_of
+from karamelo_py.compiler.lanes.numbers import Lanes, element, vector_of
 
 
 def logarithm(x: float) -> float:
@@ -99,23 +99,6 @@ def _scaled(typing_context, x, n):
     return x(x, x), codegen
 
 
-@intrinsic
-def _nearest(typing_context, x):
-    """The whole number next to x."""
-    if isinstance(x, Lanes):
-        return x(x), call_vector("rint", x)
-
-    def codegen(context, builder, sig, arguments):
-        name = f"llvm.rint.f{x.bitwidth}"
-        kind = element(x)
-        function = builder.module.globals.get(name) or ir.Function(
-            builder.module, ir.FunctionType(kind, [kind]), name
-        )
-        return builder.call(function, arguments)
-
-    return x(x), codegen
-
-
 def _series(x: str, coefficients: list[float]) -> list[str]:
     """Lines that sum up a polynomial of `x`, and of `xx`, its square, in two chains."""
     lines = []
@@ -143,15 +126,14 @@ _logarithm = define(
 )
 # e^x = 2^n e^r with |r| up to ln 2 / 2; beyond these limits it is 0 or infinite
 _exponential = define(
-    "x, most",
-    "most = real(most, x)",
+    "x, most, far",
+    "most, far = real(most, x), real(far, x)",
     "x = min(max(x, -most), most)",
-    f"n = nearest(x * real({1 / _LN_2!r}, x))",
+    f"n = (x * real({1 / _LN_2!r}, x) + far) - far",  # the whole number next to it
     f"r = fma(-n, real({_REST!r}, x), fma(-n, real({_LN_2!r}, x), x))",
     "rr = r * r",
     *_series("r", [1 / factorial(k) for k in range(14)]),
     "return scaled(total, n)",
-    nearest=_nearest,
     scaled=_scaled,
     **_NAMES,
 )
@@ -164,8 +146,9 @@ def _choose_logarithm(x):
 
 @by_type(exponential)
 def _choose_exponential(x):
-    most = 1000 if _bits(x)[3] == 1023 else 130
-    return lambda x: _exponential(x, most)
+    # So far from 0 that the next number is 1 away; all targets know how to add, but not to round.
+    most, far = (1000, 1.5 * 2**52) if _bits(x)[3] == 1023 else (130, 1.5 * 2**23)
+    return lambda x: _exponential(x, most, far)
 
 
 shared(_exponential)

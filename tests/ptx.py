@@ -1,0 +1,168 @@
+"""One point of a scene as a thread of a GPU would visit it, compiled to PTX and machine code.
+
+Needs numba-cuda and NVIDIA's compiler libraries, but neither a GPU nor a driver.
+"""
+
+from __future__ import annotations
+
+import re
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+from unittest.mock import patch
+
+import numpy as np
+from cuda.bindings import nvjitlink
+from numba import typeof, types
+from numba.cuda import dispatcher
+from numba.cuda.compiler import compile as compile_for_gpu
+
+from karamelo_py.compiler.compile import index
+from karamelo_py.compiler.fields import load_vector
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import Setup
+from karamelo_py.kernels.g2p import (
+    AverageStress,
+    FBar,
+    SeriesTerm,
+    TrialStrain,
+    empty_all,
+    settled_all,
+)
+from karamelo_py.kernels.heat import HeatFlow, TemperatureGradient, content_and_warming
+from karamelo_py.kernels.nodes import at_node
+from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all
+from karamelo_py.kernels.step import Insulated
+from karamelo_py.kernels.sweep import (
+    Context,
+    OldWeights,
+    OneByOne,
+    Visit,
+    gather_nodes,
+    places_of,
+    restencil,
+    scatter_nodes,
+    zero_of,
+)
+from karamelo_py.kernels.table import Sweep, fused, staged
+from karamelo_py.kernels.visit import Work, place_at
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.points.basis import locate
+from karamelo_py.points.transfers.xpic import XPIC
+from karamelo_py.run.lowering import lower
+from karamelo_py.scene.hub import Hub
+
+CAPABILITY = (9, 0)  # of an H100 or H200
+DEVICE = SimpleNamespace(compute_capability=CAPABILITY)
+
+
+class Compiled(NamedTuple):
+    """What a function has become."""
+
+    ptx: str
+    registers: int  # of a thread
+    stack: int  # bytes of a thread's local memory, without spills
+    spilled: int  # bytes that registers did not hold, stored and loaded
+
+
+def visit_point(visit, s, block, then, dt, p, report):
+    """What `kernels.sweep.visit_tile` does for one point, in doubles or singles."""
+    points = block.points
+    p = index(p)
+    grid = record(s.grids, index(points.grid[p]))
+    places = places_of(s.frame, points, s.now, then)
+    w = Work(
+        s.frame,
+        s.kin,
+        s.basis,
+        grid,
+        s.transfer,
+        s.averaging,
+        s.nodes,
+        points,
+        block.laws,
+        places,
+    )
+    width = OneByOne()
+    stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
+    totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
+    totals = gather_nodes(width, visit.tasks, w, stencil, totals)
+    moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, zero_of(width, dt))
+    report[p, 0] = moved
+    report[p, 1] = rate
+    if not (moved <= 1 and rate < 1e300):
+        return
+    stencil = restencil(visit.weights, w, stencil, p)
+    loads = load_all(visit.quantities, w, p, dt)
+    scatter_nodes(width, visit.quantities, w, stencil, loads)
+
+
+def visit_node(task, kin, nodes, n, dt):
+    """What `kernels.sweep.visit_nodes` does for one node."""
+    at_node(task, kin, nodes, index(n), dt)
+
+
+def setup_of(script: str) -> tuple[Setup, type]:
+    """The arrays of a scene without its run, and its scheme."""
+    hub = Hub(Console(quiet=True))
+    hub.interpreter = Interpreter(hub)
+    hub.interpreter.run_text(re.sub(r"^run\(.*", "", script, flags=re.MULTILINE))
+    return lower(hub)[0], hub.update.scheme
+
+
+def of_rows(rows: list) -> list[Visit]:
+    """The visits of the points among the rows of a step."""
+    return [row.visit for row in rows if isinstance(row, Sweep)]
+
+
+def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]:
+    """Every visit of the points in a step of a scene, each once; those in stages, if asked for."""
+    visits = of_rows(fused(scheme.rows)) + (of_rows(staged(scheme.rows)) if in_stages else [])
+    if isinstance(setup.transfer, XPIC):
+        visits.append(Visit((SeriesTerm(),), (SeriesBack(),), OldWeights()))
+    if isinstance(setup.averaging, FBar):
+        visits.append(Visit((TrialStrain(),), (Volumes(),), OldWeights()))
+        visits.append(Visit((AverageStress(),), (AveragedForce(),), OldWeights()))
+    if not isinstance(setup.heat, Insulated):
+        nodes = setup.heat.nodes
+        visits.append(content_and_warming(nodes))
+        flow = (TemperatureGradient(nodes.velocity),), (HeatFlow(nodes.sums),)
+        visits.append(Visit(*flow, OldWeights()))
+    return list({typeof(visit): visit for visit in visits}.values())
+
+
+def compiled(function: Any, *arguments: Any) -> Compiled:
+    """A kernel for arguments of these types."""
+    signature = types.void(*map(typeof, arguments))
+    # The one place where Numba asks the driver when it compiles.
+    with patch.object(dispatcher, "get_current_device", lambda: DEVICE):
+        ptx, _ = compile_for_gpu(
+            function, signature, device=False, abi="numba", cc=CAPABILITY, output="ptx"
+        )
+    options = [f"-arch=sm_{CAPABILITY[0]}{CAPABILITY[1]}", "-verbose"]
+    code = ptx.encode()
+    linker = nvjitlink.create(len(options), options)
+    try:
+        nvjitlink.add_data(linker, nvjitlink.InputType.PTX, code, len(code), "visit.ptx")
+        nvjitlink.complete(linker)
+        log = bytearray(nvjitlink.get_info_log_size(linker))
+        nvjitlink.get_info_log(linker, log)
+    finally:
+        nvjitlink.destroy(linker)
+    found = re.search(
+        r"(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads"
+        r".*?Used (\d+) registers",
+        log.decode(),
+        re.DOTALL,
+    )
+    stack, stores, loads, registers = map(int, found.groups())
+    return Compiled(ptx, registers, stack, stores + loads)
+
+
+def compiled_visit(visit: Visit, setup: Setup) -> Compiled:
+    """A visit of a point of the scene's first law."""
+    s, block = setup, setup.blocks[0]
+    real = s.nodes.sums.dtype.type
+    context = Context(s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, 0)
+    report = np.zeros((1, 2), real)
+    return compiled(visit_point, visit, context, block, 0, real(1), 0, report)
