@@ -51,6 +51,8 @@ def _kind_of_scene(hub: Hub) -> str:
 class Runner:
     """Runs a scene for a number of steps, to a time, or by a condition."""
 
+    remembers = ("halvings",)
+
     def __init__(
         self,
         hub: Hub,
@@ -68,7 +70,6 @@ class Runner:
         self.until = until
         self.halve = halve
         self.halvings = 0
-        self.told_of_growth = False
         self.place = hub.place
         self.spent = {"compilation": 0.0, "steps": 0.0, "output": 0.0}
         self.interrupted = 0  # the signal
@@ -91,8 +92,12 @@ class Runner:
         if replay is not None and not replay.at_end:
             self._pass_over()
             return
-        with self._telling_of_compilation(), blamed(hub):
-            self._run(hub.simulation)
+        hub.running = self
+        try:
+            with self._telling_of_compilation(), blamed(hub):
+                self._run(hub.simulation)
+        finally:
+            hub.running = None
         hub.runs.append(self._values())
 
     def _values(self) -> dict[str, float]:
@@ -131,7 +136,7 @@ class Runner:
         if going_on:
             hub.restart.take(hub, outputs=True)
             hub.restart = hub.interpreter.replay = None
-            simulation.go_on(self.end_time)
+            simulation.go_on(self.end_time, self.halvings)
         else:
             simulation.begin(self.end_time)
         foresight.warn(hub, simulation, self.duration)
@@ -169,10 +174,14 @@ class Runner:
             if self.interrupted:
                 break
             step = simulation.step
-            target = min(output.next_step(step), last_step, step + chunk)
+            # When snapshots are taken must not depend on how fast steps are: runs go back to them.
+            look = (step // CHUNK + 1) * CHUNK
+            target = min(output.next_step(step), last_step, step + chunk, look)
             if self.condition is not None:
                 target = step + 1
-            due = step - kept >= CHUNK or kept == first_step < step
+            due = step != kept and (step % CHUNK == 0 or step == first_step + 1)
+            # A run that goes on from a file begins with a snapshot of the state in it.
+            due = due or (self.halve and any(item.last_step == step != kept for item in output.last))
             if due and grown_little(simulation):
                 snapshot, kept = simulation.snapshot(), step
             begun, compiled = time.perf_counter(), self.spent["compilation"]
@@ -186,8 +195,8 @@ class Runner:
                     diagnosis.stop(hub, simulation, status, snapshot, self.place)
                 chunk = 1
                 continue
-            if not self.told_of_growth:
-                self.told_of_growth = tell_of_growth(hub, simulation)
+            if not simulation.told_of_growth:
+                simulation.told_of_growth = tell_of_growth(hub, simulation)
             boundary.tell_of_bounces(hub, simulation)
             if compiled < self.spent["compilation"]:
                 # A rate that counts compilation would promise hours.
