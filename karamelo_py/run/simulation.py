@@ -577,14 +577,28 @@ class Simulation:
     def snapshot(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Every array that a step changes, with a copy."""
         s = self.setup
-        arrays = [s.control.values, s.control.clock, s.spans[: 1 + s.spans[0, 0]]]
-        for block in s.blocks:
+        tiles = [int(block.tiling.colour[-1]) for block in s.blocks]
+        return [(array, array.copy()) for array in self._changing(s.spans, tiles)]
+
+    def snapshot_from(self, copies: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """A snapshot again from its copies, which a file held."""
+        at, tiles = 3, []
+        for block in self.setup.blocks:
+            at += len(list(arrays_of(block.points)))
+            tiles.append(int(copies[at][-1]))
+            at += 3
+        return list(zip(self._changing(copies[2], tiles), copies, strict=True))
+
+    def _changing(self, spans: np.ndarray, tiles: list[int]) -> list[np.ndarray]:
+        """Every array that a step changes, where so many nodes and tiles are in use."""
+        s = self.setup
+        count = 1 + int(spans[0, 0])
+        arrays = [s.control.values, s.control.clock, s.spans[:count]]
+        for block, used in zip(s.blocks, tiles, strict=True):
             tiling = block.tiling
-            used = tiling.colour[-1]
             arrays += [array for _, array in arrays_of(block.points)]
             arrays += [tiling.colour, tiling.range[:used], tiling.grid[:used]]
-        arrays += self.hub.update.method.remembered(s.contact, s.spans[1 : 1 + s.spans[0, 0]])
-        return [(array, array.copy()) for array in arrays]
+        return [*arrays, *self.hub.update.method.remembered(s.contact, spans[1:count])]
 
     def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:
         """Return to a snapshot."""
