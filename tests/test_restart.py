@@ -22,12 +22,15 @@ import h5py
 import numpy as np
 import pytest
 from combinations import BASES, MESHED, SCHEMES, TRANSFERS, fits, refused, scene, write_mesh
-from scenes import block
+from scenes import H, block
 from test_boundary import thrown
+from test_columns_karamelo import sheared
 from test_contact_grid import bars
 from test_contact_points import bodies
 from test_heat import HOT, slab
+from test_laws_rigid import scene as pushed
 from test_laws_scripts import ALL, pulled
+from test_walls import scene as rubbed
 
 EVERY = "restart(2, r.*.h5)\n"
 
@@ -142,7 +145,60 @@ set_output(time(0.004))
 plot(e, 2, time, E)
 save_plot(e.svg)
 """
+LOADS = (
+    "fix(F, force_particles, all, 2*time, -1)", "fix(T, edge_traction, all, box, xhi, 0.2, y*time)",
+    "fix(P, edge_pressure, all, box, 5*time)", "fix(calm, local_damping, all, 0.8)",
+    "compute(E, energy_balance, all)", "set_output(1)",
+    "log_modify(custom, step, dt, limit, F_y, T_x, P_x, E_drift)", "run(6)",
+)  # fmt: skip
+FLOWS = {
+    "a": "zerilli-armstrong, 80, 0.4, 0.2, 0, 0.0028, 0.000115, 0.3, 0.5",
+    "b": "tabulated, 80, 0, 0.4, 1, 0.9",
+    "c": "tabulated, 80, 0, 0.4, 0.5, 0.65, 1, 0.9",
+    "d": "formula, 80, 0.4 + 0.5*ep + 0.01*epdot",
+    "e": "mu-i, 80, 0.382, 0.643, 0.279, 1, 2",
+    "f": "drucker-prager, 80, 0.1, 30, 5, fit=plane-strain",
+    "g": "mohr-coulomb, 80, 0.1, 30, 5",
+}
+
+
+def flowing(method: str) -> str:
+    """One point a law, pulled and sheared until all flow."""
+    lines = [f"method({method})", f"dimension(2, 0, {len(FLOWS) / 10 + 0.1}, 0, 0.3, {H})",
+             "eos(bulk, linear, 8, 160)"]  # fmt: skip
+    for k, (name, law) in enumerate(FLOWS.items()):
+        lines += [
+            f"region({name}, block, {k / 10}, {(k + 1) / 10}, 0.1, 0.2)",
+            f"strength({name}, {law})",
+            f"material({name}, eos-strength, bulk, {name})",
+            f"solid({name}, region, {name}, 1, {name}, {H})",
+        ]
+    lines += [
+        "region(everywhere, block, INF, INF, INF, INF)",
+        "group(nodes, nodes, region, everywhere, all)",
+        "fix(pull, velocity_nodes, nodes, x0 + y0, -x0)",
+        "dump(d, all, particle, 1, d.*.txt, ep, epdot, s11, s12)",
+        "set_dt(0.003)",
+        "run(6)",
+    ]
+    return "\n".join(lines)
+
+
 SCENES = {
+    "loads": block(2, *LOADS),
+    "loads in the total frame": block(2, *LOADS).replace("ulmpm", "tlmpm"),
+    "wall that rubs": rubbed().replace("run_time(0.2)", "run(6)"),
+    "rigid": pushed().replace("run_time(3)", "set_dt(0.02)\nrun(40)"),
+    "rigid by a formula": pushed("ulmpm/contacts").replace("initial_velocity_particles, tool, 0.5",
+        "velocity_particles, tool, 0.2*time").replace("run_time(3)", "run(6)"),
+    "flow": flowing("ulmpm, FLIP, linear, 1"),
+    "flow in the total frame": flowing("tlmpm, APIC, linear"),
+    "rate of plastic strain": sheared(", epdot"),
+    "step that varies": block(
+        2, "fix(v, initial_velocity_particles, all, 5*sin(9*x0), 3)", "set_output(1)",
+        "fix(g, body_force, all, 100*time, 0)", "log_modify(custom, step, dt, time, limit)",
+        "run(3)", "run_time(0.02)",
+    ),
     "friction": RUBBING,
     "points that touch": bodies(
         -0.01, "contact/minimize_penetration, a, b, 0.2", "log_modify(custom, step, c_x)", "run(6)",
@@ -174,6 +230,83 @@ SCENES = {
 def test_every_part(run_interpreted, name):
     """Contact, heat, damage, edges, tools, computes that look back."""
     goes_on(run_interpreted, with_files(SCENES[name]), files=3)
+
+
+def content(path: Path) -> dict:
+    """What a file to go on from holds beside arrays."""
+    return json.loads(arrays(path)["content"].tobytes())
+
+
+def test_a_step_that_was_halved(run_interpreted):
+    """Halvings, and the state that a run goes back to, are the same behind a file."""
+    lines = ["fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y0))",
+             "dt_factor(1.9)", "set_output(5)", "log_modify(custom, step, dt, limit)",
+             "compute(E, energy_balance, all)", "dump(d, all, particle, 20, d.*.txt, x, vx)",
+             "run(60, on_trouble=halve)"]  # fmt: skip
+    script = with_files(block(2, *lines, size=(0.3, 0.3)), "restart(6, r.*.h5)\n")
+    whole = goes_on(run_interpreted, script, files=9)
+    halvings = {
+        memory["halvings"]
+        for file in whole.glob("r.*.h5")
+        for kind, *_, memory in content(file)["parts"]
+        if kind == "run"
+    }
+    assert max(halvings) > 0
+
+
+def test_a_step_above_the_limit_from_a_file_on(run_interpreted):
+    """It is what the user wants then, as at the start of a run: no reason to stop."""
+    script = FLY.replace("run(4)", "restart(1, r.*.h5)\nrun(80)")
+    still = script.replace("sin(9*x0), 0)", "0, 0)")
+    run_interpreted(still.replace("run(80)", "run(2)"))
+    result = run_interpreted(still.replace("set_dt(0.001)", "set_dt(0.05)"), "-restart", "r.1.h5")
+    assert result.log.Step[-1] == 80 and result.log.dt[-1] == 0.05
+
+
+# The clock is told that energy has grown: a scene in which it does takes hundreds of steps.
+TOLD = """
+import warnings
+from pathlib import Path
+from karamelo_py import Simulation
+text = Path("scene").read_text()
+def begun():
+    sim = Simulation(text)
+    sim.run(1)
+    return sim
+def grows(sim):
+    sim.hub.simulation.setup.control.clock[0].windows = 2
+def told(sim):
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        sim.run(1)
+    return sum("energy comes from nowhere" in str(one.message) for one in found)
+sim = begun()
+grows(sim)
+print(told(sim), told(sim))
+sim.command("write_restart(w.h5)")
+again = begun()
+again.command("read_restart(w.h5)")
+print(told(again))
+fresh = begun()
+grows(fresh)
+fresh.command("read_restart(w.h5)")
+fresh.command("dt_factor(0.3)")
+print(told(fresh), fresh.hub.simulation.setup.control.clock[0].dt_factor)
+fresh.command("fix(v, initial_velocity_particles, all, 1, 0)")
+fresh.run(1)
+grows(fresh)
+print(told(fresh))
+"""
+
+
+def test_growth_of_energy_is_told_once(tmp_path):
+    """In runs in pieces, too, and behind a file; anew where a balance begins anew."""
+    (tmp_path / "scene").write_text(FLY.partition("set_dt")[0])
+    said = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", TOLD], cwd=tmp_path, capture_output=True, text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert said.stdout.split("\n")[:-1] == ["1 0", "0", "0 0.3", "1"], said.stderr
 
 
 OUTPUTS = """\

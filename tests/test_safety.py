@@ -34,7 +34,15 @@ def test_a_log_of_somebody_else(run_interpreted, tmp_path, text):
     assert path.read_text().startswith("Step")
 
 
-@pytest.mark.parametrize("text", ["", "Step dt Time\n", "Step dt Time\n0 0.1 0\n# Step E\n1 2\n"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "Step dt Time\n",
+        "Step dt Time\n0 0.1 0\n# Step E\n1 2\n",
+        "Step limit\n0 waves\n1 set_dt\n",
+    ],
+)
 def test_a_log_of_an_earlier_run(run_interpreted, tmp_path, text):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "log.mpm").write_text(text)

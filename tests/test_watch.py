@@ -66,6 +66,44 @@ def test_half_the_step_in_trouble(run_interpreted):
     assert "with 1/2 of the step" in result.err + result.out
 
 
+CONDUCTION = """
+method({}, FLIP, linear, 1, thermo-mechanical)
+dimension({d}, {box}, 0.1)
+region(slab, block, {box})
+material(m, linear, 2, 0.01, 0.3, 0.5, 1)
+solid(slab, region, slab, {ppc}, m, 0.1, 300)
+region(end, block, -1, 0.05{whole})
+group(end, nodes, region, end, all)
+fix(hot, temperature_nodes, end, 301)
+set_output(10)
+set_dt({dt})
+run(30)
+"""
+
+
+@pytest.mark.parametrize("kind", ["ulmpm", "tlmpm"])
+@pytest.mark.parametrize(("d", "ppc"), [(1, 1), (1, 2), (2, 1), (3, 1)])
+def test_temperatures_that_swing_stop_the_run(run_interpreted, kind, d, ppc):
+    """A step far above that of conduction, h^2 rho cp/(4 d kappa); a little above it none swing.
+
+    What nodes do not show of the points' temperatures is levelled, whatever the step: up to five
+    times the stable step temperatures stay between those that are given.
+    """
+    limit = 0.1**2 / (4 * d)
+    box = "0, 0.6" + ", 0, 0.2" * (d - 1)
+
+    def scene(times):
+        whole = ", INF, INF" * (d - 1)
+        return CONDUCTION.format(kind, d=d, ppc=ppc, box=box, whole=whole, dt=times * limit)
+
+    assert "temperatures have" not in run_interpreted(scene(3), folder="little").err
+    result = run_interpreted(scene(40), status=1)
+    assert "step 10, time" in result.err and "temperatures have come to be between" in result.err
+    assert "allow 300 to 301: the step is 40 times the stable one of conduction" in result.err
+    assert f"set_dt({0.9 * limit:.3g})" in result.err
+    assert list(result.folder.glob("last_good.*"))
+
+
 def test_the_limit_has_a_name(run_interpreted):
     """The log shows what rules the step."""
     lines = ["set_output(1)", "log_modify(custom, step, limit)", "run(1)", "set_dt(1e-3)", "run(1)"]

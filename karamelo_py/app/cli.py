@@ -218,6 +218,8 @@ def _run(options: argparse.Namespace) -> int:
     except Interrupted as signal:
         _complain("interrupted: the log and the dumps are complete up to here")
         return SIGNALLED + signal.args[0]
+    finally:
+        hub.output.log.close()
     if not hub.rehearsed:
         _tell_of_no_run(hub, script)
     return 0

@@ -5,11 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import re
+import weakref
 from pathlib import Path
 from typing import TextIO
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.quantity import Quantity
+from karamelo_py.output.quantity import LIMIT, Quantity
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.script.errors import ScriptError
 
@@ -129,6 +130,7 @@ class Log(Rhythmic):
         try:
             # Line buffering: each line is in the file at once, also when the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
+            weakref.finalize(self, self._file.close)
             _claim(self._file)
             self._file.truncate(end)
         except BlockingIOError as error:
@@ -173,7 +175,11 @@ def _is_log(path: Path) -> bool:
     head, *rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip()] or [[]]
     if not rows:
         return not head or bool({"Step", "dt", "Time"} & set(head))
-    return all(row[0] == "#" or all(map(_is_number, row)) for row in rows)
+    words = {k for k, name in enumerate(head) if name == LIMIT}
+    return all(
+        row[0] == "#" or all(k in words or _is_number(cell) for k, cell in enumerate(row))
+        for row in rows
+    )
 
 
 def _is_number(word: str) -> bool:

@@ -219,6 +219,8 @@ def _parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
 def _all_parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
     yield ("update", "", ""), hub.update
     yield ("method", "", ""), hub.update.method
+    if hub.running is not None:
+        yield ("run", "", ""), hub.running
     for catalogue in hub.catalogues:
         for ID, part in catalogue.items():
             kind = getattr(part, "style", "") or type(part).__name__

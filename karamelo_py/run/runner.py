@@ -11,6 +11,8 @@ from functools import partial
 from math import inf, isfinite
 from typing import Any
 
+import numpy as np
+
 from karamelo_py.compiler import cache
 from karamelo_py.kernels.step import DONE, STOPPED
 from karamelo_py.output.console import duration
@@ -51,6 +53,8 @@ def _kind_of_scene(hub: Hub) -> str:
 class Runner:
     """Runs a scene for a number of steps, to a time, or by a condition."""
 
+    remembers = ("halvings", "good")
+
     def __init__(
         self,
         hub: Hub,
@@ -68,7 +72,8 @@ class Runner:
         self.until = until
         self.halve = halve
         self.halvings = 0
-        self.told_of_growth = False
+        self.snapshot: list[tuple[np.ndarray, np.ndarray]] = []  # of the last good state
+        self.kept = -1  # its step
         self.place = hub.place
         self.spent = {"compilation": 0.0, "steps": 0.0, "output": 0.0}
         self.interrupted = 0  # the signal
@@ -91,8 +96,12 @@ class Runner:
         if replay is not None and not replay.at_end:
             self._pass_over()
             return
-        with self._telling_of_compilation(), blamed(hub):
-            self._run(hub.simulation)
+        hub.running = self
+        try:
+            with self._telling_of_compilation(), blamed(hub):
+                self._run(hub.simulation)
+        finally:
+            hub.running = None
         hub.runs.append(self._values())
 
     def _values(self) -> dict[str, float]:
@@ -105,6 +114,20 @@ class Runner:
             if name in self.hub.values:
                 self.hub.values.set(name, value)
         self.hub.runs.append(after)
+
+    @property
+    def good(self) -> tuple[int, list[np.ndarray]] | None:
+        """The last good state, for files: a run that goes on from one may go back to it."""
+        return (self.kept, [copy for _, copy in self.snapshot]) if self.halve else None
+
+    @good.setter
+    def good(self, state: tuple[int, list[np.ndarray]] | None) -> None:
+        if state is not None and state[1]:
+            self.kept, copies = state
+            self.snapshot = self.hub.simulation.snapshot_from(copies)
+
+    def _keep(self, simulation: Simulation) -> None:
+        self.snapshot, self.kept = simulation.snapshot(), simulation.step
 
     @property
     def duration(self) -> float:
@@ -131,7 +154,7 @@ class Runner:
         if going_on:
             hub.restart.take(hub, outputs=True)
             hub.restart = hub.interpreter.replay = None
-            simulation.go_on(self.end_time)
+            simulation.go_on(self.end_time, self.halvings)
         else:
             simulation.begin(self.end_time)
         foresight.warn(hub, simulation, self.duration)
@@ -162,32 +185,35 @@ class Runner:
         hub, output = self.hub, self.hub.output
         last_step = first_step + self.steps if self.steps is not None else inf
         chunk = 1
-        snapshot, kept = simulation.snapshot(), simulation.step
+        if not self.snapshot:
+            self._keep(simulation)
         while simulation.step < last_step and simulation.time < self.end_time:
             if self.condition is not None and not self._goes_on():
                 break
             if self.interrupted:
                 break
             step = simulation.step
-            target = min(output.next_step(step), last_step, step + chunk)
+            # When snapshots are taken must not depend on how fast steps are: runs go back to them.
+            look = (step // CHUNK + 1) * CHUNK
+            target = min(output.next_step(step), last_step, step + chunk, look)
             if self.condition is not None:
                 target = step + 1
-            due = step - kept >= CHUNK or kept == first_step < step
+            due = step != self.kept and (step % CHUNK == 0 or step == first_step + 1)
             if due and grown_little(simulation):
-                snapshot, kept = simulation.snapshot(), step
+                self._keep(simulation)
             begun, compiled = time.perf_counter(), self.spent["compilation"]
             status = simulation.advance(int(target) - step)
             elapsed = time.perf_counter() - begun - (self.spent["compilation"] - compiled)
             self.spent["steps"] += elapsed
             if status != DONE:
-                if status == STOPPED and boundary.delete_leaving(hub, simulation, snapshot):
-                    snapshot, kept = simulation.snapshot(), simulation.step
-                elif not self._try_half(simulation, status, snapshot):
-                    diagnosis.stop(hub, simulation, status, snapshot, self.place)
+                if status == STOPPED and boundary.delete_leaving(hub, simulation, self.snapshot):
+                    self._keep(simulation)
+                elif not self._try_half(simulation, status):
+                    diagnosis.stop(hub, simulation, status, self.snapshot, self.place)
                 chunk = 1
                 continue
-            if not self.told_of_growth:
-                self.told_of_growth = tell_of_growth(hub, simulation)
+            if not simulation.told_of_growth:
+                simulation.told_of_growth = tell_of_growth(hub, simulation)
             boundary.tell_of_bounces(hub, simulation)
             if compiled < self.spent["compilation"]:
                 # A rate that counts compilation would promise hours.
@@ -206,13 +232,13 @@ class Runner:
                     self._fraction(simulation, first_step, first_time),
                 )
 
-    def _try_half(self, simulation: Simulation, status: int, snapshot: list) -> bool:
+    def _try_half(self, simulation: Simulation, status: int) -> bool:
         """Go back to the last good state with half the step, where the script asks for that."""
         if not self.halve or self.halvings == HALVINGS:
             return False
         message, _ = diagnosis.trouble(self.hub, simulation, status)
         self.halvings += 1
-        simulation.restore(snapshot)
+        simulation.restore(self.snapshot)
         simulation.halve_step(self.halvings)
         self.hub.warn(
             f"{message}. Back to step {simulation.step}, time {simulation.time:.6g}, with "

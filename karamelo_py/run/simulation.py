@@ -175,6 +175,7 @@ class Simulation:
         self._first: PythonHooks | None = None
         self._first_fixes: list = []
         self._watched = -1  # the version whose balance of energy is followed
+        self.told_of_growth = False  # since it is followed
         self.mapped = False  # whether the nodes show a state of this simulation
 
     def fits(self, hub: Hub) -> bool:
@@ -301,7 +302,15 @@ class Simulation:
     def measured(self, known: bool) -> None:
         self.version += 1
         self._measured = self.version if known else -1
-        self._watched = self.version  # the clock tells how its balance has gone
+
+    @property
+    def followed(self) -> bool:
+        """Whether the clock tells how the balance of energy has gone up to the present state."""
+        return self._watched == self.version
+
+    @followed.setter
+    def followed(self, known: bool) -> None:
+        self._watched = self.version if known else -1
 
     @property
     def begun(self) -> list[str]:
@@ -335,9 +344,8 @@ class Simulation:
             numba.set_num_threads(self.threads)
         update = self.hub.update
         clock = self.setup.control.clock[0]
-        clock.fixed_dt = update.fixed_dt or 0.0
         clock.courant = stable_courant(self.hub)
-        clock.dt_factor, clock.heat_factor = shares_of_limits(self.hub)
+        self._ask_for_steps(0)
         clock.end_time = end_time
         clock.over_limit = 0
         # Twice: initial values may be formulas of dt, and dt follows the fastest point.
@@ -354,17 +362,27 @@ class Simulation:
         # A body at rest that has no waves has no first limit to compare with.
         if clock.first_limit == 0 and np.isfinite(self.limit) and not update.fixed_dt:
             clock.first_limit = self.limit
-        clock.watch_limit = int(not self.above_limit())
-        clock.over_limit = 0
+        self._watch_limit()
         self._watch_energy(begun_before)
 
     def halve_step(self, times: int) -> None:
         """From here on in this run the step is that of its start, halved so many `times`."""
-        clock = self.setup.control.clock[0]
-        clock.fixed_dt = (self.hub.update.fixed_dt or 0.0) / 2**times
-        shares = shares_of_limits(self.hub)
-        clock.dt_factor, clock.heat_factor = (share / 2**times for share in shares)
+        self._ask_for_steps(times)
         choose_dt(self.setup.control)
+        self._watch_limit()
+
+    def _ask_for_steps(self, halvings: int) -> bool:
+        """Tell the clock which steps are asked for; whether these are others than before."""
+        clock = self.setup.control.clock[0]
+        before = clock.fixed_dt, clock.dt_factor, clock.heat_factor
+        asked = self.hub.update.fixed_dt or 0.0, *shares_of_limits(self.hub)
+        now = tuple(number / 2**halvings for number in asked)
+        clock.fixed_dt, clock.dt_factor, clock.heat_factor = now
+        return now != before
+
+    def _watch_limit(self) -> None:
+        """A step that is above its limit from the start is what the user wants."""
+        clock = self.setup.control.clock[0]
         clock.watch_limit = int(not self.above_limit())
         clock.over_limit = 0
 
@@ -374,8 +392,10 @@ class Simulation:
         clock = s.control.clock[0]
         clock.watch_energy = int(not unknown_work(self.hub))
         set_anew = len(self._begun) > begun_before or bool(self._first_fixes)
-        anew = self._watched != self.version or set_anew
-        self._watched = self.version
+        anew = not self.followed or set_anew
+        self.followed = True
+        if anew:
+            self.told_of_growth = False
         if clock.watch_energy:
             mass = sum(float(block.points.mass.sum()) for block in s.blocks)
             clock.energy_floor = ROUND_OFF * mass * float(clock.rate) ** 2
@@ -387,8 +407,11 @@ class Simulation:
             measure_heat(s)
             clock.coldest, clock.hottest = clock.T_low, clock.T_high
 
-    def go_on(self, end_time: float) -> None:
-        """In place of `begin`: go on with a run whose state was put into the arrays."""
+    def go_on(self, end_time: float, halvings: int) -> None:
+        """In place of `begin`: go on with a run whose state was put into the arrays.
+
+        Steps, and the end of the run, may be others than in the run that wrote the state.
+        """
         import numba
 
         if self.threads > 1:
@@ -396,11 +419,14 @@ class Simulation:
         update, clock = self.hub.update, self.setup.control.clock[0]
         self._prepare_hooks()
         update.method.begin(self.hub, self.setup.contact)
-        self._watched = self.version
-        said = update.fixed_dt or 0.0, *shares_of_limits(self.hub), end_time
-        if said != (clock.fixed_dt, clock.dt_factor, clock.heat_factor, clock.end_time):
-            clock.fixed_dt, clock.dt_factor, clock.heat_factor, clock.end_time = said
+        other_end, clock.end_time = clock.end_time != end_time, end_time
+        over_limit = clock.over_limit
+        if self._ask_for_steps(halvings):
             choose_dt(self.setup.control)
+            self._watch_limit()
+        elif other_end:
+            choose_dt(self.setup.control)
+            clock.over_limit = over_limit
 
     def _choose_dt(self) -> None:
         if self._measured != self.version:
@@ -551,14 +577,28 @@ class Simulation:
     def snapshot(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Every array that a step changes, with a copy."""
         s = self.setup
-        arrays = [s.control.values, s.control.clock, s.spans[: 1 + s.spans[0, 0]]]
-        for block in s.blocks:
+        tiles = [int(block.tiling.colour[-1]) for block in s.blocks]
+        return [(array, array.copy()) for array in self._changing(s.spans, tiles)]
+
+    def snapshot_from(self, copies: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """A snapshot again from its copies, which a file held."""
+        at, tiles = 3, []
+        for block in self.setup.blocks:
+            at += len(list(arrays_of(block.points)))
+            tiles.append(int(copies[at][-1]))
+            at += 3
+        return list(zip(self._changing(copies[2], tiles), copies, strict=True))
+
+    def _changing(self, spans: np.ndarray, tiles: list[int]) -> list[np.ndarray]:
+        """Every array that a step changes, where so many nodes and tiles are in use."""
+        s = self.setup
+        count = 1 + int(spans[0, 0])
+        arrays = [s.control.values, s.control.clock, s.spans[:count]]
+        for block, used in zip(s.blocks, tiles, strict=True):
             tiling = block.tiling
-            used = tiling.colour[-1]
             arrays += [array for _, array in arrays_of(block.points)]
             arrays += [tiling.colour, tiling.range[:used], tiling.grid[:used]]
-        arrays += self.hub.update.method.remembered(s.contact, s.spans[1 : 1 + s.spans[0, 0]])
-        return [(array, array.copy()) for array in arrays]
+        return [*arrays, *self.hub.update.method.remembered(s.contact, spans[1:count])]
 
     def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:
         """Return to a snapshot."""

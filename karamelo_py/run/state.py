@@ -11,6 +11,9 @@ from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
 from karamelo_py.script.errors import ScriptError
 
+# What else a simulation knows of its state; `measured` comes before what depends on its version.
+SHOWN = ("measured", "mapped", "followed", "told_of_growth")
+
 
 def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
     """Views and copies of them; of nodes, the rows of those that are in use."""
@@ -21,7 +24,7 @@ def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
         "present": simulation.present,
         "spans": spans,
         "tile size": np.array([simulation.tiles.size]),
-        "shown": np.array([simulation.measured, simulation.mapped]),
+        "shown": np.array([getattr(simulation, name) for name in SHOWN]),
     }
     for k, block in enumerate(s.blocks):
         found |= {f"points/{k}/{name}": array for name, array in arrays_of(block.points)}
@@ -66,7 +69,8 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
     for k, rows in enumerate(_remembered(simulation, _used(spans))):
         rows[...] = _checked(found, f"contact/{k}", rows)
     simulation.present[:] = _checked(found, "present", simulation.present)
-    simulation.measured, simulation.mapped = (bool(one) for one in found["shown"])
+    for name, known in zip(SHOWN, _checked(found, "shown", np.ones(len(SHOWN), bool)), strict=True):
+        setattr(simulation, name, bool(known))
 
 
 def _used(spans: np.ndarray) -> np.ndarray:

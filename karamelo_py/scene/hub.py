@@ -115,6 +115,8 @@ class Hub:
         Functions in Python that a program has given, by name.
     pausing
         Whether a script stops in front of its runs: a program lets time go on.
+    running
+        The run in progress, or None.
     runs
         The published values at the end of each run so far.
     restart
@@ -153,6 +155,7 @@ class Hub:
         self.output = Output(self)
         self.fields = Fields(self)
         self.functions: dict[str, Any] = {}
+        self.running: Any = None
         self.runs: list[dict[str, float]] = []
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None

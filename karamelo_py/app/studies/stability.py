@@ -49,6 +49,7 @@ REASONS = {
     r"stable step has fallen": "stable step collapsed",
     r"stable limit, which has fallen": "step above the limit",
     r"tangled": "domain of a point tangled",
+    r"has come from nowhere": "energy from nowhere",
     r"temperature": "temperature out of bounds",
 }
 
