@@ -17,7 +17,9 @@ SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
 _SAID = re.compile(r"(?:^|: )(?:warning|error): (.*)")
 _WARNED = re.compile(r"(?:^|: )warning: ")
-_CAUSE = re.compile(r"Known to do that here: (.*)")
+_CAUSE = re.compile(r"Known to do that here: (.*)|(numerical fracture)")
+_OWN = re.compile(r"^(\w+: )?step \d+, time [^:]*: | at \([^)]*\)| \(through[^)]*\)")
+_POINT = re.compile(r"point \d+ of solid '[^']*'")
 
 
 class Kept(NamedTuple):
@@ -34,7 +36,7 @@ class Kept(NamedTuple):
         Warnings of the run, and the error that ended it; what is known to be the cause where the
         program named that.
     warned
-        Whether it said something before it ended.
+        Whether it warned, or the error that ended it names a known cause.
     """
 
     word: str
@@ -44,7 +46,7 @@ class Kept(NamedTuple):
 
     @property
     def silent(self) -> bool:
-        """Whether it went wrong without any warning."""
+        """Whether it went wrong and nothing says why."""
         return self.word in WRONG and not self.warned
 
 
@@ -72,7 +74,7 @@ def look_at(row: Mapping[str, str], folder: Path, over: str, column: str, within
     except OSError:
         lines = []
     said = [match[1] for line in lines if (match := _SAID.search(line))]
-    causes = [cause[1] if (cause := _CAUSE.search(text)) else text for text in said]
+    causes = [_general(text) for text in said]
     warned = any(_WARNED.search(line) for line in lines)
     log = read_log(place)
     if not log or row["status"] in ("too long", "killed"):
@@ -87,6 +89,14 @@ def look_at(row: Mapping[str, str], folder: Path, over: str, column: str, within
     else:
         word, number = judge(log[over], log[column], within)
     return Kept(word, number, tuple(dict.fromkeys(causes)), warned)
+
+
+def _general(text: str) -> str:
+    """The known cause in a warning or an error; without one its text, without what is its own."""
+    cause = _CAUSE.search(text)
+    if cause and cause[1]:
+        return cause[1]
+    return _POINT.sub("a point", _OWN.sub("", text))
 
 
 class Table(NamedTuple):
