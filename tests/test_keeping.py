@@ -69,12 +69,12 @@ def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys):
     for line in entry.lines(str(ROOT / "inputs"), small=True):
         assert main(line.replace("ppc=2,1", "ppc=1").split()) == 0
     text = (tmp_path / "energy.md").read_text(encoding="utf-8")
-    cells = {line.split(" | ")[0][2:] + line.split(" | ")[2]: line.split(" | ")[-1]
-             for line in text.splitlines() if line.startswith("| ")}  # fmt: skip
-    assert cells["PICmusl"].startswith("damps")
-    assert cells["PICleapfrog"].startswith("refused")
+    lines = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    cells = {(transfer, order): cell for order, transfer, *_, cell in lines}
+    assert cells["PIC", "musl"].startswith("damps")
+    assert cells["PIC", "leapfrog"].startswith("refused")
     # The cause that the program names beforehand for TPIC with linear functions stands below.
-    assert "[" in cells["TPICmusl"]
+    assert "[" in cells["TPIC", "musl"]
     assert "affine noise: TPIC with linear functions" in text
     assert "refused: 2 of 4" in capsys.readouterr().out
 

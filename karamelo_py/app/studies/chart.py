@@ -133,7 +133,7 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
 
 
 def keeps(options: Any, rows: list, by: list[str], variables: list[str]) -> int:
-    """Show whether a log column stays what it was, and which runs fail to without a warning."""
+    """Show whether a log column stays what it was, and of which runs that do not nothing says why."""
     out = out_file(options.o, ".md") if options.o else None
     for name in by:
         if name not in variables:
@@ -146,7 +146,7 @@ def keeps(options: Any, rows: list, by: list[str], variables: list[str]) -> int:
     for word in dict.fromkeys(one.word for one in kept):
         print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
     for line in found.silent:
-        print(f"without a warning: {line}")
+        print(f"nothing says why: {line}")
     if out:
         out.write_text(text, encoding="utf-8")
         print(f"written: {out}")

@@ -94,8 +94,8 @@ def look_at(row: Mapping[str, str], folder: Path, over: str, column: str, within
 def _general(text: str) -> str:
     """The known cause in a warning or an error; without one its text, without what is its own."""
     cause = _CAUSE.search(text)
-    if cause and cause[1]:
-        return cause[1]
+    if cause:
+        return cause[1] or "a point has come loose from its solid (numerical fracture)"
     return _POINT.sub("a point", _OWN.sub("", text))
 
 
