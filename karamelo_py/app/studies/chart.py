@@ -133,7 +133,7 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
 
 
 def keeps(options: Any, rows: list, by: list[str], variables: list[str]) -> int:
-    """Show whether a log column stays what it was, and of which runs that do not nothing says why."""
+    """Show whether a log column stays what it was, and which runs fail without a known cause."""
     out = out_file(options.o, ".md") if options.o else None
     for name in by:
         if name not in variables:
