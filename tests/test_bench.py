@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import re
+import subprocess
+from pathlib import Path
 
 import pytest
 
-from karamelo_py.app.bench import measure
+from karamelo_py.app.bench import measure, record
+from karamelo_py.app.bench.measure import Measured
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.cli import main
 from karamelo_py.language.interpreter import Interpreter
@@ -46,7 +50,7 @@ def test_one_process_runs_a_group(request):
 
 @pytest.mark.xdist_group("disks")
 def test_what_is_said(capsys, monkeypatch):
-    monkeypatch.setattr(measure, "bandwidth", lambda threads: 1e9)
+    monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 1e9)
     assert main(["bench", "disks-20", "--seconds", "0.01"]) == 0
     out = capsys.readouterr().out
     assert "disks-20: two disks, 20 cells a side; 416 points" in out
@@ -58,12 +62,14 @@ def test_what_is_said(capsys, monkeypatch):
     )
     assert ratio == pytest.approx(speed / other, abs=0.06)
     assert "another machine" in out
+    # Nodes or the rest of a step, whichever: the machine decides.
+    assert re.search(r"limited by +(memory|arithmetic|nodes|overhead) \(", out)
 
 
 @pytest.mark.xdist_group("disks")
 def test_another_size(capsys, monkeypatch):
     """Published numbers are not compared with another scene."""
-    monkeypatch.setattr(measure, "bandwidth", lambda threads: 1e9)
+    monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 1e9)
     assert main(["bench", "disks-20", "-var", "N", "10", "--seconds", "0.01"]) == 0
     out = capsys.readouterr().out
     assert "104 points" in out and "Karamelo" not in out
@@ -72,3 +78,95 @@ def test_another_size(capsys, monkeypatch):
 def test_an_unknown_scene(capsys):
     assert main(["bench", "disks-30"]) == 1
     assert "did you mean 'disks-320'?" in capsys.readouterr().err
+
+
+def fake(speeds=(1e6, 3e6, 2e6), place=0.1, of_points=8e-4, of_nodes=1e-4, waits=0.0):
+    """What could be measured of 3000 points: the fastest repetition takes 1 ms a step."""
+    points, nodes = {"Move": of_points}, {"Update": of_nodes}
+    return Measured(3000, list(speeds), 112, 350.0, 0.4, place, points, nodes, waits, "double")
+
+
+@pytest.mark.parametrize(
+    ("measured", "word"),
+    [
+        (fake(), "arithmetic"),
+        (fake(place=0.6), "memory"),
+        (fake(of_points=4e-4, of_nodes=5e-4, place=0.6), "nodes"),
+        # 0.6 ms of 1 ms are none of the sweeps; or threads wait in them for as long.
+        (fake(of_points=3e-4, place=0.6), "overhead"),
+        (fake(waits=5e-4), "overhead"),
+    ],
+)
+def test_what_limits_a_workload(measured, word):
+    assert measured.limit == word
+    assert measured.rest == pytest.approx(
+        1 - (sum((measured.of_points | measured.of_nodes).values()) - measured.waits) / 1e-3
+    )
+
+
+@pytest.fixture
+def faked(tmp_path, monkeypatch):
+    """The command without its measuring."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
+    monkeypatch.setattr(measure, "build", lambda *_: None)
+    monkeypatch.setattr(measure, "measured", lambda *_: fake())
+    return tmp_path
+
+
+def test_a_file_and_a_comparison_with_it(faked, capsys):
+    assert main(["bench", "disks-20", "disks-80", "-o", "a.json"]) == 0
+    found = json.loads((faked / "a.json").read_text(encoding="utf-8"))
+    one = found["workloads"]["disks-80"]
+    assert found["threads"] == 1 and found["triad"] == 2e10 and found["versions"]["numba"]
+    assert one["best"] == 3e6 and one["median"] == 2e6 and one["speeds"] == [1e6, 3e6, 2e6]
+    assert one["precision"] == "double" and one["bytes_per_particle"] == 112
+    assert one["limited_by"] == "arithmetic" and one["roofline"] == 0.4
+    one["best"] = 1.5e6
+    found["processor"] = "a slower one"
+    found["versions"]["numba"] = "0.1"
+    (faked / "a.json").write_text(json.dumps(found), encoding="utf-8")
+    capsys.readouterr()
+    assert main(["bench", "disks-80", "disks-320", "--against", "a.json"]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^disks-80 +1\.50 +3\.00 +2\.00$", out, re.M)
+    assert re.search(r"^disks-20 +3\.00 +- +- +not measured now$", out, re.M)
+    assert re.search(r"^disks-320 +- +3\.00 +- +new$", out, re.M)
+    assert "another processor: a slower one then, " in out
+    assert "another version of numba: 0.1 then, " in out
+    assert "another threads" not in out
+
+
+def test_other_scenes_have_no_ratio(faked, capsys):
+    """A variable that was set, or another precision, makes another workload."""
+    assert main(["bench", "disks-20", "-o", "a.json"]) == 0
+    assert main(["bench", "disks-20", "-var", "N", "40", "--against", "a.json"]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^disks-20 +3\.00 +3\.00 +- +other variables$", out, re.M)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (None, "cannot read a.json"),
+        ("x", "a.json is not the output of a bench"),
+        ("[1]", "is not the output of a bench"),
+        ('{"kind": "karamelo-py bench", "workloads": {"disks-20": {"best": "fast"}}}', "is not"),
+        ('{"kind": "karamelo-py bench", "workloads": {"disks-20": {"best": NaN}}}', "is not"),
+    ],
+)
+def test_what_is_no_bench(faked, capsys, text, said):
+    if text is not None:
+        (faked / "a.json").write_text(text, encoding="utf-8")
+    assert main(["bench", "disks-20", "--against", "a.json"]) == 1
+    err = capsys.readouterr().err
+    assert err.count("error") == 1 and said in err and "Traceback" not in err
+
+
+def test_the_commit_is_that_of_the_repository():
+    words = ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"]
+    try:
+        head = subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("there is no repository here")
+    assert record.commit() in (head, head + "-dirty")

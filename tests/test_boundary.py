@@ -64,6 +64,20 @@ def test_error_is_the_default(run_interpreted, d):
     assert "leaves the domain" in said and "boundary(delete)" in said
 
 
+@pytest.mark.parametrize(("last", "loose"), [(0.9, True), (0.6, False)])
+def test_a_point_come_loose_from_its_solid_is_told(run_interpreted, last, loose):
+    """Two points, 0.4 or 0.1 apart in cells of 0.1, fly over the edge at x = 1.2."""
+    text = single(2, "error", "run(200)").replace(
+        "region(box, block, 0.8, 0.9, 0.8, 0.9)",
+        "region(near, block, 0.5, 0.6, 0.5, 0.6)\n"
+        f"region(far, block, {last}, {last + 0.1:g}, 0.5, 0.6)\n"
+        "region(box, union, near, far)",
+    )
+    said = run_interpreted(text, status=1).err
+    assert "leaves the domain" in said
+    assert ("numerical fracture" in said) == loose
+
+
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_deleted_points_are_gone(run_interpreted, d):
     """Dumps have the others under their own ids; the nodes carry the mass that is left."""

@@ -13,11 +13,13 @@ from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK, STOPPE
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.watch import IN_ALL, cause_of_gain
+from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError
 
 LAST_GOOD = "last_good.*.h5"
+LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
+APART = "no other point of it within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int) -> tuple[str, str]:
@@ -139,11 +141,14 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
         if simulation.above_limit():
             return f"{name} at {_place(old)} is thrown out of the domain", smaller
+        loose = _loose(hub, simulation, block, p)
+        why = f", come loose from its solid ({APART}: numerical fracture)," if loose else ""
+        keep = f"; against fracture, {WHOLE}" if loose else ""
         return (
-            f"{name} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
+            f"{name}{why} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
             "make the domain larger, hold the point back with fix velocity_nodes at the wall, let "
-            f"it go with boundary(delete), or, if it should not have got there, {smaller}",
+            f"it go with boundary(delete), or, if it should not have got there, {smaller}{keep}",
         )
     move = float(np.abs(new - old).max()) / hub.lattices[block.points.grid[p]].h
     if move > 1:
@@ -164,6 +169,16 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         f"{name} at {_place(old)} is turned inside out (det F <= 0)",
         f"{smaller}, or a finer grid, or a law that resists the compression (neo-hookean)",
     )
+
+
+def _loose(hub: Hub, simulation: Simulation, block: Block, p: int) -> bool:
+    """Whether a point has a solid of others, none of which is within a cell."""
+    number, now = int(block.points.id[p]), simulation.now
+    d, h = hub.domain.dimension, hub.lattices[block.points.grid[p]].h
+    others = simulation.present & (simulation.solid_of == simulation.solid_of[number])
+    others[number] = False
+    apart = np.abs(simulation.x[others][:, :d] - block.points.x[now][:d, p].astype(float))
+    return len(apart) > 0 and bool(np.all(apart.max(axis=1) > LOOSE * h))
 
 
 def _tangled(simulation: Simulation, block: Block, p: int) -> str | None:

@@ -15,6 +15,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.fixes.pairs import PairContact
 
 TOLD = 2  # windows of growth one after another, of which a run tells
+WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 IN_ALL = 0.1  # of the largest energy: growth since the start that it tells of, too
 
 
@@ -81,7 +82,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     if moves and _torn(hub):
         return (
             "points that are further apart than a cell (numerical fracture)",
-            "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm",
+            WHOLE,
         )
     if hub.fixes and any(isinstance(fix, PairContact) for fix in hub.fixes.values()):
         return "contact between points", "a smaller step, or method ulmpm/contacts"

@@ -9,12 +9,13 @@ from __future__ import annotations
 import re
 from argparse import ArgumentTypeError, Namespace
 from math import inf
+from pathlib import Path
 from typing import Any
 
-from karamelo_py.app.bench import measure
+from karamelo_py.app.bench import measure, record
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.cli import add_variables, threads_option
-from karamelo_py.run.report import point_fields
+from karamelo_py.app.studies.options import out_file
 from karamelo_py.script.errors import ScriptError, meant
 
 ELSEWHERE = "published, one core of another machine, a small AMD EPYC"
@@ -27,7 +28,8 @@ def add_parser(subparsers: Any) -> None:
         "bench",
         description=f"""\
 Measure the speed of this machine on known scenes, all or those that are named: particle-steps per
-second of the fastest of five repetitions, bytes per particle, and the time of each stage of a step.
+second of the fastest of five repetitions, bytes per particle, the time of each stage of a step, and
+what limits it: memory, arithmetic, nodes or overhead.
 
 workloads:
 {chr(10).join(f"  {name:<{width}}  {w.title}" for name, w in WORKLOADS.items())}""",
@@ -43,6 +45,10 @@ workloads:
         "--seconds", type=_positive, default=2.0, metavar="S",
         help="how long each scene is measured (default: 2)",
     )  # fmt: skip
+    parser.add_argument("-o", type=Path, metavar="FILE", help="write what is measured, as JSON")
+    parser.add_argument(
+        "--against", type=Path, metavar="FILE", help="compare with what -o has written before"
+    )
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
@@ -62,6 +68,8 @@ def measure_all(options: Namespace) -> int:
             raise ScriptError(
                 f"-var {variable}: no scene has a variable '{variable}'", expected="N or coarser"
             )
+    out = out_file(options.o, ".json") if options.o else None
+    earlier = record.read(options.against) if options.against else None
     import numba
 
     available = numba.config.NUMBA_NUM_THREADS
@@ -69,9 +77,20 @@ def measure_all(options: Namespace) -> int:
     numba.set_num_threads(threads)
     triad = measure.bandwidth(threads)
     print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")
+    found = record.head(threads, triad, options.seconds)
     for name in chosen:
+        workload = WORKLOADS[name]
         presets = {n: value for n, value in options.var if n in known[name]}
-        _print(name, presets, threads, options.seconds, triad)
+        simulation = measure.build(workload, threads, presets)
+        one = measure.measured(simulation, options.seconds, triad, workload.lead)
+        _print(name, one, published=not presets)
+        found["workloads"][name] = record.entry(one, workload.title, presets)
+        if out:
+            record.write(out, found)
+    if earlier:
+        print("\n" + "\n".join(record.comparison(found, earlier)))
+    if out:
+        print(f"\nwritten: {out}")
     return 0
 
 
@@ -85,24 +104,19 @@ def _positive(text: str) -> float:
     return value
 
 
-def _print(name: str, presets: dict[str, str], threads: int, seconds: float, triad: float) -> None:
-    workload = WORKLOADS[name]
-    simulation = measure.build(workload, threads, presets)
-    best, median = measure.speed(simulation, seconds, workload.lead)
-    per_step = measure.traffic(simulation)
-    per_point = sum(size for _, _, size in point_fields(simulation.setup.blocks[0]))
-    roof = triad / per_step
-    print(f"\n{name}: {workload.title}; {simulation.count} points")
-    print(f"  {'particle-steps/s':<34} {best / 1e6:8.2f} million (median {median / 1e6:.2f})")
-    if workload.karamelo is not None and not presets:
+def _print(name: str, one: measure.Measured, *, published: bool) -> None:
+    workload, best = WORKLOADS[name], one.best
+    print(f"\n{name}: {workload.title}; {one.points} points")
+    print(f"  {'particle-steps/s':<34} {best / 1e6:8.2f} million (median {one.median / 1e6:.2f})")
+    if workload.karamelo is not None and published:
         print(f"  {'of Karamelo in C++':<34} {workload.karamelo:8.2f} million ({ELSEWHERE})")
         print(f"  {'ratio of the two':<34} {best / 1e6 / workload.karamelo:8.1f}")
-    print(f"  {'bytes per particle':<34} {per_point:8d}")
-    print(f"  {'bytes moved per particle-step':<34} {per_step:8.0f}")
-    print(f"  {'share of the memory roofline':<34} {100 * best / roof:8.1f} %")
-    parts = measure.stages(simulation, seconds / 4)
-    for stage, per in parts.items():
-        print(f"    {stage:<32} {1e9 * per / simulation.count:8.2f} ns")
+    print(f"  {'bytes per particle':<34} {one.bytes_per_particle:8d}")
+    print(f"  {'bytes moved per particle-step':<34} {one.bytes_per_step:8.0f}")
+    print(f"  {'share of the memory roofline':<34} {100 * one.roofline:8.1f} %")
+    print(f"  {'share of that of its own size':<34} {100 * one.roofline_in_place:8.1f} %")
+    for stage, per in (one.of_points | one.of_nodes).items():
+        print(f"    {stage:<32} {1e9 * per / one.points:8.2f} ns")
     print(f"    {'together, in one compiled loop':<32} {1e9 / best:8.2f} ns")
-    if simulation.count < 10_000:
-        print("    (one by one, each stage costs some microseconds to call from Python)")
+    shares = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % beside them"
+    print(f"  {'limited by':<34} {one.limit:>8} ({shares})")

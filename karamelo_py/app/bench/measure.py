@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from math import inf
 from typing import Any, NamedTuple
 
@@ -22,12 +23,91 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
+ARRAYS = 3 * 256 * 2**20  # bytes
+ALONE = 0.5  # the share of a step from which on something is said to limit it
+
 
 class Timed(NamedTuple):
-    """A way of sweeping that notes how long each sweep took, then does as `mode` does."""
+    """A way of sweeping that notes how long each sweep took, then does as `mode` does.
+
+    What it takes to call the same sweep over nothing is taken off.
+    """
 
     mode: Any
-    seconds: dict[str, float]
+    of_points: dict[str, list[float]]
+    of_nodes: dict[str, list[float]]
+
+
+class Measured(NamedTuple):
+    """What is measured of a workload.
+
+    Attributes
+    ----------
+    points
+        How many.
+    speeds
+        Particle-steps per second of each repetition.
+    bytes_per_particle, bytes_per_step
+        Those that a point holds, and those that move in a particle-step if no cache keeps them.
+    roofline
+        The share of the memory's bandwidth that these take at the best speed.
+    roofline_in_place
+        The same, of the bandwidth of arrays as large as the scene, which caches may keep.
+    of_points, of_nodes
+        Seconds per step in sweeps over points and over nodes, without the way there.
+    waits
+        Seconds per step of these in which threads begin and wait for each other.
+    precision
+        ``double`` or ``single``.
+    """
+
+    points: int
+    speeds: list[float]
+    bytes_per_particle: int
+    bytes_per_step: float
+    roofline: float
+    roofline_in_place: float
+    of_points: dict[str, float]
+    of_nodes: dict[str, float]
+    waits: float
+    precision: str
+
+    @property
+    def best(self) -> float:
+        """Particle-steps per second of the fastest repetition."""
+        return max(self.speeds)
+
+    @property
+    def median(self) -> float:
+        """Their median."""
+        return statistics.median(self.speeds)
+
+    @property
+    def rest(self) -> float:
+        """The share of a step beside the work of sweeps: control, threads that wait."""
+        swept = sum(self.of_points.values()) + sum(self.of_nodes.values())
+        return min(1.0, max(0.0, 1 - (swept - self.waits) * self.best / self.points))
+
+    @property
+    def nodes(self) -> float:
+        """The share of sweeps over nodes in the time of all sweeps."""
+        nodes = sum(self.of_nodes.values())
+        swept = nodes + sum(self.of_points.values())
+        return nodes / swept if swept else 0.0
+
+    @property
+    def limit(self) -> str:
+        """What takes at least half of a step, the first of these that does.
+
+        ``overhead`` (the rest), ``nodes``, ``memory`` (at least half of the bandwidth of arrays as
+        large as the scene), else ``arithmetic``: sweeps over points that wait for instructions,
+        or for single numbers, more than for bandwidth.
+        """
+        if self.rest >= ALONE:
+            return "overhead"
+        if self.nodes >= ALONE:
+            return "nodes"
+        return "memory" if self.roofline_in_place >= ALONE else "arithmetic"
 
 
 def _name(*tags: Any) -> str:
@@ -36,20 +116,29 @@ def _name(*tags: Any) -> str:
 
 @sweep_points.on(Timed)
 def _(mode, visit, s, block, then, gathers, scatters, dt):
-    begun = time.perf_counter()
-    sweep_points(mode.mode, visit, s, block, then, gathers, scatters, dt)
-    _note(mode, _name(*visit.tasks, *visit.quantities), begun)
+    colours = np.zeros(2, block.tiling.colour.dtype)  # a colour without tiles
+    nothing = block._replace(tiling=block.tiling._replace(colour=colours))
+    name = _name(*visit.tasks, *visit.quantities)
+    with _noted(mode.of_points, name):
+        sweep_points(mode.mode, visit, s, block, then, gathers, scatters, dt)
+    with _noted(mode.of_points, name):
+        sweep_points(mode.mode, visit, s, nothing, then, gathers, scatters, dt)
 
 
 @sweep_nodes.on(Timed)
 def _(mode, task, kin, nodes, spans, dt):
+    nothing = np.zeros_like(spans)
+    with _noted(mode.of_nodes, _name(task)):
+        sweep_nodes(mode.mode, task, kin, nodes, spans, dt)
+    with _noted(mode.of_nodes, _name(task)):
+        sweep_nodes(mode.mode, task, kin, nodes, nothing, dt)
+
+
+@contextmanager
+def _noted(seconds: dict[str, list[float]], name: str) -> Iterator[None]:
     begun = time.perf_counter()
-    sweep_nodes(mode.mode, task, kin, nodes, spans, dt)
-    _note(mode, _name(task), begun)
-
-
-def _note(mode: Timed, name: str, begun: float) -> None:
-    mode.seconds[name] = mode.seconds.get(name, 0.0) + time.perf_counter() - begun
+    yield
+    seconds.setdefault(name, []).append(time.perf_counter() - begun)
 
 
 def build(
@@ -65,10 +154,29 @@ def build(
     return simulation
 
 
-def speed(
+def measured(
+    simulation: Simulation, seconds: float, triad: float, lead: int = 3, repetitions: int = 5
+) -> Measured:
+    """Measure a scene for about so many seconds; `triad` is the bandwidth of the memory."""
+    rates = speeds(simulation, seconds, lead, repetitions)
+    per_step, held, regions = traffic(simulation)
+    return Measured(
+        simulation.count,
+        rates,
+        sum(size for _, _, size in point_fields(simulation.setup.blocks[0])),
+        per_step,
+        max(rates) * per_step / triad,
+        max(rates) * per_step / bandwidth(simulation.threads, held),
+        *stages(simulation, seconds / 4),
+        regions * start_of_threads() if simulation.threads > 1 else 0.0,
+        simulation.hub.settings.precision,
+    )
+
+
+def speeds(
     simulation: Simulation, seconds: float, lead: int = 3, repetitions: int = 5
-) -> tuple[float, float]:
-    """Particle-steps per second: of the fastest repetition, and their median.
+) -> list[float]:
+    """Particle-steps per second of each repetition.
 
     Every repetition starts from the same state, that after `lead` steps.
     """
@@ -81,7 +189,7 @@ def speed(
         simulation.restore(start)
         rates.append(simulation.count * count / _advance(simulation, count))
     simulation.restore(start)
-    return max(rates), statistics.median(rates)
+    return rates
 
 
 def _advance(simulation: Simulation, count: int) -> float:
@@ -92,19 +200,31 @@ def _advance(simulation: Simulation, count: int) -> float:
     return time.perf_counter() - begun
 
 
-def stages(simulation: Simulation, seconds: float) -> dict[str, float]:
-    """Seconds per step in each sweep of a fused step, called one by one."""
+def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], dict[str, float]]:
+    """Seconds per step in each sweep of a fused step over points and over nodes.
+
+    They are called one by one, some in each step more than once; sums of medians.
+    """
     s, scheme = simulation.setup, simulation.hub.update.scheme
-    timed = Timed(simulation.mode, {})
+    timed = Timed(simulation.mode, {}, {})
     begin(scheme, Fused(), timed, s)
     _take_step(simulation, timed)
-    timed.seconds.clear()
+    timed.of_points.clear()
+    timed.of_nodes.clear()
     count = 0
     begun = time.perf_counter()
     while count < 3 or (time.perf_counter() - begun < seconds and count < MOST_STEPS):
         _take_step(simulation, timed)
         count += 1
-    return {name: total / count for name, total in timed.seconds.items()}
+    of_points, of_nodes = (
+        {name: _per_step(taken, count) for name, taken in kind.items()} for kind in timed[1:]
+    )
+    return of_points, of_nodes
+
+
+def _per_step(taken: list[float], count: int) -> float:
+    real, way = taken[::2], taken[1::2]  # a sweep, then the same over nothing
+    return len(real) / count * max(0.0, statistics.median(real) - statistics.median(way))
 
 
 def _take_step(simulation: Simulation, mode: Any) -> None:
@@ -119,6 +239,7 @@ class _Recorder(NamedTuple):
 
     points: list
     nodes: list
+    regions: list  # how often threads begin and wait for each other
 
 
 @sweep_points.on(_Recorder)
@@ -126,21 +247,25 @@ def _(mode, visit, s, block, then, gathers, scatters, dt):
     reads = {name for tag in (*visit.tasks, *visit.quantities) for name in tag.reads}
     writes = {name for tag in visit.tasks for name in tag.writes}
     mode.points.extend((*reads, *writes))
+    mode.regions.append(block.tiling.colour.size - 1)
 
 
 @sweep_nodes.on(_Recorder)
 def _(mode, task, kin, nodes, spans, dt):
     mode.nodes.extend(task.goes_through)
+    mode.regions.append(1)
 
 
-def traffic(simulation: Simulation) -> float:
-    """Bytes per particle-step that have to move if nothing stays in a cache.
+def traffic(simulation: Simulation) -> tuple[float, float, int]:
+    """Bytes per particle-step that have to move if nothing stays in a cache; what else follows.
+
+    The others are the bytes that the scene holds, and how often in a step threads begin.
 
     Fields of the points count once for each sweep that reads and once for each that writes them;
     of node fields, those that loops over nodes go through.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
-    recorder = _Recorder([], [])
+    recorder = _Recorder([], [], [])
     control = s.control
     kept = control.values.copy(), control.clock.copy()
     step(scheme, Fused(), recorder, s, simulation.hooks, True)
@@ -150,7 +275,8 @@ def traffic(simulation: Simulation) -> float:
     active = float(np.sum(s.spans[1 : 1 + s.spans[0, 0], 1] - s.spans[1 : 1 + s.spans[0, 0], 0]))
     total = simulation.count * sum(of_point.get(name, 0) for name in recorder.points)
     total += active * sum(of_node.get(name, 0) for name in recorder.nodes)
-    return total / simulation.count
+    held = simulation.count * sum(of_point.values()) + active * sum(of_node.values())
+    return total / simulation.count, held, sum(recorder.regions)
 
 
 @kernel
@@ -165,14 +291,26 @@ def _triad_threaded(a, b, c, factor):
         a[i] = b[i] + factor * c[i]
 
 
-def bandwidth(threads: int, mebibytes: int = 256) -> float:
-    """Bytes per second of a[i] = b[i] + factor c[i] over arrays far larger than the caches."""
-    n = mebibytes * 2**20 // 8
+def _fastest(calls: int, act: Callable, *arguments: Any) -> float:
+    best = inf
+    for _ in range(calls):
+        begun = time.perf_counter()
+        act(*arguments)
+        best = min(best, time.perf_counter() - begun)
+    return best
+
+
+def bandwidth(threads: int, size: float = ARRAYS) -> float:
+    """Bytes per second of a[i] = b[i] + factor c[i] over three arrays of `size` bytes together.
+
+    By default they are far larger than the caches.
+    """
+    n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
     triad: Callable = _triad if threads == 1 else _triad_threaded
-    best = inf
-    for _ in range(5):
-        begun = time.perf_counter()
-        triad(a, b, c, 0.5)
-        best = min(best, time.perf_counter() - begun)
-    return 24 * n / best
+    return 24 * n / _fastest(5 if size >= ARRAYS else 100, triad, a, b, c, 0.5)
+
+
+def start_of_threads() -> float:
+    """Seconds that it takes threads to begin and to wait for each other, for next to no work."""
+    return _fastest(200, _triad_threaded, *np.ones((3, 64)), 0.5)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies import histories, pictures, records
+from karamelo_py.app.studies import histories, keeping, pictures, records
 from karamelo_py.app.studies.curves import Family, missing, order
 from karamelo_py.app.studies.options import new_parser, out_file
 from karamelo_py.app.studies.study import shown, terminal
@@ -22,7 +22,8 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
   karamelo-py chart sweep.csv -accuracy err -x N -o orders.svg       errors over a variable
   karamelo-py chart sweep.csv -accuracy err -heat N,ppc -o heat.pdf  over two variables
   karamelo-py chart sweep.csv -accuracy err -o chart.html            a page of runs
-  karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs"""
+  karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs
+  karamelo-py chart sweep.csv -keeps E -by basis,transfer -o E.md    does an energy stay?"""
 SUFFIXES = (".png", ".svg", ".pdf", ".html")
 
 
@@ -37,6 +38,11 @@ def add_parser(subparsers: Any) -> None:
         metavar="COLUMN",
         help="a log column, a curve for each run, over -x (Time)",
     )
+    wanted.add_argument(
+        "-keeps", metavar="COLUMN",
+        help="a table of words: does a log column stay (keeps, damps, gains, breaks, refused)? "
+        "Rows are -by, columns the other variables",
+    )  # fmt: skip
     parser.add_argument("-cost", default="seconds", metavar="COLUMN", help="the cost (seconds)")
     parser.add_argument("-by", default="", metavar="A,B", help="variables that tell lines apart")
     kinds = parser.add_mutually_exclusive_group()
@@ -67,6 +73,8 @@ def run(options: Any) -> int:
     if not rows:
         raise ScriptError("no row fulfils -where " + " and ".join(options.where))
     by = [name.strip() for name in options.by.split(",") if name.strip()]
+    if options.keeps:
+        return keeps(options, rows, by or variables, variables)
     if options.curve:
         return curves(options, rows, by or variables, made)
     family = Family(rows, variables, options.accuracy, options.cost, by, options.x)
@@ -121,6 +129,27 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     for each in found:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")
+    return 0
+
+
+def keeps(options: Any, rows: list, by: list[str], variables: list[str]) -> int:
+    """Show whether a log column stays what it was, and which runs fail without a known cause."""
+    out = out_file(options.o, ".md") if options.o else None
+    for name in by:
+        if name not in variables:
+            raise missing("-by", name, variables)
+    over, folder = options.x or "Time", options.table.parent
+    kept = [keeping.look_at(row, folder, over, options.keeps, keeping.WITHIN) for row in rows]
+    found = keeping.table(rows, kept, by, variables)
+    text = keeping.markdown(found)
+    print(text)
+    for word in dict.fromkeys(one.word for one in kept):
+        print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
+    for line in found.silent:
+        print(f"nothing says why: {line}")
+    if out:
+        out.write_text(text, encoding="utf-8")
+        print(f"written: {out}")
     return 0
 
 

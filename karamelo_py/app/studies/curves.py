@@ -176,11 +176,11 @@ def require(rows: Sequence[Mapping[str, str]], option: str, name: str) -> None:
         raise missing(option, name, list(rows[0]))
 
 
-def missing(option: str, name: str, known: Sequence[str]) -> ScriptError:
-    """The error for a column or a variable that the table does not have."""
+def missing(option: str, name: str, known: Sequence[str], place: str = "the table") -> ScriptError:
+    """The error for a column or a variable that a table does not have."""
     close = nearest(name, known)
     return ScriptError(
-        f"{option}: the table has no '{name}'",
+        f"{option}: {place} has no '{name}'",
         expected="one of " + ", ".join(known),
         hint=f"did you mean '{close}'?" if close else None,
     )

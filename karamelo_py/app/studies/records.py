@@ -144,21 +144,25 @@ def value(each: Mapping[str, Any], name: str) -> float | None:
 
 def describe(path: Path, **said: Any) -> None:
     """Write beside a table what it was made with: processor, threads, versions, date."""
+    text = json.dumps({**said, **surroundings()}, indent=1) + "\n"
+    path.with_suffix(".json").write_text(text, encoding="utf-8")
+
+
+def surroundings() -> dict[str, Any]:
+    """Date, machine and versions, for what is measured here and now."""
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
     for name in ("numpy", "numba", "llvmlite"):
         try:
             versions[name] = version(name)
         except PackageNotFoundError:
             versions[name] = "not installed"
-    text = {
-        **said,
+    return {
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
         "processor": processor(),
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.release()}",
         "versions": versions,
     }
-    path.with_suffix(".json").write_text(json.dumps(text, indent=1) + "\n", encoding="utf-8")
 
 
 def beside(path: Path) -> dict[str, Any]:

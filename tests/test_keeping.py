@@ -1,0 +1,95 @@
+"""The energy table: words for logs, and the one command that makes it, reduced."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from karamelo_py.app.cli import main
+from karamelo_py.app.studies import atlas
+from karamelo_py.app.studies.keeping import judge, look_at
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.mark.parametrize(
+    ("rate", "word"), [(0.0, "keeps"), (-0.3, "damps"), (0.3, "gains"), (0.1, "keeps")]
+)
+def test_words_are_those_of_means(rate, word):
+    """Of exp(rate t) the mean over the last fifth is exp(0.8 rate) times that over the first."""
+    t = np.linspace(0, 1, 101)
+    found, ratio = judge(t, np.exp(rate * t))
+    assert found == word and ratio == pytest.approx(np.exp(0.8 * rate), rel=1e-12)
+
+
+def test_what_is_not_a_number_is_not_kept():
+    assert judge(np.arange(10.0), np.full(10, np.nan))[0] == "gains"
+
+
+def log_of(folder, values, err=""):
+    lines = [f"{k} {value}" for k, value in enumerate(values)]
+    (folder / "log.mpm").write_text("\n".join(["Time E", *lines]) + "\n", encoding="utf-8")
+    (folder / "err.txt").write_text(err, encoding="utf-8")
+
+
+GROWN = "in.x:1:1: warning: step 9: energy comes from nowhere. Known to do that here: a cause\n"
+
+
+@pytest.mark.parametrize(
+    ("values", "status", "err", "word", "silent"),
+    [
+        ([1, 1, 1, 1, 1, 2], "done", GROWN, "gains", False),
+        ([1, 1, 1, 1, 1, 2], "done", "", "gains", True),
+        ([1, 1, 1], "failed", GROWN + "in.x:9:1: error: point 1\n", "breaks", False),
+        ([1, 1, 1], "failed", "in.x:9:1: error: point 1\n", "breaks", True),
+        ([1, 1, 1], "too long", "", "unknown", False),
+    ],
+)
+def test_what_goes_wrong_in_silence_is_named(tmp_path, values, status, err, word, silent):
+    log_of(tmp_path, values, err)
+    kept = look_at({"folder": ".", "status": status}, tmp_path, "Time", "E", 0.1)
+    assert (kept.word, kept.silent) == (word, silent)
+    if GROWN in err:
+        assert kept.said[0] == "a cause"
+
+
+def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys):
+    """The command of docs/energy.md on a coarse disk, one period, with a scheme that there is not.
+
+    PIC takes what nodes have averaged away in every step: it damps by its definition.
+    """
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    entries, _ = atlas.read(ROOT / "docs" / "atlas.toml")
+    assert {e.name for e in entries} >= {"energy/FLIP", "energy/transfers"}
+    entry = next(e for e in entries if e.name == "energy/transfers")
+    entry.small.update(periods="1", transfers="PIC,TPIC", schemes="musl,leapfrog")
+    for line in entry.lines(str(ROOT / "inputs"), small=True):
+        assert main(line.replace("ppc=2,1", "ppc=1").split()) == 0
+    text = (tmp_path / "energy.md").read_text(encoding="utf-8")
+    lines = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    cells = {(transfer, order): cell for order, transfer, *_, cell in lines}
+    assert cells["PIC", "musl"].startswith("damps")
+    assert cells["PIC", "leapfrog"].startswith("refused")
+    # The cause that the program names beforehand for TPIC with linear functions stands below.
+    assert "[" in cells["TPIC", "musl"]
+    assert "affine noise: TPIC with linear functions" in text
+    assert "refused: 2 of 4" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-keeps", "F"], "the log has no 'F'"),
+        (["-keeps", "E", "-by", "bass"], "did you mean 'basis'?"),
+    ],
+)
+def test_mistakes(tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    log_of(tmp_path, [1, 1])
+    head = "basis,seconds,status,reason,folder\n"
+    (tmp_path / "runs.csv").write_text(head + "linear,1,done,,.\n", encoding="utf-8")
+    assert main(["chart", "runs.csv", *words]) == 1
+    assert said in capsys.readouterr().err
