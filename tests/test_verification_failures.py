@@ -218,8 +218,7 @@ def test_the_step_of_a_lone_point_depends_on_its_place(run):
 
 def test_usl_bears_less_than_the_courant_step(run):
     """Benchmark C11: 0.9 h/c is too much for usl, and right for musl."""
-    failed = run("courant").log
-    assert failed.energy[-1] > 1e6 * failed.energy[0]
+    assert "the step is 1.38 times the stable one" in run("courant", status=1).err
     for cure in ({"cure": 1}, {"which": "musl", "factor": 0.9}):
         cured = run("courant", **cure).log
         assert cured.energy.max() < 1.5 * cured.energy[0]
@@ -255,8 +254,11 @@ def test_what_a_light_node_is_depends_on_the_points_near_it(state_interpreted):
     assert np.array_equal(states[0]["v"][:n], states[1]["v"][:n])
 
 
-def shaken(run_interpreted, scheme, ppc, factor, method="tlmpm, FLIP, linear, 1"):
-    """Energy of a small free body, shaken a little, after 150 steps over the one at the start."""
+def shaken(run_interpreted, scheme, ppc, factor, method="tlmpm, FLIP, linear, 1", status=0):
+    """Energy of a small free body, shaken a little, after 150 steps over the one at the start.
+
+    With `status` 1 what is said where the watch over the energy stops it.
+    """
     result = run_interpreted(f"""
         method({method})
         scheme({scheme})
@@ -271,7 +273,9 @@ def shaken(run_interpreted, scheme, ppc, factor, method="tlmpm, FLIP, linear, 1"
         set_output(1000)
         log_modify(custom, step, Ek, Es)
         run(150)
-    """, folder=f"{scheme}{ppc}{factor}")  # fmt: skip
+    """, folder=f"{scheme}{ppc}{factor}", status=status)  # fmt: skip
+    if status:
+        return result.err
     total = result.log.Ek + result.log.Es
     return total[-1] / total[0]
 
@@ -284,7 +288,7 @@ def test_usl_has_a_stable_step_of_its_own(run_interpreted, ppc):
     at most 4 (2 lambda + 2 mu) / rho in the plane, stable below 0.59 h/c at nu = 0.3.
     """
     above = (0.9 if ppc == 2 else 0.75) / USL.courant[ppc == 1]
-    assert shaken(run_interpreted, "usl", ppc, above) > 5
+    assert "from nowhere" in shaken(run_interpreted, "usl", ppc, above, status=1)
     assert shaken(run_interpreted, "musl", ppc, 0.99) < 1.5
 
 

@@ -37,10 +37,10 @@ def test_windows_that_grow_are_counted():
 
 
 def test_the_bound_is_what_there_was_and_what_loads_have_brought():
-    """Twice the energy at the start is too much, unless loads have done the work."""
-    assert watched([1.0, 1.99])[1]
-    assert not watched([1.0, 2.01])[1]
-    assert watched([1.0, 2.5], work=[0.0, 4.0])[1]
+    """Ten times the energy at the start more is too much, unless loads have done the work."""
+    assert watched([1.0, 10.99])[1]
+    assert not watched([1.0, 11.01])[1]
+    assert watched([1.0, 25.0], work=[0.0, 4.0])[1]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -74,7 +74,8 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     on_trouble
         ``stop``, or ``halve``: where a point goes wrong, energy comes from nowhere or the step gets
         unstable, the run goes back to its last good state and tries half the step, at most five
-        times; it says so, and what had been written since is written again.
+        times, and says so. What had been written since stays in log and dumps, and the steps that
+        come again are written behind it. Computes that remember (errors, drifts) go on from there.
 
     Example
     -------

@@ -27,7 +27,7 @@ from karamelo_py.points.laws import (
 LOOK = 10  # steps between two looks
 LOOKS = 10  # looks that are averaged, in a window of 100 steps
 GROWTH = 0.01  # of the largest energy so far, in a window: more is told
-BOUND = 1.0  # of the energy that there was and that loads have brought: more stops the run
+BOUND = 10.0  # times the energy that there was and that loads have brought: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
 HEAT_NOISE = 1e-3  # of a temperature: what does not count where all are alike
 OVERSHOOT = 1.0  # of the range of temperatures that sources allow: more stops the run

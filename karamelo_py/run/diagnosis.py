@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import NoReturn
 
@@ -53,7 +54,8 @@ def stop(
         if status == STOPPED and step > simulation.step:
             simulation.advance(step - simulation.step)
     _write_last_good(hub)
-    name = LAST_GOOD.replace("*", str(simulation.step))
+    path = restart.path_of(hub, Path(LAST_GOOD.replace("*", str(simulation.step))))
+    name = os.path.relpath(path)
     if hub.output.writes:
         hint += f". The last good state is in {name}; karamelo-py SCRIPT -restart {name} goes on"
     raise ScriptError(message, place=place, hint=hint)

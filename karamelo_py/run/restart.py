@@ -126,6 +126,8 @@ class Restart:
         import h5py
 
         self.path = path = _latest(path)
+        if not path.is_file():
+            raise ScriptError(f"there is no file {path}", argument="file")
         what = f"{path} is no file that this program can go on from"
         expected = "a file that restart or write_restart of karamelo-py has written"
         try:

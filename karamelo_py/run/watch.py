@@ -13,6 +13,7 @@ from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run.stable import USUAL, keeping_share, sparse
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.fixes.pairs import PairContact
+from karamelo_py.styles.fixes.velocity_particles import VelocityParticles
 
 TOLD = 2  # windows of growth one after another, of which a run tells
 WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
@@ -32,7 +33,9 @@ def unknown_work(hub: Hub) -> str:
     """
     for fix in hub.fixes.values():
         acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
-        if acts and not fix.first_step_only and not fix.conserves:
+        # What leads points against their forces does work that no sum at nodes knows.
+        leads = isinstance(fix, VelocityParticles)
+        if leads or (acts and not fix.first_step_only and not fix.conserves):
             return f"fix {fix.style} '{fix.id}'"
     for solid in hub.solids.values():
         if can(solid.material.law, constrained_velocity):
