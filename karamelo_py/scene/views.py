@@ -398,6 +398,7 @@ class PieceView(PointsView):
         self._block, self._rows = block, rows
         control = simulation.setup.control
         self.dt = float(control.values[DT])
+        self.kick = float(control.clock[0].kick)
         self.time = float(control.values[TIME])
         self.ids = block.points.id[rows]
         self.moved = False
