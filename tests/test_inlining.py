@@ -13,7 +13,7 @@ from numba.core import base, caching, ccallback, codegen, compiler, dispatcher, 
 from numba.core.typing import context, templates
 
 from karamelo_py.compiler import inlining
-from karamelo_py.compiler.compile import kernel, shared
+from karamelo_py.compiler.compile import entered, kernel, shared
 
 
 @shared
@@ -47,6 +47,30 @@ def test_what_is_inlined(tmp_path, monkeypatch):
     assert names["doubled"]
     assert not names["called"]
     assert not names["plain"]
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_what_is_kept_is_in_machine_code_once(tmp_path, monkeypatch):
+    """A caller from another process brings along what was compiled here: it is not added again."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    compiled = []
+    finalize = inlining.Library.finalize
+
+    def watched(library):
+        finalize(library)
+        compiled.append(library)
+
+    monkeypatch.setattr(inlining.Library, "finalize", watched)
+
+    @entered
+    def tripled(x):
+        return 3 * x
+
+    assert tripled(5) == 15
+    (library,) = (one for one in compiled if one.own_name is not None)
+    (caller,) = (one for one in compiled if library in one.needs and not one.inlined)
+    assert inlining.Library._unserialize(library._codegen, library._state) is library
+    assert library._state in caller._state[2][1]
 
 
 # What compiler/ uses of the inside of Numba, and the text of it that this was written for.

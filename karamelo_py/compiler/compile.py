@@ -84,12 +84,6 @@ def kernel(function: Callable | None = None, **options: Any) -> Callable:
     return compiled
 
 
-def inner_kernel(function: Callable) -> Callable:
-    """A kernel that only kernels call (never Python), kept on disk for all of them."""
-    inlining.kept.add(function.__qualname__)
-    return kernel(function, no_cpython_wrapper=True)
-
-
 def subkernel(function: Callable) -> Callable:
     """A function that kernels call, too large to be written into each place that calls it.
 
@@ -100,9 +94,13 @@ def subkernel(function: Callable) -> Callable:
 
 
 def entered(function: Callable) -> Callable:
-    """A kernel for Python and for other kernels, which takes its tuples held."""
+    """A kernel for Python and for other kernels, which takes its tuples held.
+
+    What other kernels call is kept on disk for all of them; Python calls what holds the tuples.
+    """
     names = inspect.signature(function).parameters
-    inner = inner_kernel(function)
+    inlining.kept.add(function.__qualname__)
+    inner = kernel(function, no_cpython_wrapper=True)
     call = define(
         ", ".join(names),
         f"return inner({', '.join(f'hold({name})' for name in names)})",

@@ -92,6 +92,8 @@ class Library(codegen.JITCodeLibrary):
             (function,) = _own_functions(self)
             self.name_in_callers = function.name
             self.own_name = f"{self.name}.{uuid.uuid4().hex}"
+            # A caller that another process has kept may bring it along: it is here already.
+            _living[self.own_name] = self
         super().finalize()
 
     def _optimize_final_module(self) -> None:
@@ -126,8 +128,8 @@ class Library(codegen.JITCodeLibrary):
             library.needs = before
             library.name_in_callers, library.own_name = names
             library._state = state
-        if library.own_name is not None:
-            _living[library.own_name] = library
+            if library.own_name is not None:
+                _living[library.own_name] = library
         return library
 
 

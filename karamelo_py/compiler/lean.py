@@ -6,28 +6,30 @@ through properties, at each call that it gives a type to. Neither changes what i
 
 from __future__ import annotations
 
+import functools
+
 from llvmlite.binding import ffi
 from numba.core.targetconfig import TargetConfig
 
 
+@functools.cache
+def _defaults(kind: type) -> dict:
+    return {name: option.default for name, option in kind.options.items()}
+
+
+@functools.cache
+def _hash_of(kind: type) -> int:
+    return hash(tuple(sorted(kind.options)))
+
+
 def _values(self: TargetConfig) -> dict:
     """All options with their values, set or not."""
-    kind = type(self)
-    if kind not in _defaults:
-        _defaults[kind] = {name: option.default for name, option in kind.options.items()}
-    return _defaults[kind] | self._values
-
-
-_defaults: dict[type, dict] = {}
-_hashes: dict[type, int] = {}
+    return _defaults(type(self)) | self._values
 
 
 def _hash(self: TargetConfig) -> int:
     """Numba's own hash, which is of the names of the options."""
-    kind = type(self)
-    if kind not in _hashes:
-        _hashes[kind] = hash(tuple(sorted(kind.options)))
-    return _hashes[kind]
+    return _hash_of(type(self))
 
 
 TargetConfig.values = _values
