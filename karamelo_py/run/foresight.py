@@ -29,6 +29,7 @@ from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.stable import one_a_cell
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.fixes.body_force import BodyForce
@@ -179,11 +180,7 @@ def _vanishing_domains(s: Foreseen) -> Iterator[Failure]:
 
 
 def _hourglass(s: Foreseen) -> Iterator[Failure]:
-    single = [
-        solid.id
-        for solid in s.hub.solids.values()
-        if 2 * np.max(solid.half_size) > 0.75 * solid.h  # one point a cell
-    ]
+    single = [solid.id for solid in s.hub.solids.values() if one_a_cell(solid)]
     if not s.moves and isinstance(s.basis, Linear) and s.d > 1 and single:
         yield Failure(
             "hourglasses",

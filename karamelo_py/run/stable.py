@@ -16,9 +16,14 @@ USUAL = 0.9
 DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
 
 
+def one_a_cell(solid: Any) -> bool:
+    """Whether a solid has one point in a cell and direction, not two or more."""
+    return 2 * np.max(solid.half_size) > 0.75 * solid.h
+
+
 def sparse(hub: Hub) -> bool:
     """Whether a solid has about one point a cell and direction."""
-    return any(2 * np.max(solid.half_size) > 0.75 * solid.h for solid in hub.solids.values())
+    return any(map(one_a_cell, hub.solids.values()))
 
 
 def keeping_share(hub: Hub) -> float:

@@ -75,6 +75,11 @@ class _View:
     def __init__(self) -> None:
         self._handed_out: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
+    def _take_times(self, control: Any) -> None:
+        self.dt = float(control.values[DT])
+        self.kick = float(control.clock[0].kick)
+        self.time = float(control.values[TIME])
+
     def write_back(self) -> None:
         """Write what a hook has changed; called when it returns."""
         for name, (now, before) in self._handed_out.items():
@@ -121,9 +126,7 @@ class NodesView(_View):
         self._on_velocity = stage == POST_VELOCITIES_TO_GRID or before_update
         self._d = s.kin.dimension
         self._kin = s.kin
-        self.dt = float(s.control.values[DT])
-        self.kick = float(s.control.clock[0].kick)
-        self.time = float(s.control.values[TIME])
+        self._take_times(s.control)
         if group.all:
             spans = s.spans[1 : 1 + s.spans[0, 0]]
             members = np.concatenate([np.arange(a, b) for a, b in spans] or [np.empty(0, int)])
@@ -216,10 +219,7 @@ class PointsView(_View):
         super().__init__()
         self._simulation = simulation
         self._then = then
-        control = simulation.setup.control
-        self.dt = float(control.values[DT])
-        self.kick = float(control.clock[0].kick)
-        self.time = float(control.values[TIME])
+        self._take_times(simulation.setup.control)
         self.ids = simulation.members(group)
         self.moved = False
         self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
@@ -396,10 +396,7 @@ class PieceView(PointsView):
         self._simulation = simulation
         self._then = False
         self._block, self._rows = block, rows
-        control = simulation.setup.control
-        self.dt = float(control.values[DT])
-        self.kick = float(control.clock[0].kick)
-        self.time = float(control.values[TIME])
+        self._take_times(simulation.setup.control)
         self.ids = block.points.id[rows]
         self.moved = False
         self._declared = {}
