@@ -18,7 +18,10 @@ from karamelo_py.compiler.compile import entered, kernel, shared
 
 @shared
 def doubled(x):
-    return 2 * x
+    """Twice x; what branches is compiled, and not run for the kernel."""
+    if x > 0:
+        return 2 * x
+    return x + x
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

@@ -27,6 +27,7 @@ from karamelo_py.compiler.fingerprint import (
     tag_class,
 )
 from karamelo_py.compiler.held import hold
+from karamelo_py.compiler.trace import traced
 
 
 class _NoCollections(event.Listener):
@@ -122,6 +123,7 @@ def by_type(function: Callable) -> Callable:
     """Decorate the chooser of what `function` is in a kernel, from the types of its arguments."""
 
     def choose(chooser: Callable) -> Callable:
+        traced(function, chooser)
         overload(function, _INLINED, strict=False)(noting(chooser))
         return chooser
 
@@ -142,9 +144,24 @@ def of_numbers(function: Callable) -> Callable:
     return choose
 
 
-def shared(function: Callable) -> Callable:
-    """Mark a helper of point functions that needs no choice by type: kernels may call it."""
-    by_type(function)(lambda *arguments: function)
+def shared(function: Callable | None = None, *, unless: Callable | None = None) -> Callable:
+    """Mark a helper of point functions: kernels may call it. It may ask what its arguments are.
+
+    For types of which ``unless(*types)`` holds, it is something else (:func:`by_type`).
+    """
+    if function is None:
+        return lambda f: shared(f, unless=unless)
+
+    def choose(*arguments: Any) -> Callable | None:
+        return None if unless is not None and unless(*arguments) else function
+
+    by_type(function)(choose)
+    return function
+
+
+def looping(function: Callable) -> Callable:
+    """Mark a helper with a loop that is left to the compiler to unroll."""
+    overload(function, _INLINED, strict=False)(lambda *arguments: function)
     return function
 
 
@@ -348,16 +365,11 @@ def of_present(p: int, value: float) -> float:
 of_numbers(of_present)(lambda p, value: lambda p, value: value)
 
 
+@shared(unless=lambda *kinds: lanes_of(kinds))
 def accumulate(array: Any, i: int, first: int, values: tuple) -> None:
     """array[i, first + k] += values[k], lane after lane."""
     for k, value in enumerate(values):
         array[i, first + k] += value
-
-
-@of_numbers(accumulate)
-def _accumulate(array, i, first, values):
-    lines = [f"array[i, first + {k}] += values[{k}]" for k in range(len(values))]
-    return define("array, i, first, values", *lines)
 
 
 def largest(a: float) -> float:
@@ -412,17 +424,11 @@ def over_blocks(per_block: Callable) -> Callable:
 
     shared(per_block)
 
+    @shared
     def loop(setup: Any, *arguments: Any) -> None:
         for block in setup.blocks:
             per_block(block, setup, *arguments)
 
-    def written_out(setup: Any, *arguments: Any) -> Callable:
-        names = "".join(f", a{k}" for k in range(len(arguments)))
-        count = len(setup[setup.fields.index("blocks")])
-        lines = [f"per_block(setup.blocks[{k}], setup{names})" for k in range(count)]
-        return define(f"setup{names}", *lines, per_block=per_block)
-
-    by_type(loop)(written_out)
     return loop
 
 

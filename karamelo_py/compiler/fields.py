@@ -36,7 +36,7 @@ from numba import types
 from numba.core.imputils import impl_ret_borrowed
 from numba.extending import lower_builtin, type_callable
 
-from karamelo_py.compiler.compile import by_type, define
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import is_held, item_of
 
 
@@ -136,29 +136,19 @@ def _lower_field(context, builder, signature, arguments):
 # --- rows of arrays that may be absent --------------------------------------------------------
 
 
+@shared
 def load(array, p, like):
     """Components 0, 1, ... of point `p`, as many as `like` has; none where there is no array."""
     return () if array is None else tuple(array[k, p] for k in range(len(like)))
 
 
-@by_type(load)
-def _load(array, p, like):
-    if isinstance(array, types.NoneType):
-        return lambda array, p, like: ()
-    items = "".join(f"array[{k}, p], " for k in range(len(like)))
-    return define("array, p, like", f"return ({items})")
-
-
+@shared
 def store(array, p, values):
     """Components 0, 1, ... of point `p` become `values`; nothing where there is no array."""
     store_from(array, p, 0, values)
 
 
-@by_type(store)
-def _store(array, p, values):
-    return lambda array, p, values: store_from(array, p, 0, values)
-
-
+@shared
 def store_from(array, p, first, values):
     """Components from `first` on of point `p` become those of `values`; earlier ones stay."""
     if array is not None:
@@ -166,14 +156,7 @@ def store_from(array, p, first, values):
             array[k, p] = values[k]
 
 
-@by_type(store_from)
-def _store_from(array, p, first, values):
-    if isinstance(array, types.NoneType):
-        return lambda array, p, first, values: None
-    lines = [f"if first <= {k}: array[{k}, p] = values[{k}]" for k in range(len(values))]
-    return define("array, p, first, values", *lines)
-
-
+@shared
 def increase(array, p, values):
     """Add `values` to components 0, 1, ... of point `p`; nothing where there is no array."""
     if array is not None:
@@ -181,20 +164,7 @@ def increase(array, p, values):
             array[k, p] += value
 
 
-@by_type(increase)
-def _increase(array, p, values):
-    if isinstance(array, types.NoneType):
-        return lambda array, p, values: None
-    lines = [f"array[{k}, p] += values[{k}]" for k in range(len(values))]
-    return define("array, p, values", *lines)
-
-
+@shared
 def load_vector(kin, array, p):
     """The first components of point `p`, as many as a vector has."""
     return tuple(array[k, p] for k in range(kin.dimension))
-
-
-@by_type(load_vector)
-def _load_vector(kin, array, p):
-    items = "".join(f"array[{k}, p], " for k in range(kin.instance_class.dimension))
-    return define("kin, array, p", f"return ({items})")

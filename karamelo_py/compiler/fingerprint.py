@@ -15,7 +15,8 @@ import inspect
 import pickle
 import sys
 import types as python
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -75,6 +76,28 @@ def asks(dispatch: Callable, classes: tuple) -> None:
     """Note that whether `dispatch` is defined for `classes` was asked, maybe by a chooser."""
     if _asked:
         _asked[-1].add((dispatch, classes))
+    note([(dispatch, classes)])
+
+
+# Of the functions that are made, innermost last: what was asked of point functions, and the code
+# of functions that were run for them.
+_noted: list[set[tuple[Callable, tuple] | python.CodeType]] = []
+
+
+def note(parts: Iterable[tuple[Callable, tuple] | python.CodeType]) -> None:
+    """Note what the function that is compiled now consists of."""
+    if _noted:
+        _noted[-1].update(parts)
+
+
+@contextmanager
+def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
+    """The set of what is noted meanwhile."""
+    _noted.append(set())
+    try:
+        yield _noted[-1]
+    finally:
+        _noted.pop()
 
 
 def noting(chooser: Callable) -> Callable:
@@ -132,34 +155,38 @@ class _Watch(event.Listener):
     """Notes which implementation each piece of compiled code is."""
 
     def on_start(self, event: Any) -> None:
-        """Nothing is known yet."""
+        """What is chosen while it is compiled is noted."""
+        _noted.append(set())
 
     def on_end(self, event: Any) -> None:
         """A function was compiled, or failed to."""
+        noted = _noted.pop()
         dispatcher, arguments = event.data["dispatcher"], tuple(event.data["args"])
         compiled = dispatcher.overloads.get(arguments)
         if compiled is None:
             return
         function = dispatcher.py_func
+        run = {part for part in noted if isinstance(part, python.CodeType)}
         try:
-            choices = frozenset(_own_choices(function, arguments))
+            choices = frozenset(_own_choices(function, arguments, noted - run))
         except Unknown:
             _unfit[compiled.library] = True
             return
-        code = function.__code__
+        if not _opaque(function):
+            run.add(function.__code__)
         # What was spelled out at compile time was spelled by a function that is followed itself.
-        known = _opaque(function) or code.co_filename in (SPELLED, *WHOLE)
-        _contents[compiled.library] = Contents(choices, frozenset(() if known else (code,)))
+        codes = frozenset(code for code in run if code.co_filename not in (SPELLED, *WHOLE))
+        _contents[compiled.library] = Contents(choices, codes)
 
 
 event.register("numba:compile", _Watch())
 
 
-def _own_choices(function: Callable, arguments: tuple) -> Iterable[Choice]:
+def _own_choices(function: Callable, arguments: tuple, noted: set) -> Iterable[Choice]:
     for dispatch in _serves.get(function, ()):
         classes = tuple(tag_class(a) for a in arguments[: dispatch.tags])
         yield Choice(name_of(dispatch), tuple(_class_name(c) for c in classes))
-    for dispatch, classes in _answers.get(function, ()):
+    for dispatch, classes in (*_answers.get(function, ()), *noted):
         yield Choice(name_of(dispatch), tuple(_class_name(c) for c in classes))
 
 

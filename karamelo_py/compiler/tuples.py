@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from numba import types
 
-from karamelo_py.compiler.compile import by_type, define, fma, lanes_of
+from karamelo_py.compiler.compile import by_type, define, fma, lanes_of, shared
 
 
 def spell(parameters: str, term: str, length: int) -> Callable:
@@ -19,81 +19,50 @@ def spell(parameters: str, term: str, length: int) -> Callable:
     return define(parameters, f"return ({items})", fma=fma)
 
 
+@shared
 def add(a, b):
     """a + b, component by component."""
     return tuple(x + y for x, y in zip(a, b, strict=True))
 
 
-@by_type(add)
-def _add(a, b):
-    return spell("a, b", "a[k] + b[k]", len(a))
-
-
+@shared
 def subtract(a, b):
     """a - b, component by component."""
     return tuple(x - y for x, y in zip(a, b, strict=True))
 
 
-@by_type(subtract)
-def _subtract(a, b):
-    return spell("a, b", "a[k] - b[k]", len(a))
-
-
+@shared
 def scale(factor, a):
     """factor * a."""
     return tuple(factor * x for x in a)
 
 
-@by_type(scale)
-def _scale(factor, a):
-    return spell("factor, a", "factor * a[k]", len(a))
-
-
+@shared
 def add_scaled(a, factor, b):
     """a + factor * b."""
     return tuple(fma(factor, y, x) for x, y in zip(a, b, strict=True))
 
 
-@by_type(add_scaled)
-def _add_scaled(a, factor, b):
-    return spell("a, factor, b", "fma(factor, b[k], a[k])", len(a))
-
-
+@shared
 def multiply_each(a, b):
     """a b, component by component."""
     return tuple(x * y for x, y in zip(a, b, strict=True))
 
 
-@by_type(multiply_each)
-def _multiply_each(a, b):
-    return spell("a, b", "a[k] * b[k]", len(a))
-
-
+@shared
 def put_at(array, i, first, values):
     """array[i, first + k] = values[k]."""
     for k, value in enumerate(values):
         array[i, first + k] = value
 
 
-@by_type(put_at)
-def _put_at(array, i, first, values):
-    lines = [f"array[i, first + {k}] = values[{k}]" for k in range(len(values))]
-    return define("array, i, first, values", *lines)
-
-
+@shared(unless=lambda array, i, first, like: lanes_of(i))
 def row(array, i, first, like):
     """(array[i, first], ..., array[i, first + len(like) - 1])."""
     return tuple(array[i, first + k] for k in range(len(like)))
 
 
-@by_type(row)
-def _row(array, i, first, like):
-    if lanes_of(i):
-        return None
-    items = "".join(f"array[i, first + {k}], " for k in range(len(like)))
-    return define("array, i, first, like", f"return ({items})")
-
-
+@shared
 def record(table, i):
     """A NamedTuple of arrays, seen at index `i`: the same NamedTuple of scalars.
 
@@ -102,26 +71,10 @@ def record(table, i):
     return type(table)(*(record(c, i) if isinstance(c, tuple) else c[i] for c in table))
 
 
-@by_type(record)
-def _record(table, i):
-    terms = [
-        f"record(table[{k}], i)" if isinstance(column, types.BaseNamedTuple) else f"table[{k}][i]"
-        for k, column in enumerate(table)
-    ]
-    made = f"return make({', '.join(terms)})"
-    return define("table, i", made, make=table.instance_class, record=record)
-
-
+@shared
 def add_optional(a, factor, b):
     """a + factor * b, where an empty `b` counts as zero."""
     return add_scaled(a, factor, b) if len(b) else a
-
-
-@by_type(add_optional)
-def _add_optional(a, factor, b):
-    if len(b) == 0:
-        return lambda a, factor, b: a
-    return lambda a, factor, b: add_scaled(a, factor, b)
 
 
 def clear_optional(array, i):
@@ -175,59 +128,31 @@ def _add_row(a, first, b):
     return define("a, first, b", f"return ({''.join(item + ', ' for item in items)})")
 
 
+@shared
 def leading(values, like):
     """The first len(like) of `values`."""
     return values[: len(like)]
 
 
-@by_type(leading)
-def _leading(values, like):
-    return define("values, like", f"return values[:{len(like)}]" if len(like) else "return ()")
-
-
+@shared
 def following(values, like):
     """What comes after the first len(like) of `values`, perhaps nothing."""
     return values[len(like) :]
 
 
-@by_type(following)
-def _following(values, like):
-    rest = range(len(like), len(values))
-    items = "".join(f"values[{k}], " for k in rest)
-    return define("values, like", f"return ({items})")
-
-
+@shared
 def plus(number, present):
     """number + present[0], or the number alone where `present` is empty."""
     return number + present[0] if len(present) else number
 
 
-@by_type(plus)
-def _plus(number, present):
-    if len(present) == 0:
-        return lambda number, present: number
-    return lambda number, present: number + present[0]
-
-
+@shared
 def increased(present, change):
     """(present[0] + change,), or nothing where `present` is empty."""
     return (present[0] + change,) if len(present) else ()
 
 
-@by_type(increased)
-def _increased(present, change):
-    if len(present) == 0:
-        return lambda present, change: ()
-    return lambda present, change: (present[0] + change,)
-
-
+@shared
 def either(first, second):
     """`first`, or `second` where `first` is empty."""
     return first if len(first) else second
-
-
-@by_type(either)
-def _either(first, second):
-    if len(first) == 0:
-        return lambda first, second: second
-    return lambda first, second: first

@@ -9,18 +9,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, NamedTuple
 
-from numba import types
-
-from karamelo_py.compiler.compile import (
-    by_type,
-    choose,
-    define,
-    fma,
-    in_all,
-    point_function,
-    real,
-    shared,
-)
+from karamelo_py.compiler.compile import choose, fma, in_all, point_function, real, shared
 from karamelo_py.compiler.fields import (
     field,
     increase,
@@ -332,33 +321,19 @@ def _(task, w, stencil, k, total):
     )
 
 
+@shared
 def zero_vector(kin, like):
     """The components of a vector, all 0."""
     return (real(0, like),) * kin.dimension
 
 
-@by_type(zero_vector)
-def _zero_vector(kin, like):
-    items = "zero, " * kin.instance_class.dimension
-    return define("kin, like", "zero = real(0, like)", f"return ({items})", real=real)
-
-
+@shared
 def update_at(kin, nodes, i, like):
-    """v* and v* - v of a node."""
+    """v* and v* - v of a node: one record in the plane, two in space."""
+    if kin.dimension == 2:
+        both = row(nodes.update, i, 0, like + like)
+        return both[:2], both[2:]
     return row(nodes.update, i, 0, like), row(nodes.update, i, of_change(kin), like)
-
-
-@by_type(update_at)
-def _update_at(kin, nodes, i, like):
-    d = kin.instance_class.dimension
-    if d != 2:  # one record in the plane, two in space
-        return update_at
-    return define(
-        "kin, nodes, i, like",
-        "both = row(nodes.update, i, 0, like + like)",
-        "return (both[0], both[1]), (both[2], both[3])",
-        row=row,
-    )
 
 
 @shared
@@ -369,16 +344,10 @@ def _gradient(w, stencil, k, total):
     return add_outer(w.kin, total, v, g)
 
 
+@shared
 def add_gradient(w, stencil, k, total):
     """`_gradient`, where it is gathered at all."""
     return _gradient(w, stencil, k, total) if len(total) else total
-
-
-@by_type(add_gradient)
-def _add_gradient(w, stencil, k, total):
-    if len(total) == 0:
-        return lambda w, stencil, k, total: total
-    return lambda w, stencil, k, total: _gradient(w, stencil, k, total)
 
 
 @gathered.on(Strain)
@@ -555,17 +524,11 @@ def _strain(w, x, p, dt, gradient, ratio, fastest):
     return grown, choose(fastest > rate, fastest, rate)
 
 
+@shared
 def store_deformation(array, kin, p, increment, f):
     """Store F after the increment, where there is an array for it."""
     if array is not None:
         store(array, p, deform(kin, increment, f))
-
-
-@by_type(store_deformation)
-def _store_deformation(array, kin, p, increment, f):
-    if isinstance(array, types.NoneType):
-        return lambda array, kin, p, increment, f: None
-    return lambda array, kin, p, increment, f: store(array, p, deform(kin, increment, f))
 
 
 empty_all = for_tags(empty, "w, x")

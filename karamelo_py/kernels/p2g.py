@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from numba import types
-
-from karamelo_py.compiler.compile import (
-    accumulate,
-    by_type,
-    of_present,
-    point_function,
-    real,
-    shared,
-)
+from karamelo_py.compiler.compile import accumulate, of_present, point_function, real, shared
 from karamelo_py.compiler.fields import field, load, load_vector, scalar, vector
 from karamelo_py.compiler.tuples import (
     add_optional,
@@ -168,40 +159,23 @@ def _own_mass(w, p):
     return of_present(p, w.points.mass[p])
 
 
+@shared
 def shared_mass(led, law, mass):
     """The mass that a point gives to the sums of all solids: of rigid points none, if `led`."""
-    return 0 * mass if led is not None and constrained_velocity.defined(type(law)) else mass
+    rigid = led is not None and constrained_velocity.defined(type(law))
+    return mass - mass if rigid else mass
 
 
-@by_type(shared_mass)
-def _shared_mass(led, law, mass):
-    if isinstance(led, types.NoneType) or not constrained_velocity.defined(law.instance_class):
-        return lambda led, law, mass: mass
-    return lambda led, law, mass: mass - mass
-
-
+@shared
 def loaded_for(nodal, kin, array, p):
     """The vector of a point, where there is a nodal array for it; else ()."""
     return () if nodal is None else load_vector(kin, array, p)
 
 
-@by_type(loaded_for)
-def _loaded_for(nodal, kin, array, p):
-    if isinstance(nodal, types.NoneType):
-        return lambda nodal, kin, array, p: ()
-    return lambda nodal, kin, array, p: load_vector(kin, array, p)
-
-
+@shared
 def led_mass(led, law, mass):
     """(mass,) of rigid points, which have sums of their own if `led`; () of others."""
     return (mass,) if led is not None and constrained_velocity.defined(type(law)) else ()
-
-
-@by_type(led_mass)
-def _led_mass(led, law, mass):
-    if isinstance(led, types.NoneType) or not constrained_velocity.defined(law.instance_class):
-        return lambda led, law, mass: ()
-    return lambda led, law, mass: (mass,)
 
 
 @shared
@@ -354,35 +328,19 @@ def _(quantity, w, stencil, k, load):
     accumulate(field(w.nodes.fields, Series), i, len(u), scale(weight * mass, u))
 
 
+@shared
 def accumulate_led(array, i, weight, led, v):
     """Give a node the mass and momentum of a rigid point."""
     if len(led):
-        accumulate(array, i, MASS, scale(weight * led[0], (1.0, *v)))
-
-
-@by_type(accumulate_led)
-def _accumulate_led(array, i, weight, led, v):
-    if len(led) == 0:
-        return lambda array, i, weight, led, v: None
-
-    def give(array, i, weight, led, v):
         part = weight * led[0]
-        accumulate(array, i, MASS, (part,) + scale(part, v))
-
-    return give
+        accumulate(array, i, MASS, (part, *scale(part, v)))
 
 
+@shared
 def accumulate_optional(array, i, values):
     """Add to a node, where there is an array for it."""
     if array is not None:
         accumulate(array, i, 0, values)
-
-
-@by_type(accumulate_optional)
-def _accumulate_optional(array, i, values):
-    if isinstance(array, types.NoneType):
-        return lambda array, i, values: None
-    return lambda array, i, values: accumulate(array, i, 0, values)
 
 
 load_all = for_tags(load_of, "w, p, like")

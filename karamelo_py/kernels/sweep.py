@@ -22,9 +22,9 @@ from karamelo_py.compiler.compile import (
     in_all,
     index,
     largest,
+    looping,
     point_function,
     real,
-    shared,
     subkernel,
 )
 from karamelo_py.compiler.fields import load_vector
@@ -188,14 +188,14 @@ def _(width, like):
     return spread(width, like - like)
 
 
-@shared
+@looping
 def _gather(tasks, w, stencil, totals):
     for k in range(support(w.basis, w.kin)):
         totals = gathered_all(tasks, w, stencil, k, totals)
     return totals
 
 
-@shared
+@looping
 def _scatter(quantities, w, stencil, loads):
     for k in range(support(w.basis, w.kin)):
         scattered_all(quantities, w, stencil, k, loads)

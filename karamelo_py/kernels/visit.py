@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import by_type, define, index, point_function, real, shared
+from karamelo_py.compiler.compile import index, point_function, real, shared
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.points.basis import blank, locate
@@ -53,16 +53,10 @@ def state_of(w, law, p, like):
     return load(w.points.state, p, initial_state(law, w.kin, like))
 
 
+@shared
 def stored_or_own(f, law, kin, state):
     """The deformation gradient `f` that was stored, or that of the law's state."""
     return f if len(f) else deformation(law, kin, state)
-
-
-@by_type(stored_or_own)
-def _stored_or_own(f, law, kin, state):
-    if len(f):
-        return lambda f, law, kin, state: f
-    return lambda f, law, kin, state: deformation(law, kin, state)
 
 
 @point_function()
@@ -107,10 +101,7 @@ def for_tags(function: Callable, names: str, each: str | None = None) -> Callabl
 
     parameters = names.split(", ")
 
-    def item(k: int) -> str:
-        arguments = (f"{name}[{k}]" if name == each else name for name in parameters)
-        return f"function(tags[{k}], {', '.join(arguments)}), "
-
+    @shared
     def loop(tags, *arguments):
         given = dict(zip(parameters, arguments, strict=True))
         return tuple(
@@ -118,11 +109,6 @@ def for_tags(function: Callable, names: str, each: str | None = None) -> Callabl
             for k, tag in enumerate(tags)
         )
 
-    def written_out(tags, *arguments):
-        items = "".join(item(k) for k in range(len(tags)))
-        return define(f"tags, {names}", f"return ({items})", function=function)
-
-    by_type(loop)(written_out)
     return loop
 
 
@@ -132,6 +118,7 @@ def in_turn(function: Callable) -> Callable:
     Distances add up, and the rate goes from one to the next (see `g2p.settled`).
     """
 
+    @shared
     def loop(tags, w, stencil, p, dt, totals, fastest):
         moved = real(0, fastest)
         for k, tag in enumerate(tags):
@@ -139,17 +126,4 @@ def in_turn(function: Callable) -> Callable:
             moved += further
         return moved, fastest
 
-    def written_out(tags, w, stencil, p, dt, totals, fastest):
-        lines = ["moved = real(0, fastest)"]
-        for k in range(len(tags)):
-            lines.append(
-                f"further{k}, fastest{k + 1} = function("
-                f"tags[{k}], w, stencil, p, dt, totals[{k}], totals, fastest{k or ''})"
-            )
-            lines.append(f"moved += further{k}")
-        lines.append(f"return moved, fastest{len(tags) or ''}")
-        names = "tags, w, stencil, p, dt, totals, fastest"
-        return define(names, *lines, function=function, real=real)
-
-    by_type(loop)(written_out)
     return loop

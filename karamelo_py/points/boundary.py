@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import by_type, define, point_function, real, shared
+from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import vector
 from karamelo_py.compiler.tuples import multiply_each
 from karamelo_py.points.grid import Grid, in_cells, pick
@@ -75,17 +75,11 @@ def mirror(grid, direction, y):
 def in_every_direction(function: Callable) -> Callable:
     """Make ``f(grid, y, ...)``, the tuple of function(grid, k, y[k], ...) over the directions k."""
 
+    @shared
     def of_all(grid, *vectors):
         count = len(vectors[0])
         return tuple(function(grid, k, *(vector[k] for vector in vectors)) for k in range(count))
 
-    def written_out(grid, *vectors):
-        names = [f"a{m}" for m in range(len(vectors))]
-        items = (", ".join(f"{name}[{k}]" for name in names) for k in range(len(vectors[0])))
-        calls = "".join(f"function(grid, {k}, {item}), " for k, item in enumerate(items))
-        return define(f"grid, {', '.join(names)}", f"return ({calls})", function=function)
-
-    by_type(of_all)(written_out)
     return of_all
 
 
@@ -94,14 +88,8 @@ hits = in_every_direction(hit)
 turns = in_every_direction(turn)
 
 
+@shared
 def turned(signs, moment):
     """R L R of a square tensor L (or none), R = diag(signs): velocities and places turn round."""
     d = len(signs)
     return tuple(signs[n // d] * m * signs[n % d] for n, m in enumerate(moment))
-
-
-@by_type(turned)
-def _turned(signs, moment):
-    d = len(signs)
-    items = "".join(f"signs[{n // d}] * moment[{n}] * signs[{n % d}], " for n in range(len(moment)))
-    return define("signs, moment", f"return ({items})")

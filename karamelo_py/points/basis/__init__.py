@@ -38,7 +38,7 @@ shape
     :class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
-from karamelo_py.compiler.compile import by_type, define, point_function, real, tag_class
+from karamelo_py.compiler.compile import point_function, real, shared
 
 
 @point_function(tags=2)
@@ -101,16 +101,10 @@ def shape_size(basis: type, d: int) -> int:
     return sum(sizes[part] for part in shape)
 
 
+@shared
 def blank(basis, kin, x):
     """A place at position `x` with a shape of zeros."""
     return (*x, *((x[0] - x[0],) * shape_size(type(basis), len(x))))
-
-
-@by_type(blank)
-def _blank(basis, kin, x):
-    own = "".join(f"x[{k}], " for k in range(len(x)))
-    zeros = "zero, " * shape_size(tag_class(basis), len(x))
-    return define("basis, kin, x", "zero = x[0] - x[0]", f"return ({own}{zeros})")
 
 
 @point_function()
