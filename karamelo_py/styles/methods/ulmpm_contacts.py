@@ -55,7 +55,9 @@ class ULMPMContacts(Method):
     16 cells that collide lose 15, 11 and 4 % of the kinetic energy.
 
     A base that does not move is best a rigid solid. Where fix velocity_nodes holds nodes of its
-    region instead, nodes beyond it that its points see with splines give way.
+    region instead, nodes beyond it that its points see with splines give way, which is told before
+    the run. With splines a base should be three cells thick: the surface of a thinner one seems
+    higher by a quarter of a cell or less.
 
     The normal at a node is one for both solids, so that they get opposite impulses and momentum is
     kept: from the sums of m grad N of the two, that of the solid with a prescribed velocity, else
