@@ -49,7 +49,9 @@ class ULMPMContacts(Method):
     Where a surface is follows from the mean place of the points that a node sees, as of layers of
     points whose outermost is half their size below a plane surface (Nairn 2013, "Modeling imperfect
     interfaces in the material point method using multimaterial methods"). It is exact for plane
-    surfaces along the grid; a disk cut out of a square grid of points has an uneven rim. With
+    surfaces along the grid. A disk cut out of a square grid of points has a rim with steps, and is
+    met up to half a step early or late: force and stress of a pressed disk are of first order
+    (in.hertz), and finer points help as much as finer cells. With
     Bernstein-quadratic functions no gap is known: contact is felt as soon as two solids have mass
     at one node. A node at a surface loses what it has of the motion of approach: bars of 4, 8 and
     16 cells that collide lose 15, 11 and 4 % of the kinetic energy.
