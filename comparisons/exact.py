@@ -12,7 +12,7 @@ by numerical differentiation, and holds the rest against independent numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan, cos, exp, pi, sin, sqrt, tan
+from math import atan, cos, exp, log, pi, sin, sqrt, tan
 from pathlib import Path
 
 import numpy as np
@@ -287,6 +287,21 @@ def hertz_stress(x: np.ndarray, depth: np.ndarray, force: float, half: float) ->
     m = np.sqrt((root + a) / 2)
     n = np.sqrt(np.maximum(root - a, 0) / 2)
     return -2 * force / (pi * half**2) * m * (1 - (z**2 + n**2) / (m**2 + n**2))
+
+
+def hertz_load(approach: float, R: float, modulus: float) -> float:
+    """Force per length that brings a plane nearer to the axis of a cylinder by `approach`.
+
+    approach = 2 P / (pi E*) (ln(4 R / a) - 1/2) with half the width a = sqrt(4 P R / (pi E*)) of
+    the contact, of a cylinder between two planes (Johnson 1985, Contact Mechanics, section 5.6).
+    """
+    low, high = 0.0, modulus * R
+    for _ in range(100):
+        P = (low + high) / 2
+        a = sqrt(4 * P * R / (pi * modulus))
+        below = 2 * P / (pi * modulus) * (log(4 * R / a) - 0.5) < approach
+        low, high = (P, high) if below else (low, P)
+    return low
 
 
 def granular_runout(aspect: float) -> float:

@@ -1,39 +1,60 @@
-"""Elastic disk on a rigid plane: stress below the contact against Hertz."""
+"""Elastic disk on a rigid plane: force and stress below the contact against Hertz."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from comparisons.exact import hertz_stress
+from comparisons.exact import hertz_load, hertz_stress
 from comparisons.row import Row
 
-SMALL = None
-R, SURFACE, MODULUS = 1.0, 0.27, 1e6 / (1 - 0.3**2)
+SMALL = {}
+R, APPROACH, SURFACE, MODULUS = 1.0, 0.02, 0.27, 1e6 / (1 - 0.3**2)
+LOAD = hertz_load(APPROACH, R, MODULUS)
+HALF = np.sqrt(4 * LOAD * R / (np.pi * MODULUS))  # width of the contact
+LARGEST = 2 * LOAD / (np.pi * HALF)
+HERTZ = "Hertz 1882; Johnson 1985 (exact)"
+
+
+def error(last):
+    """Of the stress between 0.3 and 1.5 half widths deep, rms over the largest pressure."""
+    depth = last.y - SURFACE
+    near = (last.y0 > 0.25) & (last.x < 1.5 * HALF)
+    near &= (depth > 0.3 * HALF) & (depth < 1.5 * HALF)
+    off = last.s22[near] - hertz_stress(last.x[near], depth[near], LOAD, HALF)
+    return np.sqrt((off**2).mean()) / LARGEST
 
 
 def compare(run, axes, full):
-    """Mean stress of layers below the contact; in full on finer grids, too: the order is shown."""
-    # The first layers of points are those of a disk cut out of squares.
-    for refine, within in ((1, 0.2), (2, 0.1)):
-        result = run(refine=refine)
-        last = result.snapshots("hertz")[-1]
-        force = result.log.force[result.log.Time > 0.45].mean()
-        half = np.sqrt(4 * force * R / (np.pi * MODULUS))
-        disk = (last.y0 > 0.25) & (last.x < 0.7 * half)
-        for lower, upper in ((0, 0.5), (0.5, 1)):
-            depth = last.y - SURFACE
-            found = (
-                disk & (depth >= lower * half - (1 if lower == 0 else 0)) & (depth < upper * half)
+    """Force and stress on finer and finer grids, and with finer points on one of them.
+
+    The disk is cut out of squares of points: its rim has steps of 1 / ppc of a cell, whatever the
+    functions, so that the plane is met up to half a step too early or late, a quarter on average.
+    """
+    cases = [("linear", 2, (16, 32))]
+    if full:
+        cases = [("linear", 2, (16, 32, 64)), ("quadratic-spline", 2, (16, 32, 64, 128))]
+        cases.append(("linear", 4, (32,)))
+    for basis, ppc, sizes in cases:
+        errors = []
+        for cells in sizes:
+            result = run(refine=cells / 32, basis=basis, ppc=ppc)
+            last = result.snapshots("hertz")[-1]
+            force = result.log.force[result.log.Time > 0.45].mean()
+            errors.append(error(last))
+            of = f"{basis}, {ppc} x {ppc} points, {cells} cells"
+            early = R / cells / ppc / 4 / APPROACH
+            yield Row(f"force, {of} (kN/m)", LOAD / 1000, force / 1000, early, HERTZ)
+            # Of first order.
+            yield Row(
+                f"stress, rms error over the largest, {of}", 0.0, errors[-1], 6 / cells, HERTZ
             )
-            exact = hertz_stress(last.x[found], depth[found], force, half)
-            ratio = last.s22[found].mean() / exact.mean()
-            name = f"stress to Hertz's, {lower:g} to {upper:g} of the half width deep"
-            yield Row(f"{name}, {32 * refine:g} cells", 1.0, ratio, within, "Hertz 1882 (exact)")
-        near = (last.y0 > 0.25) & (last.x < 1.5 * half) & (last.y - SURFACE < 0.3 * half)
-        largest = 2 * force / (np.pi * half)
-        axes.plot(
-            last.x[near] / half, -last.s22[near] / largest, ".", ms=2, label=f"{32 * refine:g}"
-        )
+        label = f"{basis}, {ppc} x {ppc}, {cells}"
+        near = (last.y0 > 0.25) & (last.x < 1.5 * HALF) & (last.y - SURFACE < 0.3 * HALF)
+        axes.plot(last.x[near] / HALF, -last.s22[near] / LARGEST, ".", ms=2, label=label)
+        if len(sizes) > 1:
+            slope = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+            of = f"{basis}, {sizes[0]} to {sizes[-1]} cells"
+            yield Row(f"order of that error, {of}", 1.0, slope, 0.3, "steps of the rim")
     x = np.linspace(0, 1, 100)
     axes.plot(x, np.sqrt(1 - x**2), "k--", lw=0.8, label="Hertz, at the surface")
     axes.set(xlabel="x / half width", ylabel="stress / largest pressure")

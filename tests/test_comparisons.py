@@ -27,7 +27,7 @@ def found(run_script, name: str, full: bool) -> list[Row]:
 # Scenes that share compiled loops with each other or with other tests.
 SHARED = {
     "two_disks": "disks", "axis_aligned": "neo-hookean", "vibrating_bar": "bar",
-    "incline": "contact", "collapse": "soil", "slump": "soil",
+    "incline": "contact", "hertz": "contact", "collapse": "soil", "slump": "soil",
     "dam_break": "water", "dam_ritter": "water",
 }  # fmt: skip
 SMALL = [

@@ -256,6 +256,47 @@ def test_one_thread_or_two(tmp_path, monkeypatch):
     assert same_bits(final_state(path, 1), final_state(path, 2))
 
 
+def glide(gap: float, v: float, steps: int, basis: str = "linear") -> str:
+    """A block, `gap` above a rigid base, that moves along it and comes down with speed `v`."""
+    return f"""
+        method(ulmpm/contacts, FLIP, {basis}, 1)
+        dimension(2, 0, 1.2, 0, 0.7, {H})
+        region(b, block, 0, 1.2, 0, 0.2)
+        region(t, block, 0.3, 0.6, {0.2 + gap}, {0.4 + gap})
+        material(soft, neo-hookean, 1, 100, 0.3)
+        material(rock, rigid, 1)
+        solid(base, region, b, 2, rock, {H}, 0)
+        solid(top, region, t, 2, soft, {H}, 0)
+        group(top, particles, region, t, solid, top)
+        fix(start, initial_velocity_particles, top, 1, {-v})
+        fix(rub, contact/friction, top, base, 0.5)
+        compute(v, average_velocity, top)
+        log_modify(custom, step, v_x, rub_x, rub_y)
+        set_dt(4e-3)
+        run({steps})
+    """
+
+
+def test_no_friction_across_a_gap(run_interpreted):
+    """Half a cell above the base both have mass at its nodes; the block slides on freely."""
+    log = run_interpreted(glide(H / 2, 0, 30)).log
+    assert log.v_x == pytest.approx(np.ones(31), rel=1e-12)
+    assert (log.rub_x == 0).all()
+
+
+# Half a cell is closed in 31.25 steps; with splines two cells seem a quarter of a cell thicker.
+@pytest.mark.parametrize(("basis", "apart"), [("linear", 31), ("quadratic-spline", 15)])
+def test_friction_is_a_share_of_the_push(run_interpreted, basis, apart):
+    """Coulomb while it slides: in the step in which the gap closes, too, where a part of the
+    approach is still free. The rigid base decides the normal, at the edges of the block, too.
+    """
+    log = run_interpreted(glide(H / 2, 0.4, 36, basis)).log
+    assert (log.rub_y[: apart + 1] == 0).all() and (log.rub_x[: apart + 1] == 0).all()
+    assert (log.rub_y[32:] > 0).all()
+    assert log.v_x[-1] < 0.99
+    assert log.rub_x == pytest.approx(-0.5 * log.rub_y, rel=1e-9)
+
+
 TWICE = "fix(f, contact/friction, a, b, 0.1)\nfix(g, contact/friction, {}, {}, 0.2)"
 
 MESSAGES = {

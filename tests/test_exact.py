@@ -99,6 +99,24 @@ def test_incline():
     assert exact.incline_acceleration(radians(30), 0, g) == pytest.approx(5)
 
 
+def test_load_of_a_pressed_cylinder():
+    """The strain along the axis between contact and centre adds up to the approach.
+
+    Stresses of a disk under two opposite loads, spread as by Hertz (Johnson 1985, section 5.6).
+    """
+    E, nu, approach = 1.0, 0.3, 0.02
+    modulus = E / (1 - nu**2)
+    P = exact.hertz_load(approach, 1.0, modulus)
+    a = np.sqrt(4 * P / (np.pi * modulus))
+    z = np.linspace(0, 1, 100001)
+    root = np.sqrt(a**2 + z**2)
+    along = P / np.pi * (1 - 2 / (2 - z) - 2 / root)
+    across = P / np.pi * (1 - 2 * (a**2 + 2 * z**2) / (a**2 * root) + 4 * z / a**2)
+    strain = (along - nu / (1 - nu) * across) / modulus
+    # The formula leaves out (a / R)^2.
+    assert -np.trapezoid(strain, z) == pytest.approx(approach, rel=a**2)
+
+
 def test_two_disks_touch_when_published():
     """1.5858 s (Sinaie et al. 2017)."""
     time = exact.contact_time(0.6 * 2**0.5, 0.4, 0.2 * 2**0.5)

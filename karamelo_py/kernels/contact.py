@@ -134,11 +134,29 @@ def _outward(nodes, pair, k):
 
 
 @subkernel
-def _slide(contact, nodes, pair, k, push):
+def _left(contact, nodes, pair, k, push):
     """Component of the relative velocity once the impulse `push` m grad N has been given."""
     along = push * _outward(nodes, pair, k)
     relative = nodes.update[pair.n, k] - nodes.update[pair.m, k]
     return relative - along * _yielding(contact, pair, k)
+
+
+@subkernel
+def _approach_left(contact, d, nodes, pair, push, size):
+    """What is left of the approach by which a gap closes, over the length of m grad N.
+
+    Friction does not act on it: bodies that are still apart come together freely.
+    """
+    across = 0.0
+    for k in range(d):
+        across += _outward(nodes, pair, k) * _left(contact, nodes, pair, k, push)
+    return across / (size * size)
+
+
+@subkernel
+def _slide(contact, nodes, pair, k, push, across):
+    """Component of the relative velocity along the surface, once `push` has been given."""
+    return _left(contact, nodes, pair, k, push) - across * _outward(nodes, pair, k)
 
 
 @subkernel
@@ -292,12 +310,12 @@ def _compliance(contact, d, nodes, pair, size):
 
 
 @subkernel
-def _rub(contact, d, nodes, pair, friction, push, size, share):
+def _rub(contact, d, nodes, pair, friction, push, size, across, share):
     """Impulse along the surface over the speed of sliding, and whether it stops all sliding."""
     compliance = 0.0
     slip = 0.0
     for k in range(d):
-        slide = _slide(contact, nodes, pair, k, push / size)
+        slide = _slide(contact, nodes, pair, k, push / size, across)
         slip += slide * slide
         compliance += slide * slide * _yielding(contact, pair, k)
     if not compliance > 0:
@@ -320,16 +338,18 @@ def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     if not compliance > 0:
         return  # the fixes move both
     push = share * excess / compliance
-    rub, sticks = 0.0, False
-    if contact.friction[a, b] > 0:
-        rub, sticks = _rub(contact, d, nodes, pair, contact.friction[a, b], push, size, share)
+    rub, sticks, across = 0.0, False, 0.0
+    friction = contact.friction[a, b]
+    if friction > 0:
+        across = _approach_left(contact, d, nodes, pair, push / size, size)
+        rub, sticks = _rub(contact, d, nodes, pair, friction, push, size, across, share)
     values, kick = control.values, control.clock[0].kick
     step = int(values[TIMESTEP]) + 1
     contact.touched[pair.n, b] = -step if sticks else step
     for k in range(d):
         impulse = push * _outward(nodes, pair, k) / size
         if rub > 0:
-            impulse += rub * _slide(contact, nodes, pair, k, push / size)
+            impulse += rub * _slide(contact, nodes, pair, k, push / size, across)
         _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a, where.x)
         _take(contact, control, b, j, pair.m, k, impulse, pair.per_b, where.x)
         if contact.pair[a, b] >= 0:

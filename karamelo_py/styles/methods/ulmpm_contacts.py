@@ -49,13 +49,17 @@ class ULMPMContacts(Method):
     Where a surface is follows from the mean place of the points that a node sees, as of layers of
     points whose outermost is half their size below a plane surface (Nairn 2013, "Modeling imperfect
     interfaces in the material point method using multimaterial methods"). It is exact for plane
-    surfaces along the grid; a disk cut out of a square grid of points has an uneven rim. With
+    surfaces along the grid. A disk cut out of a square grid of points has a rim with steps, and is
+    met up to half a step early or late: force and stress of a pressed disk are of first order
+    (in.hertz), and finer points help as much as finer cells. With
     Bernstein-quadratic functions no gap is known: contact is felt as soon as two solids have mass
     at one node. A node at a surface loses what it has of the motion of approach: bars of 4, 8 and
     16 cells that collide lose 15, 11 and 4 % of the kinetic energy.
 
     A base that does not move is best a rigid solid. Where fix velocity_nodes holds nodes of its
-    region instead, nodes beyond it that its points see with splines give way.
+    region instead, nodes beyond it that its points see with splines give way, which is told before
+    the run. With splines a base should be three cells thick: the surface of a thinner one seems
+    higher by a quarter of a cell or less.
 
     The normal at a node is one for both solids, so that they get opposite impulses and momentum is
     kept: from the sums of m grad N of the two, that of the solid with a prescribed velocity, else
