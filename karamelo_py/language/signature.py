@@ -39,6 +39,7 @@ from karamelo_py.language.kinds import (
     kind_of,
 )
 from karamelo_py.script.errors import Place, ScriptError, meant
+from karamelo_py.script.other_programs import SHORTER
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
@@ -215,6 +216,9 @@ def _bind(
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
         gap = next((argument for argument in given if _GAP.search(argument.text)), None)
+        hint = SHORTER.get(name) if len(given) < needed else None
+        if gap:
+            hint = f"is a comma missing in '{gap.text}'?"
         missing = [p.shown for p in slots[len(given) : needed]] or [f"{m}=..." for m in missing]
         raise ScriptError(
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
@@ -224,7 +228,7 @@ def _bind(
             else f"{len(given) - len(slots)} arguments too many",
             place=gap.place if gap else surplus.place if surplus else None,
             expected=syntax(target, name),
-            hint=f"is a comma missing in '{gap.text}'?" if gap else None,
+            hint=hint,
         )
     for k, argument in enumerate(given):
         parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic
