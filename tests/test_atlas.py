@@ -87,7 +87,7 @@ def test_an_entry_that_fails_stops_no_other(folder, capsys):
 
 def test_runs_that_end_early_are_named(folder, capsys):
     """0/0 is refused; where that is what the entry shows, it may be."""
-    text = ATLAS.partition("[[entry]]\nname = \"broken\"")[0].replace("law=1,2", "law=1,0/0")
+    text = ATLAS.partition('[[entry]]\nname = "broken"')[0].replace("law=1,2", "law=1,0/0")
     (folder / "a.toml").write_text(text, encoding="utf-8")
     words = ["atlas", "a.toml", "-small"]
     for state in ("done", "known"):

@@ -119,12 +119,12 @@ INSTEAD = {
 
 # What stands for the arguments that earlier forms of Karamelo's laws did not have.
 SHORTER = {
-    "eos shock": "without heat and viscosity eos(ID, shock, rho0, K, c0, S, 0, 0, 0, 0, 0); 0, 0 at "
-    "the end is no viscosity",
-    "strength johnson_cook": "strength(ID, johnson_cook, G, A, B, n, epsdot0, C, 0, 0, 1): 0, 0, 1 "
-    "at the end is no softening by heat",
-    "damage damage_johnson_cook": "damage(ID, damage_johnson_cook, d1, d2, d3, d4, 0, epsdot0, 0, "
-    "1) does not depend on temperature",
+    "eos shock": "without heat and viscosity: eos(ID, shock, rho0, K, c0, S, 0, 0, 0, 0, 0); "
+    "0, 0 at the end is no viscosity",
+    "strength johnson_cook": "without softening by heat: "
+    "strength(ID, johnson_cook, G, A, B, n, epsdot0, C, 0, 0, 1)",
+    "damage damage_johnson_cook": "without a temperature: "
+    "damage(ID, damage_johnson_cook, d1, d2, d3, d4, 0, epsdot0, 0, 1)",
 }
 
 
