@@ -16,6 +16,7 @@ NULL = "NULL"
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _NAME = re.compile(r"[^\W\d]\w*")
 _QUOTED = re.compile(r'"([^"]*)"')
+_GAP = re.compile(r'[\w)"]\s+["\w.]')  # two words with nothing but blanks between them
 _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
@@ -178,6 +179,11 @@ class _Seeds:
     def hides(self, name: str) -> bool:
         """Whether the script uses the name of a function for something else."""
         return self.outer.hides(name)
+
+
+def with_gap(arguments: Sequence[Argument]) -> Argument | None:
+    """The first argument that may be two, with a comma forgotten between them."""
+    return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 
 def look_up(catalogue: Any, argument: Argument):

@@ -23,7 +23,7 @@ from functools import cache
 from typing import Any, Literal, get_type_hints
 
 from karamelo_py.language import docstrings, registry
-from karamelo_py.language.arguments import NULL, Argument
+from karamelo_py.language.arguments import NULL, Argument, with_gap
 from karamelo_py.language.faults import told
 from karamelo_py.language.kinds import (
     AtLeast,
@@ -44,9 +44,6 @@ from karamelo_py.script.other_programs import SHORTER
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
 ]  # fmt: skip
-
-# Two words with nothing but blanks between them.
-_GAP = re.compile(r'[\w)"]\s+["\w.]')
 
 
 @dataclass(frozen=True)
@@ -215,7 +212,7 @@ def _bind(
     missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
-        gap = next((argument for argument in given if _GAP.search(argument.text)), None)
+        gap = with_gap(given)
         hint = SHORTER.get(name) if len(given) < needed else None
         if gap:
             hint = f"is a comma missing in '{gap.text}'?"

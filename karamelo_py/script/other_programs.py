@@ -56,6 +56,11 @@ INSTEAD = {
         "neigh_modify": f"{_NEEDLESS}: points interact by the grid",
         "newton": _NEEDLESS,
         "processors": "karamelo-py SCRIPT --threads N",
+        "units": "units(m, kg, s) names the units of all numbers; or leave it out",
+        "write_data": "write_restart(file), or dump(ID, all, particle, every, file, ...)",
+        "write_dump": "dump(ID, all, particle, every, file, ...) writes the last state, too",
+        "minimize": "fix(ID, local_damping, all, 0.8) and run_while(Ek > ...)",
+        "reset_timestep": f"{_NEEDLESS}: steps are counted through all runs",
     },
     "fix": {
         "body_force_current_config": "the style body_force",
