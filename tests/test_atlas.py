@@ -85,6 +85,22 @@ def test_an_entry_that_fails_stops_no_other(folder, capsys):
     assert "laws/power done" in out and "broken failed" in out and "failed: broken" in out
 
 
+def test_runs_that_end_early_are_named(folder, capsys):
+    """0/0 is refused; where that is what the entry shows, it may be."""
+    text = ATLAS.partition('[[entry]]\nname = "broken"')[0].replace("law=1,2", "law=1,0/0")
+    (folder / "a.toml").write_text(text, encoding="utf-8")
+    words = ["atlas", "a.toml", "-small"]
+    for state in ("done", "known"):
+        assert main(words) == 1
+        out = capsys.readouterr().out
+        assert f"laws/power {state}, 1 of 2 runs ended early" in out
+        assert "failed: laws/power (N=2,law=0_0" in out
+    text = text.replace("interpreted", "ends_early = true\ninterpreted")
+    (folder / "a.toml").write_text(text, encoding="utf-8")
+    assert main(words) == 0
+    assert "1 of 2 runs ended early" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -66,6 +66,24 @@ def test_a_point_that_leaves_the_domain(run_interpreted):
     assert "step 63," in message
 
 
+def test_the_last_good_state_is_written_once(run_interpreted, tmp_path):
+    """Not to the files of restart(...) as well; not over a file of somebody else; or not at all."""
+    lines = ("fix(v, initial_velocity_particles, all, 10, 0)", "set_dt(0.001)")
+    script = block(2, *lines, *OUTPUT, "restart(40, r.*.h5)", "run(200)")
+    result = run_interpreted(script, folder="a", status=1)
+    assert "last_good.62.h5; karamelo-py SCRIPT -restart" in result.err
+    assert {path.name for path in result.folder.glob("*.h5")} == {"last_good.62.h5", "r.40.h5"}
+    (result.folder / "last_good.62.h5").write_text("mine")
+    again = run_interpreted(script, folder="a", status=1)
+    assert "leaves the domain" in again.err and "last_good." not in again.err
+    assert (again.folder / "last_good.62.h5").read_text() == "mine"
+    assert (again.folder / "r.62.h5").exists()
+    # A folder in the place of a file to write: that is told, and what went wrong as well.
+    (tmp_path / "b" / "last_good.62.h5.part").mkdir(parents=True)
+    third = run_interpreted(script, folder="b", status=1)
+    assert "warning: cannot write" in third.err and "error: run: step 63" in third.err
+
+
 @pytest.mark.parametrize("law", ["linear", "neo-hookean"])
 def test_a_point_turned_inside_out(run_interpreted, law):
     """Nodes that move with v = -100 (x - c) turn I into I (1 - 2) in a step of 0.02."""

@@ -208,6 +208,20 @@ def test_errors_carry_message_and_place(tmp_path, capsys):
         sim.command("dt_factor(0.5)\nset_dt(0.1)")
 
 
+def test_a_text_of_one_line(tmp_path, monkeypatch):
+    """A file of that name comes first; what is neither a file nor a statement is told so."""
+    monkeypatch.chdir(tmp_path)
+    assert Simulation("a = 2*3").variables == {"a": 6}
+    assert Simulation("dimension(1, 0, 1, 0.1)" + " " * 5000).command("2") is None
+    (tmp_path / "in (1)").write_text("a = 7")
+    assert Simulation("in (1)").variables == {"a": 7}
+    expected = "there is no file in.two_diks\nexpected: the name of a script, or its text"
+    with pytest.raises(SimulationError, match=expected):
+        Simulation("in.two_diks")
+    with pytest.raises(SimulationError, match=r"'dimensio'"):
+        Simulation("dimensio(1, 0, 1, 0.1)")
+
+
 def test_two_in_one_folder(tmp_path):
     """They are told; when the first is closed, or gone, the second may."""
     first = Simulation(out=tmp_path / "files")

@@ -81,3 +81,26 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
     broken = err.index("broken.in:1:")
     last = err.index("in.script:4: the script above is included here")
     assert inner < outer < main < then < broken < last
+
+
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("fix 1 all nve", "leave it out: points move without a fix"),
+        ("fix 1 all body_force 0 -9.81", "fix(1, body_force, all, 0, -9.81)"),
+        ("compute Ek all ke", "compute(Ek, kinetic_energy, all)"),
+        ("units lj", "units(m, kg, s)"),
+        ("write_data end.dat", "write_restart(file)"),
+        ("region(b, block, 0 1, 0, 1)", "is a comma missing in '0 1'?"),
+        ("eos(e, shock, 1, 1, 1, 0, 1, 0)", "eos(ID, shock, rho0, K, c0, S, 0, 0, 0, 0, 0)"),
+        ("strength(s, johnson_cook, 1, 1, 1, 1, 0, 0)", "n, epsdot0, C, 0, 0, 1)"),
+        ("damage(d, damage_johnson_cook, 1, 1, 1, 0, 1)", "d3, d4, 0, epsdot0, 0, 1)"),
+        ("fix(f, indent/pinball, all)", "indent/minimize_penetration"),
+    ],
+)
+def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):
+    """In one step: of LAMMPS, and of Karamelo's older forms."""
+    err = run_interpreted(f"dimension(2, 0, 1, 0, 1, 0.1)\n{line}\n", status=1).err
+    (told,) = places(err)
+    assert told[0] == 2
+    assert hint in err.partition("hint: ")[2]

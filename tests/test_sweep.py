@@ -1,5 +1,6 @@
 """Sweeps: every combination, run and put into one table, whatever becomes of single runs."""
 
+import io
 import json
 import os
 import signal
@@ -203,6 +204,31 @@ def test_the_time_that_remains_grows_as_the_runs_do():
     times = [float(c["N"]) ** 3 / 64 * (2 if c["basis"] == "slow" else 1) for c in cases]
     guess = study.growth(cases, times)
     assert guess({"N": "64", "basis": "slow"}) == pytest.approx(64**3 / 32, rel=0.33)
+
+
+def test_variables_that_are_0_in_some_runs_have_a_time_as_well():
+    """0 has no logarithm, and counts as a word; 2 takes eight times as long as 1."""
+    cases = [{"cure": c, "n": n} for c in ("0", "1") for n in ("1", "2")]
+    guess = study.growth(cases, [1.0, 8.0, 1.0, 8.0])
+    assert guess({"cure": "0", "n": "2"}) > 3 * guess({"cure": "1", "n": "1"})
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_a_narrow_table_cuts_no_value_off(width):
+    from rich.console import Console
+
+    names, values = ("factor", "transfer"), ("0.12345", "mechanical")
+    at = dict(zip(names, values, strict=True))
+    facts = {"seconds": 12.25, "points": 123456, "steps": 987654, "max:growth": 1.5e10}
+    end = {"status": "failed", "reason": "turned inside out " * 3}
+    console = Console(width=width, record=True, file=io.StringIO())
+    items = [records.Recorded("max:growth")]
+    row = {**at, **facts, **end}
+    console.print(study.results_table([row], names, items, "in.long", width, [(at, "running")]))
+    text = console.export_text()
+    for word in (*names, *values, "max:growth", "1.500e+10", "failed:", "inside", "running"):
+        assert word in text, (word, text)
+    assert ("987654" in text) == (width == 200)
 
 
 def test_facts_and_logs_of_several_runs(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import io
 import itertools
+import os
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -105,8 +106,9 @@ class Simulation:
     Parameters
     ----------
     script
-        Name of a script, or the text of one (several lines). It is carried out up to its first run
-        command; ``run()`` without a number goes on from there.
+        Name of a script, or the text of one: a str that names no file and has a line break, a
+        parenthesis or an equals sign; a Path is always a name. It is carried out up to its first
+        run command; ``run()`` without a number goes on from there.
     out
         Folder for log, dumps, plots and files to go on from. Without it none is written: the log
         is kept in memory, and what a script says of dumps and plots has no effect.
@@ -181,7 +183,8 @@ class Simulation:
         return folder
 
     def _read(self, script: str | PathLike) -> None:
-        is_text = isinstance(script, str) and "\n" in script
+        there = os.path.exists(script)  # False for what is too long for a name
+        is_text = isinstance(script, str) and not there and any(c in script for c in "\n(=")
         self._name = "a script" if is_text else str(script)
         try:
             if is_text:
@@ -190,6 +193,10 @@ class Simulation:
                 self._interpreter.run_file(script)
         except Pause:
             pass
+        except ScriptError as error:
+            if isinstance(script, str) and not is_text and not there:
+                error.expected = "the name of a script, or its text: statements, as in name = 1"
+            raise
 
     # -- commands ---------------------------------------------------------------------------------
 

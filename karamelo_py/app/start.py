@@ -7,32 +7,37 @@ program just ends.
 from __future__ import annotations
 
 import os
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
 
 INTERRUPTED = 130  # as a shell reports a program that SIGINT ended
 
 
-def _leave(number: int, frame: Any) -> None:
+def _leave(*_):
     os.write(2, b"error: interrupted\n")
     os._exit(INTERRUPTED)
 
 
-@contextmanager
-def leaving_at_once() -> Iterator[None]:
+# Nothing more is imported here: until `leaving_at_once` is at work, Python tells of an interrupt.
+try:
+    import signal
+except KeyboardInterrupt:
+    _leave()
+
+
+class leaving_at_once:
     """Let Ctrl-C end the program on the spot: for imports."""
-    try:
-        before = signal.signal(signal.SIGINT, _leave)
-    except ValueError:  # not in the main thread, which gets the signals
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
+
+    before = None
+
+    def __enter__(self) -> None:
+        try:
+            self.before = signal.signal(signal.SIGINT, _leave)
+        except ValueError:  # not in the main thread, which gets the signals
+            self.before = None
+
+    def __exit__(self, *_) -> None:
+        if self.before is not None:
+            signal.signal(signal.SIGINT, self.before)
 
 
 def main() -> int:

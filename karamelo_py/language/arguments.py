@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Place, ScriptError, meant
 from karamelo_py.script.expressions import Formula, Value, evaluate
 from karamelo_py.script.parser import parse_expression
 from karamelo_py.script.syntax import Raw
@@ -16,6 +16,7 @@ NULL = "NULL"
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _NAME = re.compile(r"[^\W\d]\w*")
 _QUOTED = re.compile(r'"([^"]*)"')
+_GAP = re.compile(r'[\w)"]\s+["\w.]')  # two words with nothing but blanks between them
 _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
@@ -156,8 +157,20 @@ class _Seeds:
         self.seeds = seeds
 
     def name(self, name: str, node: Any, raw: Raw) -> Value:
-        """What a name stands for."""
-        return Formula.seed(name) if name in self.seeds else self.outer.name(name, node, raw)
+        """What a name stands for; one that means nothing is told with those that do here."""
+        if name in self.seeds:
+            return Formula.seed(name)
+        try:
+            return self.outer.name(name, node, raw)
+        except ScriptError as error:
+            if error.message.startswith("unknown name"):
+                variables = self.outer.variables.items()
+                numbers = [n for n, value in variables if isinstance(value, float)]
+                others = ", ".join(numbers) or "none so far"
+                own = ", ".join(self.seeds)
+                error.expected = f"{own}, or a number that the script has set ({others})"
+                error.hint = meant(name, [*self.seeds, *numbers]) or f"set it first: {name} = ..."
+            raise
 
     def command(self, node: Any, raw: Raw) -> Value:
         """The value of a call that is not a function."""
@@ -166,6 +179,11 @@ class _Seeds:
     def hides(self, name: str) -> bool:
         """Whether the script uses the name of a function for something else."""
         return self.outer.hides(name)
+
+
+def with_gap(arguments: Sequence[Argument]) -> Argument | None:
+    """The first argument that may be two, with a comma forgotten between them."""
+    return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 
 def look_up(catalogue: Any, argument: Argument):

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from karamelo_py.language.arguments import with_gap
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import ScriptError, meant
 
@@ -82,12 +83,17 @@ class Forms:
             else f"{got - len(names)} argument{'s' if got - len(names) > 1 else ''} too many "
             f"in {dimension}D"
         )
+        gap = with_gap(arguments)
         fitting = [d for d, other in self.names.items() if len(other) == got and d != dimension]
         raise ScriptError(
             message,
-            place=None if missing else arguments[len(names)].place,
+            place=gap.place if gap else None if missing else arguments[len(names)].place,
             expected=self.line(dimension),
-            hint=f"{got} arguments are the form for {fitting[0]}D" if fitting and got else None,
+            hint=f"is a comma missing in '{gap.text}'?"
+            if gap
+            else f"{got} arguments are the form for {fitting[0]}D"
+            if fitting and got
+            else None,
         )
 
     def _convert(self, hub: Scene, argument: Any, name: str, dimension: int) -> float | str:

@@ -23,7 +23,7 @@ from functools import cache
 from typing import Any, Literal, get_type_hints
 
 from karamelo_py.language import docstrings, registry
-from karamelo_py.language.arguments import NULL, Argument
+from karamelo_py.language.arguments import NULL, Argument, with_gap
 from karamelo_py.language.faults import told
 from karamelo_py.language.kinds import (
     AtLeast,
@@ -39,13 +39,11 @@ from karamelo_py.language.kinds import (
     kind_of,
 )
 from karamelo_py.script.errors import Place, ScriptError, meant
+from karamelo_py.script.other_programs import SHORTER
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
 ]  # fmt: skip
-
-# Two words with nothing but blanks between them.
-_GAP = re.compile(r'[\w)"]\s+["\w.]')
 
 
 @dataclass(frozen=True)
@@ -214,7 +212,10 @@ def _bind(
     missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
-        gap = next((argument for argument in given if _GAP.search(argument.text)), None)
+        gap = with_gap(given)
+        hint = SHORTER.get(name) if len(given) < needed else None
+        if gap:
+            hint = f"is a comma missing in '{gap.text}'?"
         missing = [p.shown for p in slots[len(given) : needed]] or [f"{m}=..." for m in missing]
         raise ScriptError(
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
@@ -224,7 +225,7 @@ def _bind(
             else f"{len(given) - len(slots)} arguments too many",
             place=gap.place if gap else surplus.place if surplus else None,
             expected=syntax(target, name),
-            hint=f"is a comma missing in '{gap.text}'?" if gap else None,
+            hint=hint,
         )
     for k, argument in enumerate(given):
         parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic

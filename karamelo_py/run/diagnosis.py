@@ -53,10 +53,9 @@ def stop(
         simulation.restore(snapshot)
         if status == STOPPED and step > simulation.step:
             simulation.advance(step - simulation.step)
-    _write_last_good(hub)
-    path = restart.path_of(hub, Path(LAST_GOOD.replace("*", str(simulation.step))))
-    name = os.path.relpath(path)
-    if hub.output.writes:
+    path = _write_last_good(hub)
+    if path is not None:
+        name = os.path.relpath(path)
         hint += f". The last good state is in {name}; karamelo-py SCRIPT -restart {name} goes on"
     raise ScriptError(message, place=place, hint=hint)
 
@@ -213,9 +212,20 @@ def _place(x: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
 
 
-def _write_last_good(hub: Hub) -> None:
-    """Write the present state: to a file to go on from, and to the outputs of the script."""
+def _write_last_good(hub: Hub) -> Path | None:
+    """Write the present state: to a file to go on from, and to the outputs of the script.
+
+    What prevents that is told as a warning, as another error is on its way. A file of somebody
+    else is left alone. The files of restart(...) would hold the same once more.
+    """
+    written = None
     path = restart.path_of(hub, Path(LAST_GOOD))
-    if hub.output.writes and (not path.exists() or restart.is_restart(path)):
-        restart.write(hub, Path(LAST_GOOD), within=True)
-    hub.output.write(last=True)
+    try:
+        if hub.output.writes and (not path.exists() or restart.is_restart(path)):
+            written = restart.write(hub, Path(LAST_GOOD), within=True)
+            for item in hub.output.last:
+                item.last_step = hub.update.step
+        hub.output.write(last=True)
+    except ScriptError as error:
+        hub.warn(error.message, hint=error.hint, place=error.place)
+    return written

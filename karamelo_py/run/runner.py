@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from math import inf, isfinite
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from karamelo_py.run.watch import grown_little, tell_of_growth
 from karamelo_py.scene import boundary
 from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Pause, Quit, ScriptError
+from karamelo_py.script.errors import Pause, Quit, ScriptError, render_message
 
 CHUNK = 100  # steps between two looks at the run, and between two snapshots, at most
 HALVINGS = 5  # at most, in a run
@@ -152,9 +153,11 @@ class Runner:
         first_step, first_time = simulation.step, simulation.time
         going_on = hub.restart is not None
         if going_on:
+            file = hub.restart.path
             hub.restart.take(hub, outputs=True)
             hub.restart = hub.interpreter.replay = None
             simulation.go_on(self.end_time, self.halvings)
+            self._tell_of_no_step_left(file, simulation, first_step)
         else:
             simulation.begin(self.end_time)
         foresight.warn(hub, simulation, self.duration)
@@ -180,6 +183,24 @@ class Runner:
         self._summary(simulation, began, time.perf_counter() - started)
         if self.interrupted:
             raise Interrupted(self.interrupted)
+
+    def _tell_of_no_step_left(self, file: Path, simulation: Simulation, first_step: int) -> None:
+        """Say so where a file holds the end of this run already, or what comes behind it."""
+        step, time = simulation.step, simulation.time
+        last_step = first_step + self.steps if self.steps is not None else inf
+        holds = f"{file} holds step {step}, time {time:.6g}"
+        hint = "a longer run, or a file from before its end"
+        if step > last_step or time > self.end_time:
+            end = f"step {last_step}" if step > last_step else f"time {self.end_time:.6g}"
+            message = f"{holds}, which is beyond the end of this run, {end}: it takes no step"
+            self.hub.warn(message, hint=hint, place=self.place)
+        elif (
+            step == last_step
+            or time == self.end_time
+            or (self.condition is not None and not self._goes_on())
+        ):
+            message = f"{holds}, the end of this run: it takes no further step"
+            self.hub.console.say(render_message("note", message, hint=hint))
 
     def _loop(self, simulation: Simulation, first_step: int, first_time: float) -> None:
         hub, output = self.hub, self.hub.output

@@ -93,10 +93,12 @@ def require_domain(hub: Scene) -> Domain:
     if hub.domain is None:
         announced = getattr(hub, "announced_dimension", None)
         if announced:
+            ends = [f"{axis}{end}" for axis in "xyz"[:announced] for end in ("min", "max")]
             raise ScriptError(
                 f"the domain has no size yet: dimension({announced}) only says how many "
                 "directions there are",
-                expected="create_domain(...) or the longer form of dimension(...) before this line",
+                expected=f"create_domain({', '.join(ends)}, h) before this line, or in its place "
+                f"dimension({announced}, {', '.join(ends)}, h)",
             )
         raise ScriptError(
             "there is no domain yet",

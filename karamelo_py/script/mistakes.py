@@ -362,6 +362,13 @@ def _block_or_call(name: str, words: list[str]) -> str:
         return _NO_BLOCKS
     if other := instead("command", name):
         return other
+    if name in ("fix", "compute") and len(words) > 2:
+        other = instead(name, words[2]) or ""
+        style = other.removeprefix("the style ")
+        if other and (style == other or " " in style):
+            return other
+        if words[1] == "all" or other:  # LAMMPS has the group in front of the style
+            words[1:3] = style or words[2], words[1]
     if all(re.fullmatch(r"[\w.*/+-]+|\"[^\"]*\"", word) for word in words):
         return f"arguments go in parentheses: {name}({', '.join(words)})"
     return f"arguments go in parentheses: {name}(...)"

@@ -24,7 +24,8 @@ KARAMELO_COMMANDS = frozenset((
 # By family and name.
 INSTEAD = {
     "command": {
-        "method_modify": "method(ulmpm, FLIP, linear, 0.99) says all of it in one line",
+        "method_modify": "method(tlmpm, FLIP, linear, 0.99), at the top of the script: behind the "
+        "first word stand those of method_modify",
         "partition_domain": "method(ulmpm, FLIP, linear, 1): with linear weights no point acts "
         "across a line of nodes",
         "delete_atoms": "delete_particles(solid, region, regionID)",
@@ -55,8 +56,16 @@ INSTEAD = {
         "neigh_modify": f"{_NEEDLESS}: points interact by the grid",
         "newton": _NEEDLESS,
         "processors": "karamelo-py SCRIPT --threads N",
+        "units": "units(m, kg, s) names the units of all numbers; or leave it out",
+        "write_data": "write_restart(file), or dump(ID, all, particle, every, file, ...)",
+        "write_dump": "dump(ID, all, particle, every, file, ...) writes the last state, too",
+        "minimize": "fix(ID, local_damping, all, 0.8) and run_while(Ek > ...)",
+        "reset_timestep": f"{_NEEDLESS}: steps are counted through all runs",
     },
     "fix": {
+        "body_force_current_config": "the style body_force",
+        "indent/pinball": "fix(ID, indent/minimize_penetration, group, sphere, R, x, y, z, vx, vy, "
+        "vz, mu)",
         "nve": f"{_NEEDLESS}: points move without a fix",
         "enforce2d": f"{_NEEDLESS}: dimension(2, ...) is a plane",
         "gravity": "fix(ID, body_force, all, 0, -9.81)",
@@ -110,6 +119,17 @@ INSTEAD = {
         "custom/gz": "the style particle/gz",
         "image": "the style pyplot",
     },
+}
+
+
+# What stands for the arguments that earlier forms of Karamelo's laws did not have.
+SHORTER = {
+    "eos shock": "without heat and viscosity: eos(ID, shock, rho0, K, c0, S, 0, 0, 0, 0, 0); "
+    "0, 0 at the end is no viscosity",
+    "strength johnson_cook": "without softening by heat: "
+    "strength(ID, johnson_cook, G, A, B, n, epsdot0, C, 0, 0, 1)",
+    "damage damage_johnson_cook": "without a temperature: "
+    "damage(ID, damage_johnson_cook, d1, d2, d3, d4, 0, epsdot0, 0, 1)",
 }
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import karamelo_py
+from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import environment
 from karamelo_py.app.studies.options import new_parser
 from karamelo_py.output.console import duration
@@ -42,7 +43,10 @@ An entry has a name, a text, and commands that run in a folder of its own; {inpu
     "chart bar.csv -accuracy err_history -x refine -o bar.png",
   ]
   whole = {sizes = "0.5,1,2,4"}
-  small = {sizes = "0.2,0.4"}"""
+  small = {sizes = "0.2,0.4"}
+
+Runs that do not end well are named, and the exit status is 1, unless the entry says ends_early =
+true: that they do is what it shows."""
 KEPT = "entry.json"
 SAID = "said.txt"
 PICTURES = (".png", ".svg")
@@ -67,6 +71,8 @@ class Entry:
         Whether its scenes are so small that to interpret them takes less time than to compile.
     page
         Whether it has a part of the page.
+    ends_early
+        Whether it shows runs that do not end well.
     """
 
     name: str
@@ -76,6 +82,7 @@ class Entry:
     small: dict[str, str] = field(default_factory=dict)
     interpreted: bool = False
     page: bool = True
+    ends_early: bool = False
 
     def lines(self, inputs: str, *, small: bool) -> list[str]:
         """The commands with their values.
@@ -116,7 +123,7 @@ def read(path: Path) -> tuple[list[Entry], Path]:
         except TypeError as error:
             raise ScriptError(
                 f"{path}: an entry with {str(error).split(') ')[-1]}",
-                expected="name, text, commands, whole, small, interpreted, page",
+                expected="name, text, commands, whole, small, interpreted, page, ends_early",
             ) from None
     if not entries:
         raise ScriptError(f"{path} has no entries", expected="[[entry]] with name and commands")
@@ -163,19 +170,38 @@ def run(options: Any) -> int:
             print(f"{entry.name:<32} {entry.text.splitlines()[0] if entry.text else ''}")
         return 0
     folder = options.o / "small" if options.small else options.o
-    failed = []
+    failed: dict[str, str] = {}
     for k, entry in enumerate(chosen, 1):
         said = f"{k} of {len(chosen)}: {entry.name}"
         begun = time.perf_counter()
-        state = make(entry, folder / entry.name, inputs, small=options.small, again=options.again)
+        place = folder / entry.name
+        state = make(entry, place, inputs, small=options.small, again=options.again)
+        bad, count = ended(place)
         if state == "failed":
-            failed.append(entry.name)
+            failed[entry.name] = ""
+        elif bad:
+            state += f", {len(bad)} of {count} runs ended early"
+            if not entry.ends_early:
+                failed[entry.name] = f" ({_few(bad)})"
         print(f"{said} {state} ({duration(time.perf_counter() - begun)})", flush=True)
     if options.page and not options.small:
         write_page(options.page, entries, folder, inputs)
     if failed:
-        print(f"failed: {', '.join(failed)}; the messages are above, the other entries are done")
+        named = ", ".join(name + runs for name, runs in failed.items())
+        print(f"failed: {named}; see above and the tables, the other entries are done")
     return 1 if failed else 0
+
+
+def ended(place: Path) -> tuple[list[str], int]:
+    """Runs in the tables of an entry that did not end well, and how many there are in all."""
+    tables = [records.read(path) for path in sorted(place.glob("*.csv"))]
+    runs = [row for table in tables for row in table if "status" in row and "folder" in row]
+    bad = [row["folder"] for row in runs if row["status"] != "done"]
+    return [Path(folder).name for folder in bad], len(runs)
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
 def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -> str:

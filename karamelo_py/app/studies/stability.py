@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -142,7 +143,8 @@ def in_short(row: Mapping[str, Any]) -> str:
     for pattern, words in REASONS.items():
         if re.search(pattern, row["reason"]):
             return words
-    return str(row["reason"])[:40]
+    cause = re.sub(r"^(run\w*: )?step \d+, time [^:]+: ", "", str(row["reason"]))
+    return textwrap.shorten(cause, 60, placeholder=" …")
 
 
 class Map:

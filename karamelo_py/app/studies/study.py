@@ -17,7 +17,8 @@ from karamelo_py.app.studies.records import Recorded, row
 from karamelo_py.app.studies.variables import number
 from karamelo_py.output.console import duration
 
-_SHOWN = ("seconds", "points", "steps", "status")
+_FACTS = ("seconds", "points", "steps")
+_STATUS = 24  # characters at least, for what became of a run
 
 
 class Study:
@@ -187,11 +188,14 @@ class _Display:
 
         rows = list(self.study.rows.values())
         room = max(4, self.live.console.height - 8 - len(running))
-        table = results_table(rows[-room:], self.names, self.study.items, self.study.title)
-        for case in running:
-            spent = time.perf_counter() - self.started[tuple(case.values())]
-            blank = [""] * (len(self.study.items) + len(_SHOWN) - 1)
-            table.add_row(*case.values(), *blank, f"running, {duration(spent)}", style="dim")
+        waiting = [
+            (case, f"running, {duration(time.perf_counter() - self.started[tuple(case.values())])}")
+            for case in running
+        ]
+        table = results_table(
+            rows[-room:], self.names, self.study.items, self.study.title,
+            self.live.console.width, waiting,
+        )  # fmt: skip
         left = self.left(queue, running)
         line = Table.grid(padding=(0, 1))
         said = f"{self.finished} of {self.count} runs, {duration(self.elapsed)}"
@@ -231,7 +235,8 @@ def growth(
     Fitted by least squares of logarithms, with a pull towards "changes nothing" where little is
     known.
     """
-    terms = sorted({_term(n, v) for case in cases for n, v in case.items()})
+    # A variable may have numbers and words, of which 0 is one.
+    terms = list(dict.fromkeys(_term(n, v) for case in cases for n, v in case.items()))
 
     def features(case: Mapping[str, str]) -> list[float]:
         have = {_term(n, v): v for n, v in case.items()}
@@ -267,28 +272,40 @@ def results_table(
     rows: Sequence[Mapping[str, Any]],
     names: Sequence[str],
     items: Sequence[Recorded],
-    title: str = "",
+    title: str,
+    width: int,
+    running: Sequence[tuple[Mapping[str, str], str]] = (),
 ) -> Any:
-    """A table of runs for the terminal."""
+    """A table of runs for a terminal of `width` characters, and below them those that run.
+
+    No value is cut off: where there is little room some facts are left out, and the last column
+    takes more lines.
+    """
     from rich.table import Table
     from rich.text import Text
 
+    words = [item.word for item in items]
+    values = {name: [shown(each[name]) for each in rows] for name in (*names, *words, *_FACTS)}
+    for name in names:
+        values[name] += [case[name] for case, _ in running]
+    widths = {name: max(map(len, (name, *cells))) for name, cells in values.items()}
+    facts = list(_FACTS)
+    while facts and sum(widths[n] + 2 for n in (*names, *words, *facts)) + _STATUS > width:
+        facts.pop()
+    columns = [*words, *facts]
     table = Table(title=title or None, title_justify="left", box=None, pad_edge=False)
     for name in names:
-        table.add_column(name, style="cyan", no_wrap=True, min_width=min(len(name), 12))
-    for name in [*(item.word for item in items), *_SHOWN]:
-        last = name == "status"
-        justify = "left" if last else "right"
-        width = 6 if last else min(len(name), 12)
-        table.add_column(name, justify=justify, no_wrap=True, min_width=width)
-    for each in rows:
-        cells = [Text(shown(each[name])) for name in names]
-        cells += [Text(shown(each[item.word])) for item in items]
-        cells += [Text(shown(each[name])) for name in _SHOWN[:-1]]
+        table.add_column(name, style="cyan", min_width=widths[name])
+    for name in columns:
+        table.add_column(name, justify="right", min_width=widths[name])
+    table.add_column("status", overflow="fold", min_width=6)
+    for k, each in enumerate(rows):
         end = each["status"] + (f": {each['reason']}" if each["reason"] else "")
         style = {"done": "green", "failed": "red"}.get(each["status"], "yellow")
-        cells.append(Text(end if len(end) < 60 else end[:59] + "…", style=style))
-        table.add_row(*cells)
+        cells = [Text(values[name][k]) for name in (*names, *columns)]
+        table.add_row(*cells, Text(end if len(end) < 60 else end[:59] + "…", style=style))
+    for case, state in running:
+        table.add_row(*case.values(), *[""] * len(columns), state, style="dim")
     return table
 
 

@@ -86,12 +86,17 @@ def run(options: Any) -> int:
 
 def tell(rows: list, values: dict, items: list, study: Study, out: Path) -> None:
     """Show the whole table and what became of the runs."""
-    terminal().print(results_table(rows, list(values), items, study.title))
+    console = terminal()
+    console.print(results_table(rows, list(values), items, study.title, console.width))
     done = sum(row["status"] == "done" for row in rows)
     old = len(rows) - study.ran
     print(
         f"{done} of {len(rows)} runs are done"
-        + (f", {len(rows) - done} are not (see reason)" if done < len(rows) else "")
+        + (
+            f", {len(rows) - done} {'is' if len(rows) - done == 1 else 'are'} not (see reason)"
+            if done < len(rows)
+            else ""
+        )
         + (f"; {old} were known" if old > 0 else "")
         + f"; the table is {out}"
     )

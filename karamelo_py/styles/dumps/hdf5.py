@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,16 @@ from karamelo_py.styles.dumps.table import OfPoints, TableDump
 # per cent.
 STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 16
+
+
+class Rows(NamedTuple):
+    """One snapshot: a number in each column for each id."""
+
+    time: float
+    step: int
+    ids: np.ndarray
+    types: np.ndarray
+    columns: dict[str, np.ndarray]
 
 
 class Hdf5Dump(TableDump):
@@ -31,58 +41,65 @@ class Hdf5Dump(TableDump):
     _snapshots = 0
 
     def write(self) -> None:
-        """Write one snapshot: to a file of its own, or after those before it."""
+        """Write one snapshot."""
+        update = self.hub.update
+        ids, types = self.ids()
+        columns = {name: self.field(name) for name in self.columns}
+        rows = Rows(update.time, update.step, ids, types, columns)
+        self._add(self.path(), self._snapshots, rows)
+        self._snapshots += 1
+
+    def _add(self, path: Path, k: int, rows: Rows) -> None:
+        """Write snapshot `k`: to a file of its own, or after those before it."""
         import h5py
 
-        path = self.path()
-        ids, types = self.ids()
-        if self._snapshots == 0 or self.one_file_per_step:
+        if k == 0 or self.one_file_per_step:
             with (
                 whole(path) as file,
                 h5py.File(file.name, "w", libver="latest", locking=False) as root,
             ):
-                self._prepare(root, ids)
-                self._append(root, 0, ids, types)
-            self._snapshots = 1
+                self._prepare(root, rows.ids)
+                self._append(root, 0, rows)
             return
         with reported(path), _opened_to_append(path) as root:
             try:
-                self._append(root, self._snapshots, ids, types)
+                self._append(root, k, rows)
             except BaseException:
                 for name in ("time", "step", *self.columns):
-                    root[name].resize(self._snapshots, axis=0)
+                    root[name].resize(k, axis=0)
                 raise
-        self._snapshots += 1
 
     def resumed(self) -> None:
         """Go on in the file of an earlier run, with the snapshots that it had then.
 
-        They are copied: a file that a killed program was writing can be read, not written to.
+        They are written once more, as they were the first time, so that the bytes are the same. A
+        file that a killed program was writing can be read, not written to.
         """
         import h5py
 
         path, count = self.path(), self._snapshots
         if count == 0 or self.one_file_per_step:
             return
+        again = path.with_name(f"{path.name}.again")
         try:
-            with (
-                h5py.File(path, "r", libver="latest", swmr=True, locking=False) as old,
-                whole(path) as file,
-                h5py.File(file.name, "w", libver="latest", locking=False) as root,
-            ):
+            with h5py.File(path, "r", libver="latest", swmr=True, locking=False) as old:
                 if len(old["step"]) < count:
                     raise OSError
-                self._prepare(root, old["id"][:])
-                for name in ("id", "type"):
-                    root[name].resize(old[name].shape)
-                    root[name][:] = old[name][:]
-                for name in ("time", "step", *self.columns):
-                    root[name].resize((count, *old[name].shape[1:]))
-                    for k in range(count):
-                        root[name][k] = old[name][k]
+                for k in range(count):
+                    self._add(again, k, self._past(old, k))
+            os.replace(again, path)
         except (OSError, KeyError, ScriptError):
+            again.unlink(missing_ok=True)
             self.warn_of_absence()
             self._snapshots = 0
+
+    def _past(self, old: Any, k: int) -> Rows:
+        """Snapshot `k` of a file; rows that hold NaN alone were not there."""
+        columns = {name: old[name][k] for name in self.columns}
+        at = np.flatnonzero(~np.all([np.isnan(row) for row in columns.values()], axis=0))
+        kept = {name: row[at] for name, row in columns.items()}
+        time, step = float(old["time"][k]), int(old["step"][k])
+        return Rows(time, step, old["id"][:][at], old["type"][:][at], kept)
 
     def _prepare(self, root: Any, ids: np.ndarray) -> None:
         """Make the empty arrays, with names of their axes, as xarray reads them."""
@@ -112,25 +129,25 @@ class Hdf5Dump(TableDump):
             for axis, scale in enumerate(scales):
                 root[name].dims[axis].attach_scale(root[scale])
 
-    def _append(self, root: Any, k: int, ids: np.ndarray, types: np.ndarray) -> None:
+    def _append(self, root: Any, k: int, rows: Rows) -> None:
         """Write snapshot `k`. Points are numbered from 1 and nodes from 0: rows go by their id."""
         first = int(self.rows_are == "points")
-        at = ids - first
+        at = rows.ids - first
         count = max(int(at.max(initial=-1)) + 1, len(root["id"]))
         if count > len(root["id"]):
             for name in ("id", "type"):
                 root[name].resize((count,))
             root["id"][:] = np.arange(first, first + count)
         known = root["type"][:]
-        if (known[at] != types).any():
-            known[at] = types
+        if (known[at] != rows.types).any():
+            known[at] = rows.types
             root["type"][:] = known
-        for name, number in (("time", self.hub.update.time), ("step", self.hub.update.step)):
+        for name, number in (("time", rows.time), ("step", rows.step)):
             root[name].resize((k + 1,))
             root[name][k] = number
         row = np.full(count, np.nan)
         for name in self.columns:
-            row[at] = self.field(name)
+            row[at] = rows.columns[name]
             root[name].resize((k + 1, count))
             root[name][k] = row
 
