@@ -30,8 +30,9 @@ from karamelo_py.points.laws import (
     wave_speed_squared,
     with_stress,
 )
+from karamelo_py.points.laws.composed import memory_of
 from karamelo_py.points.laws.eos.linear import LinearPressure
-from karamelo_py.points.laws.eos_strength import EosStrength, memory_of
+from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.further import chained, initial_part, part_after, part_pressure
 from karamelo_py.points.laws.strengths.linear import Elastic
 from karamelo_py.points.laws.strengths.plastic import Plastic

@@ -8,7 +8,7 @@ import itertools
 import os
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Any, NoReturn
@@ -16,6 +16,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from karamelo_py.app.shown import Picture, Table
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter, shown
 from karamelo_py.output.console import Console
@@ -53,51 +54,6 @@ class _Quiet(Console):
 
     def warn(self, text: str) -> None:
         warnings.warn(text, KarameloWarning, stacklevel=2)
-
-
-class Table(Mapping):
-    """Columns by name: arrays of numbers."""
-
-    def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
-        self._names = names
-        self._column = column
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        names = self._names()
-        if name not in names:
-            close = nearest(name, names)
-            hint = f"; did you mean '{close}'?" if close else ""
-            raise KeyError(f"there is no '{name}'{hint}")
-        return self._column(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names())
-
-    def __len__(self) -> int:
-        return len(self._names())
-
-    def __repr__(self) -> str:
-        return f"<columns {', '.join(self)}>"
-
-    def to_pandas(self) -> Any:
-        """The columns as a DataFrame."""
-        import pandas
-
-        return pandas.DataFrame(dict(self))
-
-
-class Picture:
-    """A picture of the points, which a notebook shows."""
-
-    def __init__(self, png: bytes):
-        self.png = png
-
-    def _repr_png_(self) -> bytes:
-        return self.png
-
-    def save(self, file: str | PathLike) -> None:
-        """Write it to a file (PNG)."""
-        Path(file).write_bytes(self.png)
 
 
 class Simulation:

@@ -10,23 +10,19 @@ a plug-in's, are chained (`karamelo_py.points.laws.further`).
 
 from __future__ import annotations
 
-from math import log, sqrt
-from typing import Any, ClassVar, NamedTuple
+from math import log
+from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, point_function, real, shared
-from karamelo_py.compiler.tuples import either, following, increased, leading, plus, scale
-from karamelo_py.language.arguments import Argument, look_up
-from karamelo_py.language.scene import Scene
+from karamelo_py.compiler.compile import choose, real
+from karamelo_py.compiler.tuples import increased, plus
 from karamelo_py.points.kinematics import (
     add_pressure,
-    after_symmetric,
     deviator,
     leading_symmetric,
     spin,
     symmetric_part,
     trace,
     volume_ratio,
-    von_mises,
     zero_symmetric,
 )
 from karamelo_py.points.laws import (
@@ -52,14 +48,27 @@ from karamelo_py.points.laws import (
     with_stress,
     with_temperature,
 )
-from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
+from karamelo_py.points.laws.composed import (
+    Memory,
+    borne,
+    broken_further,
+    full_pressure,
+    intact_pressure,
+    lossless,
+    memory_of,
+    nominal,
+    released,
+    slowed_by_viscosity,
+    state_of,
+    viscous_after,
+)
+from karamelo_py.points.laws.damages import initial_damage, initiation
 from karamelo_py.points.laws.eos import (
     at_pressure,
     bulk_modulus,
     compressed,
     compression_energy,
     initial_energy,
-    pressure,
     stored_heat,
 )
 from karamelo_py.points.laws.further import (
@@ -68,12 +77,12 @@ from karamelo_py.points.laws.further import (
     further_pressure,
     initial_further,
 )
+from karamelo_py.points.laws.named import Eos, Option, Strength
 from karamelo_py.points.laws.strengths import (
     Remembered,
     damped_speed_squared,
     elastic_ratio,
     equivalent_plastic_strain,
-    initial_loss,
     initial_memory,
     respond,
     shear_energy,
@@ -87,56 +96,9 @@ from karamelo_py.points.laws.temperatures import (
     thermal_pressure,
 )
 from karamelo_py.points.laws.viscosity import (
-    damped,
     initial_viscous_pressure,
-    viscous_pressure,
-    viscous_speed,
 )
-from karamelo_py.script.errors import ScriptError, nearest
-
-
-class Eos:
-    """For signatures: an equation of state that the script has named."""
-
-    script_kind: ClassVar[str] = "the ID of an equation of state"
-    kind: ClassVar[str] = "eos"
-
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """The part that `argument` names."""
-        return look_up(hub.parts[cls.kind], argument)
-
-
-class Strength(Eos):
-    """For signatures: a strength."""
-
-    script_kind = "the ID of a strength"
-    kind = "strength"
-
-
-class Option:
-    """For signatures: a part that may be left out."""
-
-    script_kind: ClassVar[str] = "the ID of a damage or of a temperature"
-
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """The part that `argument` names."""
-        word = argument.word()
-        optional = {kind: named for kind, named in hub.parts.items() if kind not in NEEDED}
-        known = {ID: part for named in optional.values() for ID, part in named.items()}
-        if word in known:
-            return known[word]
-        close = nearest(word, known) if word else None
-        raise ScriptError(
-            f"unknown {' or '.join(optional)} '{argument.text}'",
-            place=argument.place,
-            expected=f"one of {', '.join(known)}" if known else "none is defined yet",
-            hint=f"did you mean '{close}'?" if close else None,
-        )
-
-
-NEEDED = ("eos", "strength")
+from karamelo_py.script.errors import ScriptError
 
 
 class EosStrength(NamedTuple):
@@ -201,24 +163,6 @@ class EosStrength(NamedTuple):
 column(EosStrength, "dissipated", dissipated_energy)
 
 
-class Memory(NamedTuple):
-    """What the parts of a law remember at one point: flat tuples, empty for parts without."""
-
-    energy: Any  # of the equation of state
-    viscous: Any  # viscous pressure
-    damage: Any
-    heat: Any  # temperature
-    loss: Any  # dissipated energy per reference volume
-    strength: Any
-    further: Any
-
-
-@shared
-def lossless(law, like):
-    """(0,) where a part dissipates energy, else ()."""
-    return either(initial_loss(law.strength, like), initial_viscous_pressure(law.viscosity, like))
-
-
 @initial_state.on(EosStrength)
 def _(law, kin, like):
     m = Memory(
@@ -231,164 +175,6 @@ def _(law, kin, like):
         initial_further(law.further, like),
     )
     return state_of(real(1, like), zero_symmetric(kin, like), m)
-
-
-@shared
-def memory_of(law, kin, state):
-    """What the parts remember."""
-    like = state[0]
-    rest = after_symmetric(kin, state[1:])
-    energy = leading(rest, initial_energy(law.eos, like))
-    rest = following(rest, energy)
-    viscous = leading(rest, initial_viscous_pressure(law.viscosity, like))
-    rest = following(rest, viscous)
-    broken = leading(rest, initial_damage(law.damage, like))
-    rest = following(rest, broken)
-    heat = heat_from(initial_heat(law.temperature, like), rest)
-    rest = following(rest, heat)
-    loss = leading(rest, lossless(law, like))
-    rest = following(rest, loss)
-    strength = leading(rest, initial_memory(law.strength, like))
-    return Memory(energy, viscous, broken, heat, loss, strength, following(rest, strength))
-
-
-@shared
-def state_of(j, s, m):
-    """The state of a point from its numbers."""
-    heat = leading(m.heat, m.heat)  # the tuple without its name
-    return (j,) + s + m.energy + m.viscous + m.damage + heat + m.loss + m.strength + m.further
-
-
-# ---- pressure -----------------------------------------------------------------------------------
-
-
-@shared
-def intact_pressure(law, j, m):
-    """Pressure of the intact material, without viscous pressure."""
-    elastic = elastic_ratio(law.strength, m.strength, j)
-    p = pressure(law.eos, elastic, m.energy, m.heat)
-    p = plus(p, thermal_pressure(law.temperature, m.heat))
-    return further_pressure(law.further, m.further, p)
-
-
-@shared
-def full_pressure(law, j, m):
-    """The pressure in the stress: damage takes of tension, not of compression."""
-    p = intact_pressure(law, j, m)
-    return plus(choose(p < 0, borne(law.damage, m.damage, p), p), m.viscous)
-
-
-@shared
-def sound(law, j, m):
-    """Speed of sound without shear."""
-    elastic = elastic_ratio(law.strength, m.strength, j)
-    K = bulk_modulus(law.eos, elastic, m.energy, m.heat)
-    return sqrt(K * specific_volume(law.eos) * j)
-
-
-@point_function()
-def viscous_after(viscosity, law, j, m, rate):
-    """Viscous pressure (q,) at a rate of volume change, or ()."""
-
-
-@viscous_after.on(Absent)
-def _(viscosity, law, j, m, rate):
-    return ()
-
-
-@viscous_after.otherwise
-def _(viscosity, law, j, m, rate):
-    density = real(1, j) / (specific_volume(law.eos) * j)
-    return viscous_pressure(viscosity, rate, density, sound(law, j, m))
-
-
-@point_function()
-def slowed_by_viscosity(viscosity, law, j, m, squared, density):
-    """The square of the speed of waves that the time step has to resolve."""
-
-
-@slowed_by_viscosity.on(Absent)
-def _(viscosity, law, j, m, squared, density):
-    return squared
-
-
-@slowed_by_viscosity.otherwise
-def _(viscosity, law, j, m, squared, density):
-    return damped(squared, viscous_speed(viscosity, m.viscous, density, sound(law, j, m)))
-
-
-# ---- damage -------------------------------------------------------------------------------------
-
-
-@point_function()
-def borne(damage, memory, x):
-    """The share of a number that the damaged material bears: (1 - D) x."""
-
-
-@borne.on(Absent)
-def _(damage, memory, x):
-    return x
-
-
-@borne.otherwise
-def _(damage, memory, x):
-    return x * integrity(damage, memory)
-
-
-@point_function()
-def nominal(damage, memory, s):
-    """The deviatoric stress that damage leaves, (1 - D) s."""
-
-
-@nominal.on(Absent)
-def _(damage, memory, s):
-    return s
-
-
-@nominal.otherwise
-def _(damage, memory, s):
-    return scale(integrity(damage, memory), s)
-
-
-@point_function()
-def broken_further(damage, law, kin, m, strain, s, j, dt):
-    """Memory of the damage after an increment of plastic strain; () where nothing breaks."""
-
-
-@broken_further.on(Absent)
-def _(damage, law, kin, m, strain, s, j, dt):
-    return ()
-
-
-@broken_further.otherwise
-def _(damage, law, kin, m, strain, s, j, dt):
-    p = intact_pressure(law, j, m)
-    q = von_mises(kin, s)
-    bound = q + real(1e-3, p) * abs(p)
-    known = bound > 0
-    triaxiality = choose(known, -p / choose(known, bound, real(1, p)), real(0, p))
-    return damage_after(damage, m.damage, strain, triaxiality, m.heat, dt)
-
-
-@point_function()
-def released(damage, law, kin, j, s, m, broken):
-    """Stored energy that an increment of damage sets free."""
-
-
-@released.on(Absent)
-def _(damage, law, kin, j, s, m, broken):
-    return j - j
-
-
-@released.otherwise
-def _(damage, law, kin, j, s, m, broken):
-    shear = j * shear_energy(law.strength, kin, s)
-    tension = intact_pressure(law, j, m) < 0
-    energy = shear + choose(tension, compression_energy(law.eos, j, m.energy), real(0, j))
-    return (integrity(damage, m.damage) - integrity(damage, broken)) * energy
-
-
-# ---- the law ------------------------------------------------------------------------------------
 
 
 @advance.on(EosStrength)

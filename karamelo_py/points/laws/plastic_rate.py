@@ -14,7 +14,8 @@ from karamelo_py.points.laws import (
     shown,
     wave_speed_squared,
 )
-from karamelo_py.points.laws.eos_strength import EosStrength, memory_of
+from karamelo_py.points.laws.composed import memory_of
+from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.further import Further, initial_part, part_after
 from karamelo_py.points.laws.strengths import equivalent_plastic_strain
 

@@ -1,0 +1,204 @@
+"""What the parts of a law remember at a point, and what they are to each other.
+
+`law` is a record with the parts of `karamelo_py.points.laws.eos_strength`. Pressure, speed of sound
+and damage need more than one of them.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.compile import choose, point_function, real, shared
+from karamelo_py.compiler.tuples import either, following, leading, plus, scale
+from karamelo_py.points.kinematics import after_symmetric, von_mises
+from karamelo_py.points.laws import Absent, specific_volume
+from karamelo_py.points.laws.damages import damage_after, initial_damage, integrity
+from karamelo_py.points.laws.eos import bulk_modulus, compression_energy, initial_energy, pressure
+from karamelo_py.points.laws.further import further_pressure
+from karamelo_py.points.laws.strengths import (
+    elastic_ratio,
+    initial_loss,
+    initial_memory,
+    shear_energy,
+)
+from karamelo_py.points.laws.temperatures import heat_from, initial_heat, thermal_pressure
+from karamelo_py.points.laws.viscosity import (
+    damped,
+    initial_viscous_pressure,
+    viscous_pressure,
+    viscous_speed,
+)
+
+
+class Memory(NamedTuple):
+    """What the parts of a law remember at one point: flat tuples, empty for parts without."""
+
+    energy: Any  # of the equation of state
+    viscous: Any  # viscous pressure
+    damage: Any
+    heat: Any  # temperature
+    loss: Any  # dissipated energy per reference volume
+    strength: Any
+    further: Any
+
+
+@shared
+def lossless(law, like):
+    """(0,) where a part dissipates energy, else ()."""
+    return either(initial_loss(law.strength, like), initial_viscous_pressure(law.viscosity, like))
+
+
+@shared
+def memory_of(law, kin, state):
+    """What the parts remember."""
+    like = state[0]
+    rest = after_symmetric(kin, state[1:])
+    energy = leading(rest, initial_energy(law.eos, like))
+    rest = following(rest, energy)
+    viscous = leading(rest, initial_viscous_pressure(law.viscosity, like))
+    rest = following(rest, viscous)
+    broken = leading(rest, initial_damage(law.damage, like))
+    rest = following(rest, broken)
+    heat = heat_from(initial_heat(law.temperature, like), rest)
+    rest = following(rest, heat)
+    loss = leading(rest, lossless(law, like))
+    rest = following(rest, loss)
+    strength = leading(rest, initial_memory(law.strength, like))
+    return Memory(energy, viscous, broken, heat, loss, strength, following(rest, strength))
+
+
+@shared
+def state_of(j, s, m):
+    """The state of a point from its numbers."""
+    heat = leading(m.heat, m.heat)  # the tuple without its name
+    return (j,) + s + m.energy + m.viscous + m.damage + heat + m.loss + m.strength + m.further
+
+
+# ---- pressure -----------------------------------------------------------------------------------
+
+
+@shared
+def intact_pressure(law, j, m):
+    """Pressure of the intact material, without viscous pressure."""
+    elastic = elastic_ratio(law.strength, m.strength, j)
+    p = pressure(law.eos, elastic, m.energy, m.heat)
+    p = plus(p, thermal_pressure(law.temperature, m.heat))
+    return further_pressure(law.further, m.further, p)
+
+
+@shared
+def full_pressure(law, j, m):
+    """The pressure in the stress: damage takes of tension, not of compression."""
+    p = intact_pressure(law, j, m)
+    return plus(choose(p < 0, borne(law.damage, m.damage, p), p), m.viscous)
+
+
+@shared
+def sound(law, j, m):
+    """Speed of sound without shear."""
+    elastic = elastic_ratio(law.strength, m.strength, j)
+    K = bulk_modulus(law.eos, elastic, m.energy, m.heat)
+    return sqrt(K * specific_volume(law.eos) * j)
+
+
+@point_function()
+def viscous_after(viscosity, law, j, m, rate):
+    """Viscous pressure (q,) at a rate of volume change, or ()."""
+
+
+@viscous_after.on(Absent)
+def _(viscosity, law, j, m, rate):
+    return ()
+
+
+@viscous_after.otherwise
+def _(viscosity, law, j, m, rate):
+    density = real(1, j) / (specific_volume(law.eos) * j)
+    return viscous_pressure(viscosity, rate, density, sound(law, j, m))
+
+
+@point_function()
+def slowed_by_viscosity(viscosity, law, j, m, squared, density):
+    """The square of the speed of waves that the time step has to resolve."""
+
+
+@slowed_by_viscosity.on(Absent)
+def _(viscosity, law, j, m, squared, density):
+    return squared
+
+
+@slowed_by_viscosity.otherwise
+def _(viscosity, law, j, m, squared, density):
+    return damped(squared, viscous_speed(viscosity, m.viscous, density, sound(law, j, m)))
+
+
+# ---- damage -------------------------------------------------------------------------------------
+
+
+@point_function()
+def borne(damage, memory, x):
+    """The share of a number that the damaged material bears: (1 - D) x."""
+
+
+@borne.on(Absent)
+def _(damage, memory, x):
+    return x
+
+
+@borne.otherwise
+def _(damage, memory, x):
+    return x * integrity(damage, memory)
+
+
+@point_function()
+def nominal(damage, memory, s):
+    """The deviatoric stress that damage leaves, (1 - D) s."""
+
+
+@nominal.on(Absent)
+def _(damage, memory, s):
+    return s
+
+
+@nominal.otherwise
+def _(damage, memory, s):
+    return scale(integrity(damage, memory), s)
+
+
+@point_function()
+def broken_further(damage, law, kin, m, strain, s, j, dt):
+    """Memory of the damage after an increment of plastic strain; () where nothing breaks."""
+
+
+@broken_further.on(Absent)
+def _(damage, law, kin, m, strain, s, j, dt):
+    return ()
+
+
+@broken_further.otherwise
+def _(damage, law, kin, m, strain, s, j, dt):
+    p = intact_pressure(law, j, m)
+    q = von_mises(kin, s)
+    bound = q + real(1e-3, p) * abs(p)
+    known = bound > 0
+    triaxiality = choose(known, -p / choose(known, bound, real(1, p)), real(0, p))
+    return damage_after(damage, m.damage, strain, triaxiality, m.heat, dt)
+
+
+@point_function()
+def released(damage, law, kin, j, s, m, broken):
+    """Stored energy that an increment of damage sets free."""
+
+
+@released.on(Absent)
+def _(damage, law, kin, j, s, m, broken):
+    return j - j
+
+
+@released.otherwise
+def _(damage, law, kin, j, s, m, broken):
+    shear = j * shear_energy(law.strength, kin, s)
+    tension = intact_pressure(law, j, m) < 0
+    energy = shear + choose(tension, compression_energy(law.eos, j, m.energy), real(0, j))
+    return (integrity(damage, m.damage) - integrity(damage, broken)) * energy
