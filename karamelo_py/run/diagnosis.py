@@ -44,7 +44,7 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> tuple[str, str]:
 
 
 def stop(
-    hub: Hub, simulation: Simulation, status: int, snapshot: list, place: Place | None
+    hub: Hub, simulation: Simulation, status: int, snapshot: dict, place: Place | None
 ) -> NoReturn:
     """Return to the last good state, write it, and raise what the user should know."""
     step = simulation.step

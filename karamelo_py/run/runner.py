@@ -73,7 +73,7 @@ class Runner:
         self.until = until
         self.halve = halve
         self.halvings = 0
-        self.snapshot: list[tuple[np.ndarray, np.ndarray]] = []  # of the last good state
+        self.snapshot: dict[str, np.ndarray] = {}  # of the last good state
         self.kept = -1  # its step
         self.place = hub.place
         self.spent = {"compilation": 0.0, "steps": 0.0, "output": 0.0}
@@ -117,15 +117,14 @@ class Runner:
         self.hub.runs.append(after)
 
     @property
-    def good(self) -> tuple[int, list[np.ndarray]] | None:
+    def good(self) -> tuple[int, dict[str, np.ndarray]] | None:
         """The last good state, for files: a run that goes on from one may go back to it."""
-        return (self.kept, [copy for _, copy in self.snapshot]) if self.halve else None
+        return (self.kept, self.snapshot) if self.halve else None
 
     @good.setter
-    def good(self, state: tuple[int, list[np.ndarray]] | None) -> None:
+    def good(self, state: tuple[int, dict[str, np.ndarray]] | None) -> None:
         if state is not None and state[1]:
-            self.kept, copies = state
-            self.snapshot = self.hub.simulation.snapshot_from(copies)
+            self.kept, self.snapshot = state
 
     def _keep(self, simulation: Simulation) -> None:
         self.snapshot, self.kept = simulation.snapshot(), simulation.step

@@ -19,7 +19,6 @@ from karamelo_py.kernels.arrays import (
     TIMESTEP,
     Hooks,
     NoHooks,
-    arrays_of,
 )
 from karamelo_py.kernels.export import impose_stress
 from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, show_heat
@@ -56,6 +55,7 @@ from karamelo_py.run.lowering import (
     thread_count,
 )
 from karamelo_py.run.stable import ruling_limit, shares_of_limits
+from karamelo_py.run.state import changing
 from karamelo_py.run.trial import try_parts
 from karamelo_py.run.watch import unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
@@ -574,33 +574,12 @@ class Simulation:
 
     # --- state that can be returned to --------------------------------------------------------
 
-    def snapshot(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Every array that a step changes, with a copy."""
-        s = self.setup
-        tiles = [int(block.tiling.colour[-1]) for block in s.blocks]
-        return [(array, array.copy()) for array in self._changing(s.spans, tiles)]
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Copies of every array that a step changes, and of the published values."""
+        copies = {name: array.copy() for name, array in changing(self)}
+        return copies | {"values": self.setup.control.values.copy()}
 
-    def snapshot_from(self, copies: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-        """A snapshot again from its copies, which a file held."""
-        at, tiles = 3, []
-        for block in self.setup.blocks:
-            at += len(list(arrays_of(block.points)))
-            tiles.append(int(copies[at][-1]))
-            at += 3
-        return list(zip(self._changing(copies[2], tiles), copies, strict=True))
-
-    def _changing(self, spans: np.ndarray, tiles: list[int]) -> list[np.ndarray]:
-        """Every array that a step changes, where so many nodes and tiles are in use."""
-        s = self.setup
-        count = 1 + int(spans[0, 0])
-        arrays = [s.control.values, s.control.clock, s.spans[:count]]
-        for block, used in zip(s.blocks, tiles, strict=True):
-            tiling = block.tiling
-            arrays += [array for _, array in arrays_of(block.points)]
-            arrays += [tiling.colour, tiling.range[:used], tiling.grid[:used]]
-        return [*arrays, *self.hub.update.method.remembered(s.contact, spans[1:count])]
-
-    def restore(self, snapshot: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot."""
         s = self.setup
         # Nodes that were not in use then have to be empty, as they were.
@@ -611,8 +590,9 @@ class Simulation:
                 one.array[begin:end] = 0
             if isinstance(s.heat, Conducting):
                 s.heat.nodes.sums[begin:end] = 0
-        for array, copy in snapshot:
-            array[...] = copy
+        for name, array in changing(self, snapshot):
+            array[...] = snapshot[name]
+        s.control.values[:] = snapshot["values"]
         for marks in self.hub.update.method.remembered(s.contact, spans):
             marks[np.abs(marks) > self.step] = 0
         self.version += 1

@@ -1,4 +1,4 @@
-"""All arrays of a simulation that a step changes, by name: to be written, and to go on from."""
+"""All arrays of a simulation that a step changes, by name: to return to, to write, to read."""
 
 from __future__ import annotations
 
@@ -15,25 +15,40 @@ from karamelo_py.script.errors import ScriptError
 SHOWN = ("measured", "mapped", "followed", "told_of_growth")
 
 
-def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
-    """Views and copies of them; of nodes, the rows of those that are in use."""
+def changing(
+    simulation: Any, copies: Mapping[str, np.ndarray] | None = None
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Every array that a step changes and the next one needs, as far as it is in use.
+
+    With `copies` of them, as far as it was in use when these were made.
+    """
     s = simulation.setup
-    spans = _used(s.spans)
-    found = {
+    used = _used(s.spans) if copies is None else copies["spans"]
+    yield "clock", s.control.clock
+    yield "spans", s.spans[: len(used)]
+    for k, block in enumerate(s.blocks):
+        for name, array in arrays_of(block.points):
+            yield f"points/{k}/{name}", array
+        tiling = block.tiling
+        colour = tiling.colour if copies is None else copies[f"tiling/{k}/colour"]
+        yield f"tiling/{k}/colour", tiling.colour
+        yield f"tiling/{k}/range", tiling.range[: colour[-1]]
+        yield f"tiling/{k}/grid", tiling.grid[: colour[-1]]
+    for k, rows in enumerate(_remembered(simulation, used)):
+        yield f"contact/{k}", rows
+
+
+def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
+    """Views and copies of them, and of what else a file holds; of nodes, the rows in use."""
+    s = simulation.setup
+    found = dict(changing(simulation)) | {
         "clock": s.control.clock.view(np.ndarray),
         "present": simulation.present,
-        "spans": spans,
         "tile size": np.array([simulation.tiles.size]),
         "shown": np.array([getattr(simulation, name) for name in SHOWN]),
     }
-    for k, block in enumerate(s.blocks):
-        found |= {f"points/{k}/{name}": array for name, array in arrays_of(block.points)}
-        found |= {f"tiling/{k}/{name}": array for name, array in _tiles_in_use(block.tiling)}
-    nodes = _numbers(spans)
-    found |= {name: array[nodes] for name, array in _of_nodes(s)}
-    for k, rows in enumerate(_remembered(simulation, spans)):
-        found[f"contact/{k}"] = rows
-    return found
+    nodes = _numbers(found["spans"])
+    return found | {name: array[nodes] for name, array in _of_nodes(s)}
 
 
 def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
@@ -91,13 +106,6 @@ def _of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
             yield f"{kind}/{name}", getattr(nodes, name)
         for one in nodes.fields:
             yield f"{kind}/{name_of(type(one))}", one.array
-
-
-def _tiles_in_use(tiling: Tiling) -> Iterator[tuple[str, np.ndarray]]:
-    used = tiling.colour[-1]
-    yield "colour", tiling.colour
-    yield "range", tiling.range[:used]
-    yield "grid", tiling.grid[:used]
 
 
 def _tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:

@@ -62,7 +62,7 @@ def leaving(simulation: Any) -> np.ndarray:
     return np.sort(np.concatenate(found))
 
 
-def delete_leaving(hub: Scene, simulation: Any, snapshot: list) -> bool:
+def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
     """Take out of a step that went wrong the points that leave in it, if the scene says so.
 
     The run is then where it was before that step. Which points leave depends on the state alone,
