@@ -80,7 +80,7 @@ class Pair(NamedTuple):
 
 
 @subkernel
-def _held(contact, n, k):
+def _immovable(contact, n, k):
     """Whether contact cannot move a node in direction k."""
     return contact.prescribed[n, k] != 0 or contact.rigid[n // contact.stride]
 
@@ -101,8 +101,8 @@ def _shares(contact, d, nodes, n, m):
     for k in range(d):
         of_n += normal[n, k] * normal[n, k]
         of_m += normal[m, k] * normal[m, k]
-        prescribed_n = prescribed_n or _held(contact, n, k)
-        prescribed_m = prescribed_m or _held(contact, m, k)
+        prescribed_n = prescribed_n or _immovable(contact, n, k)
+        prescribed_m = prescribed_m or _immovable(contact, m, k)
     if not of_n + of_m > 0:
         return 0.0, 0.0
     if prescribed_n != prescribed_m and (of_n if prescribed_n else of_m) > 0:
@@ -121,8 +121,8 @@ def _pair(contact, d, nodes, n, m):
 @subkernel
 def _yielding(contact, pair, k):
     """Change of the relative velocity with an impulse along direction k."""
-    of_n = 0.0 if _held(contact, pair.n, k) else pair.per_a
-    of_m = 0.0 if _held(contact, pair.m, k) else pair.per_b
+    of_n = 0.0 if _immovable(contact, pair.n, k) else pair.per_a
+    of_m = 0.0 if _immovable(contact, pair.m, k) else pair.per_b
     return of_n + of_m
 
 
@@ -208,7 +208,7 @@ def _excess(contact, d, nodes, pair, where):
 def _take(contact, control, a, i, n, k, impulse, per_mass, x):
     """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
-    if not _held(contact, n, k):
+    if not _immovable(contact, n, k):
         contact.change[i, k] += impulse * per_mass
     force = impulse / control.clock[0].kick
     values = control.values
@@ -434,9 +434,9 @@ def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
         impulse = push * _outward(nodes, pair, k)
         if sticks:
             impulse = share * (v[pair.n, k] - v[pair.m, k]) / yielding
-        if not _held(contact, pair.n, k):
+        if not _immovable(contact, pair.n, k):
             contact.change[i, k] -= impulse * pair.per_a
-        if not _held(contact, pair.m, k):
+        if not _immovable(contact, pair.m, k):
             contact.change[j, k] += impulse * pair.per_b
 
 

@@ -241,7 +241,7 @@ def _giving_base(s: Foreseen) -> Iterator[Failure]:
     if not wide or not s.method.fields_per_solid or len(s.hub.solids) < 2:
         return
     for fix in s.hub.fixes.values():
-        if not fix.holds_nodes or None in fix.formulas or fix.group.all:
+        if not fix.prescribes_velocity or None in fix.formulas or fix.group.all:
             continue
         for k, solid in enumerate(s.hub.solids.values()):
             lattice = s.hub.lattices[s.method.lattice_of(s.hub, solid)]

@@ -201,7 +201,7 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
             and not any(_depends(act[axis], AXES[k]) for axis in rest if axis < len(act))
             for act in _acts(hub)
         )  # fmt: skip
-        layers = _layers(hub, k, rest) if still and _held(hub, k) else 0
+        layers = _layers(hub, k, rest) if still and _faces_prescribed(hub, k) else 0
         if layers:
             given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             kept = " and ".join(AXES[axis] for axis in rest)
@@ -229,12 +229,12 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
     return most
 
 
-def _held(hub: Hub, k: int) -> bool:
-    """Whether the nodes at both faces across direction k are held in it."""
+def _faces_prescribed(hub: Hub, k: int) -> bool:
+    """Whether the velocity of the nodes at both faces across direction k is prescribed in it."""
     lattice = hub.lattices[0]
     found = []
     for fix in hub.fixes.values():
-        if fix.holds_nodes and len(fix.formulas) > k and _is_zero(fix.formulas[k]):
+        if fix.prescribes_velocity and len(fix.formulas) > k and _is_zero(fix.formulas[k]):
             if fix.formulas[k] is None:
                 continue
             if fix.group.all:

@@ -60,12 +60,12 @@ class Fix:
         are then called for some points after the others, whose fields need no copies.
     for_method
         Whether it has no hooks because the method reads it.
-    holds_nodes
+    prescribes_velocity
         Whether it prescribes velocities of the nodes of its group in ``post_update_grid_state``,
         in the directions in which it has a formula: contact does not move them.
     wall_friction
-        Formula of the coefficient of friction along the wall that a fix makes which holds nodes, in
-        the directions in which it has no formula; None for walls without.
+        Formula of the coefficient of friction along the wall that a fix makes which prescribes
+        velocities, in the directions in which it has no formula; None for walls without.
     point_fields
         The fields of points that it declares (:mod:`karamelo_py.compiler.fields`); `Force` if it
         sets forces on points in ``initial_integrate``.
@@ -91,7 +91,7 @@ class Fix:
     first_step_only = False
     point_by_point = False
     for_method = False
-    holds_nodes = False
+    prescribes_velocity = False
     wall_friction: Any = None
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()

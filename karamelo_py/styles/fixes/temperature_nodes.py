@@ -14,7 +14,7 @@ def prescribe(capacity, T, T_star, flow, value, before, dt, share):
     return T, value, flow, capacity * (value - T_star) / dt
 
 
-def hold(capacity, T, T_star, flow, value, before, dt, share):
+def prescribe_mapped(capacity, T, T_star, flow, value, before, dt, share):
     """The temperature whose gradient makes heat flow is the value."""
     return value, value, flow, 0.0
 
@@ -43,7 +43,7 @@ class TemperatureNodes(HeatFix):
     temperature_particles, heat_flux_particles, convection_particles, method
     """
 
-    post_heat_to_grid = node_hook(hold, publishes=False)
+    post_heat_to_grid = node_hook(prescribe_mapped, publishes=False)
     post_update_grid_heat = node_hook(prescribe)
 
     def __init__(self, hub: Hub, group: NodeGroup, T: Expression):

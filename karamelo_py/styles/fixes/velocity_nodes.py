@@ -21,7 +21,7 @@ def prescribe(mass, v, v_star, force, value, before, dt, share):
     return before, value, force, mass * (value - v_star) / dt
 
 
-def hold(mass, v, v_star, force, value, before, dt, share):
+def prescribe_mapped(mass, v, v_star, force, value, before, dt, share):
     """The re-mapped velocity is the value now."""
     return value, value, force, 0.0
 
@@ -32,7 +32,7 @@ def prescribe_at_most(mass, v, v_star, force, value, before, dt, share):
     return v, allowed, force, mass * (allowed - v_star) / dt
 
 
-def hold_at_most(mass, v, v_star, force, value, before, dt, share):
+def prescribe_mapped_at_most(mass, v, v_star, force, value, before, dt, share):
     """Nor is the re-mapped velocity."""
     allowed = min(v, value)
     return allowed, allowed, force, 0.0
@@ -44,7 +44,7 @@ def prescribe_at_least(mass, v, v_star, force, value, before, dt, share):
     return v, allowed, force, mass * (allowed - v_star) / dt
 
 
-def hold_at_least(mass, v, v_star, force, value, before, dt, share):
+def prescribe_mapped_at_least(mass, v, v_star, force, value, before, dt, share):
     """Nor is the re-mapped velocity."""
     allowed = max(v, value)
     return allowed, allowed, force, 0.0
@@ -110,10 +110,10 @@ class VelocityNodes(Fix):
 
     syntax = "group, vx[, vy[, vz]][, mu=mu]"
     published = ("x", "y", "z")
-    holds_nodes = True
+    prescribes_velocity = True
 
     post_update_grid_state = node_hook(prescribe, uses_before=True)
-    post_velocities_to_grid = node_hook(hold, publishes=False)
+    post_velocities_to_grid = node_hook(prescribe_mapped, publishes=False)
 
     def __init__(
         self,
@@ -141,12 +141,12 @@ class VelocityNodes(Fix):
         if self.bound:
             most = self.bound == "leq"
             # Contact may move these nodes: they are held only as far as they come.
-            self.holds_nodes = False
+            self.prescribes_velocity = False
             self.post_update_grid_state = node_hook(
                 prescribe_at_most if most else prescribe_at_least
             )
             self.post_velocities_to_grid = node_hook(
-                hold_at_most if most else hold_at_least, publishes=False
+                prescribe_mapped_at_most if most else prescribe_mapped_at_least, publishes=False
             )
 
     def _one_bound(self) -> str:

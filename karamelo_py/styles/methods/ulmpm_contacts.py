@@ -178,13 +178,13 @@ class ULMPMContacts(Method):
                 yield (of[first.index], of[second.index]), fix
 
     def _prescribe(self, hub: Hub, prescribed: np.ndarray) -> None:
-        """Note which nodes fixes hold, and where the reaction of each is published."""
-        holding = [fix for fix in hub.fixes.values() if fix.holds_nodes]
+        """Note the nodes whose velocity fixes prescribe, and where each reaction is published."""
+        fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
         # Pages that nothing is written to cost no memory.
         if self._prescribed is prescribed:
             prescribed[:] = 0
-        self._prescribed = prescribed if holding else None
-        for fix in holding:
+        self._prescribed = prescribed if fixes else None
+        for fix in fixes:
             nodes = slice(None) if fix.group.all else fix.group.nodes
             for k, formula in enumerate(fix.formulas):
                 if formula is not None:
