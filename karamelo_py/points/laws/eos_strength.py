@@ -14,7 +14,7 @@ from math import log, sqrt
 from typing import Any, ClassVar, NamedTuple
 
 from karamelo_py.compiler.compile import choose, point_function, real, shared
-from karamelo_py.compiler.tuples import either, following, increased, leading, plus, scale
+from karamelo_py.compiler.tuples import added, either, following, increased, leading, plus, scale
 from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.kinematics import (
@@ -48,6 +48,7 @@ from karamelo_py.points.laws import (
     shown,
     specific_volume,
     temperature,
+    warmed,
     wave_speed_squared,
     with_stress,
     with_temperature,
@@ -61,6 +62,7 @@ from karamelo_py.points.laws.eos import (
     initial_energy,
     pressure,
     stored_heat,
+    taken_heat,
 )
 from karamelo_py.points.laws.further import (
     chained,
@@ -532,6 +534,16 @@ def _(law, kin, state, T):
 @heat_capacity.on(EosStrength)
 def _(law, like):
     return heat_capacity(law.temperature, like)
+
+
+@warmed.on(EosStrength)
+def _(law, kin, state, heat):
+    m = memory_of(law, kin, state)
+    taken = taken_heat(law.eos, m.energy, heat)
+    energy = added(m.energy, taken)
+    loss = added(m.loss, taken)
+    now = Memory(energy, m.viscous, m.damage, m.heat, loss, m.strength, m.further)
+    return state_of(state[0], leading_symmetric(kin, state[1:]), now)
 
 
 @conductivity.on(EosStrength)
