@@ -153,6 +153,12 @@ def increased(present, change):
 
 
 @shared
+def added(present, change):
+    """(present[0] + change[0],), or `present` where one of both is empty."""
+    return (present[0] + change[0],) if len(present) and len(change) else present
+
+
+@shared
 def either(first, second):
     """`first`, or `second` where `first` is empty."""
     return first if len(first) else second

@@ -201,6 +201,7 @@ CLOCK = np.dtype(
         ("work", np.float64),  # of the fixes so far
         ("kinetic", np.float64),  # sums over the points
         ("stored", np.float64),  # with what is dissipated
+        ("born_with", np.float64),  # internal energy of gases before any work
         ("stored_before", np.float64),  # one step earlier
         ("stored_at", np.int64),  # the step of that
         ("looks", np.int64),  # number of looks at the balance

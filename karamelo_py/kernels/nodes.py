@@ -8,9 +8,10 @@ from numba import types
 
 from karamelo_py.compiler.compile import by_type, point_function, real, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.tuples import clear_optional
+from karamelo_py.compiler.tuples import clear_first, clear_optional
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.g2p import NodalMean, NodalStress
+from karamelo_py.kernels.loss import Lost, keep_loss
 from karamelo_py.kernels.p2g import Centre, Led, Normal, SeenMass
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
@@ -60,6 +61,12 @@ class ExtendSeries(NamedTuple):
     factor: float
 
     goes_through = ("sums", "series", "series", "update", "update")
+
+
+class KeepLoss(NamedTuple):
+    """What a node does not keep of the kinetic energy that it was brought."""
+
+    goes_through = ("sums", "lost", "lost")
 
 
 class Update(NamedTuple):
@@ -118,6 +125,12 @@ def _(task, kin, nodes, n, dt):
     clear_optional(field(nodes.fields, NodalStress), n)
     clear_optional(field(nodes.fields, Led), n)
     clear_optional(field(nodes.fields, Centre), n)
+    clear_first(field(nodes.fields, Lost), n)
+
+
+@at_node.on(KeepLoss)
+def _(task, kin, nodes, n, dt):
+    keep_loss(field(nodes.fields, Lost), kin, nodes.sums, n)
 
 
 @at_node.on(ClearVelocity)

@@ -22,6 +22,7 @@ from karamelo_py.kernels.g2p import (
     VolumeRatio,
     zero_vector,
 )
+from karamelo_py.kernels.loss import Lost, bring_energy
 from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, Updated, add_force, force_stress
@@ -206,6 +207,7 @@ def _(quantity, w, stencil, k, load):
     mass, v, moment, led, x = load
     part = momentum_part(w, stencil, k, weight, mass, v, moment)
     accumulate(w.nodes.sums, i, MASS, (weight * mass,) + part)
+    bring_energy(field(w.nodes.fields, Lost), i, weight * mass, part)
     accumulate_led(field(w.nodes.fields, Led), i, weight, led, v)
     accumulate_optional(field(w.nodes.fields, Centre), i, scale(weight * mass, x))
     accumulate_optional(field(w.nodes.fields, Normal), i, scale(mass, leading(gradient, v)))

@@ -43,11 +43,13 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.g2p import STRAINS, AverageStress, FBar, Move, SeriesTerm, TrialStrain
 from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks
+from karamelo_py.kernels.loss import Lost
 from karamelo_py.kernels.nodes import (
     ClearMean,
     ClearSums,
     ClearVelocity,
     ExtendSeries,
+    KeepLoss,
     MomentumToVelocity,
     StartSeries,
     SumsToVelocity,
@@ -436,6 +438,13 @@ def _(averaging, s, mode):
 
 
 @shared
+def sum_loss(lost, s, mode):
+    """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
+    if lost is not None:
+        sweep_nodes(mode, KeepLoss(), s.kin, s.nodes, s.spans, step_size(s))
+
+
+@shared
 def light_node(s):
     """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of a point that the node sees.
 
@@ -465,6 +474,14 @@ HEAT = _call(
         None
         if isinstance(s.heat, Insulated)
         else "heat to the nodes, its flow, temperature of the points"
+    ),
+)
+LOSS = _call(
+    "sum_loss(field(s.nodes.fields, Lost), s, mode)",
+    lambda s: (
+        None
+        if field(s.nodes.fields, Lost) is None
+        else "kinetic energy that the nodes do not keep, as heat to the points"
     ),
 )
 AVERAGED = _call(
@@ -497,6 +514,7 @@ VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.Nodes(SumsToVelocity()))
 FORCE = table.Scatter((InternalForce(),), OldWeights())
 # v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
 ACCELERATE = (
+    LOSS,
     AVERAGED,
     HEAT,
     table.AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS),

@@ -29,6 +29,7 @@ LOOKS = 10  # looks that are averaged, in a window of 100 steps
 GROWTH = 0.01  # of the largest energy so far, in a window: more is told
 BOUND = 10.0  # times the energy that there was and that loads have brought: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
+COARSE = 1000.0  # round-off errors: a strain of so many is noise, too
 HEAT_NOISE = 1e-3  # of a temperature: what does not count where all are alike
 OVERSHOOT = 1.0  # of the range of temperatures that sources allow: more stops the run
 
@@ -65,7 +66,7 @@ def sum_energies(s):
     """Kinetic, and stored plus dissipated energy of all points, into the clock."""
     clock = s.control.clock[0]
     clock.kinetic = 0.0
-    clock.stored = 0.0
+    clock.stored = clock.born_with
     _sum_blocks(s)
 
 

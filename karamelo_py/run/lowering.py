@@ -28,6 +28,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.g2p import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
+from karamelo_py.kernels.loss import Lost
 from karamelo_py.kernels.step import Insulated
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried, deformed
@@ -43,8 +44,10 @@ from karamelo_py.points.laws import (
     specific_volume,
     with_temperature,
 )
+from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.points.transfers import lost_shares
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
@@ -200,6 +203,8 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         for kind in fields.declared(owners, "node_fields")
         if getattr(kind, "needed", lambda basis: True)(basis)
     ]
+    if returns_loss(hub):
+        at_nodes.append(Lost)
     setup = Setup(
         frame=method.frame,
         kin=kin,
@@ -217,6 +222,17 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         control=control,
     )
     return setup, tiles
+
+
+def returns_loss(hub: Hub) -> bool:
+    """Whether kinetic energy that the transfer takes heats points of the scene.
+
+    FLIP with a share of 1 takes none that does not vanish with the step.
+    """
+    transfer = hub.update.transfer
+    if not lost_shares.defined(type(transfer)) or getattr(transfer, "alpha", 0) == 1:
+        return False
+    return any(can(solid.material.law, taken_heat) for solid in hub.solids.values())
 
 
 def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> Nodes:

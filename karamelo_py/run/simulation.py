@@ -42,7 +42,7 @@ from karamelo_py.kernels.step import (
     sweep,
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, Visit, sweep_nodes
-from karamelo_py.kernels.watch import ROUND_OFF, begin_to_look, measure_heat
+from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat
 from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, law_kind, with_stress
 from karamelo_py.points.laws.plastic_rate import without_rate
@@ -57,7 +57,7 @@ from karamelo_py.run.lowering import (
 from karamelo_py.run.stable import ruling_limit, shares_of_limits
 from karamelo_py.run.state import changing
 from karamelo_py.run.trial import try_parts
-from karamelo_py.run.watch import unknown_heat, unknown_work
+from karamelo_py.run.watch import internal_energy, unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
 from karamelo_py.script.errors import ScriptError
@@ -398,7 +398,9 @@ class Simulation:
             self.told_of_growth = False
         if clock.watch_energy:
             mass = sum(float(block.points.mass.sum()) for block in s.blocks)
-            clock.energy_floor = ROUND_OFF * mass * float(clock.rate) ** 2
+            strain = COARSE * float(np.finfo(s.nodes.sums.dtype).eps)
+            clock.energy_floor = max(ROUND_OFF, strain**2) * mass * float(clock.rate) ** 2
+            clock.born_with = internal_energy(s.blocks)
             # Velocities belong to half a step before, stresses to the share strained before.
             level = 0.5 + getattr(self.hub.update.scheme, "strained_before", 0.0)
             begin_to_look(s, level, anew)

@@ -196,6 +196,16 @@ def _(law, like):
 
 
 @point_function()
+def warmed(law, kin, state, heat):
+    """The state with `heat` more of internal energy, per reference volume, where there is any."""
+
+
+@warmed.otherwise
+def _(law, kin, state, heat):
+    return state
+
+
+@point_function()
 def conductivity(law, like):
     """Heat flux per gradient of temperature; 0 of laws without temperature."""
 

@@ -14,7 +14,7 @@ from math import log
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import choose, real
-from karamelo_py.compiler.tuples import increased, plus
+from karamelo_py.compiler.tuples import added, increased, plus
 from karamelo_py.points.kinematics import (
     add_pressure,
     deviator,
@@ -44,6 +44,7 @@ from karamelo_py.points.laws import (
     shown,
     specific_volume,
     temperature,
+    warmed,
     wave_speed_squared,
     with_stress,
     with_temperature,
@@ -70,6 +71,7 @@ from karamelo_py.points.laws.eos import (
     compression_energy,
     initial_energy,
     stored_heat,
+    taken_heat,
 )
 from karamelo_py.points.laws.further import (
     chained,
@@ -318,6 +320,16 @@ def _(law, kin, state, T):
 @heat_capacity.on(EosStrength)
 def _(law, like):
     return heat_capacity(law.temperature, like)
+
+
+@warmed.on(EosStrength)
+def _(law, kin, state, heat):
+    m = memory_of(law, kin, state)
+    taken = taken_heat(law.eos, m.energy, heat)
+    energy = added(m.energy, taken)
+    loss = added(m.loss, taken)
+    now = Memory(energy, m.viscous, m.damage, m.heat, loss, m.strength, m.further)
+    return state_of(state[0], leading_symmetric(kin, state[1:]), now)
 
 
 @conductivity.on(EosStrength)

@@ -21,7 +21,7 @@ What else is not defined for a class is that of PIC: nothing is kept, v alone is
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.compile import point_function, real
 from karamelo_py.compiler.fields import planar
 from karamelo_py.compiler.tuples import add_scaled
 
@@ -39,8 +39,21 @@ def updated_velocity(transfer, v, v_pic, dv):
     """The point's velocity after the step."""
 
 
+@point_function()
+def lost_shares(transfer, like):
+    """How much of the kinetic energy is lost that mapping to the nodes, and back, takes.
+
+    Two numbers. What is not lost comes back with what the points keep. Left out where nobody knows:
+    the energy then goes without trace.
+    """
+
+
 def take_nodal_velocity(transfer: type) -> None:
     """Let the points of `transfer` take the velocity of the nodes after the step, as PIC's do."""
+
+    @lost_shares.on(transfer)
+    def _(transfer, like):
+        return real(1, like), real(1, like)
 
     @updated_velocity.on(transfer)
     def _(transfer, v, v_pic, dv):

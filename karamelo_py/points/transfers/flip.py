@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.tuples import add, add_scaled, scale
 from karamelo_py.language.kinds import Constraint
-from karamelo_py.points.transfers import updated_velocity
+from karamelo_py.points.transfers import lost_shares, updated_velocity
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
 
@@ -53,3 +53,10 @@ def blended(transfer: type) -> None:
 
 
 blended(FLIP)
+
+
+# With P = S S+ from points to points, v becomes alpha v + (1 - alpha) P v + S dv.
+@lost_shares.on(FLIP)
+def _(transfer, like):
+    pic = real(1, like) - transfer.alpha
+    return pic * (real(1, like) + transfer.alpha), pic * pic

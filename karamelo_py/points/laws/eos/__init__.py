@@ -34,6 +34,16 @@ def _(eos, memory, before, j, heating):
 
 
 @point_function()
+def taken_heat(eos, memory, heat):
+    """(heat,) that internal energy in the memory takes of `heat`; () where there is none."""
+
+
+@taken_heat.otherwise
+def _(eos, memory, heat):
+    return ()
+
+
+@point_function()
 def stored_heat(eos, loss):
     """How much of the dissipated energy is in the memory and so in `compression_energy`."""
 

@@ -15,6 +15,7 @@ from karamelo_py.points.laws.eos import (
     initial_energy,
     pressure,
     stored_heat,
+    taken_heat,
 )
 from karamelo_py.points.laws.viscosity.artificial import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
@@ -43,8 +44,9 @@ class IdealGas(NamedTuple):
     Notes
     -----
     p = (gamma - 1) rho e, and de = -p dv with the volume v per mass: along an adiabat e grows as
-    rho^(gamma - 1), which each step follows exactly. Viscous work heats the gas. Where there are
-    shocks, Q1 = 2 and Q2 = 0.2 are usual.
+    rho^(gamma - 1), which each step follows exactly. Viscous work heats the gas, and so does the
+    kinetic energy that PIC, FLIP, APIC, MLS and TPIC take. Where there are shocks, Q1 = 2 and
+    Q2 = 0.2 are usual.
 
     The gas presses on what is around it from the first step: a free surface expands. Fix
     initial_stress sets the pressure by the energy, and leaves the volume.
@@ -98,6 +100,12 @@ def _(eos, like):
 def _(eos, memory, before, j, heating):
     # dE = -p dJ has the solution E J^(gamma - 1) = const, whatever the size of the step.
     return (memory[0] * power(before / j, eos.gamma - real(1, j)) + heating,)
+
+
+@taken_heat.on(IdealGas)
+def _(eos, memory, heat):
+    # A moment may hold a little more than there was: a cold gas does not pay all of that at once.
+    return (max(heat, real(-0.1, heat) * memory[0]),)
 
 
 @stored_heat.on(IdealGas)
