@@ -156,7 +156,10 @@ def add_parser(subparsers: Any) -> None:
     add_family(parser)
     add_combinations(parser)
     parser.add_argument(
-        "-accuracy", required=True, metavar="COLUMN", help="log column: err, max:err"
+        "-accuracy",
+        required=True,
+        metavar="COLUMN",
+        help="log column: err, max:err, or a formula: off=abs(max:u/3.28 - 1)",
     )
     parser.add_argument("-target", required=True, type=seconds, help="the error that is allowed")
     parser.add_argument("-cost", default="seconds", help="what counts as cost (seconds)")
@@ -171,7 +174,7 @@ def run(options: Any) -> int:
     out = out_file(options.o, ".csv")
     timed = options.cost in ("seconds", "wall_s", "particle_steps_per_s")
     values, launch, jobs = family(options, timed=timed)
-    items = records.recorded(options.accuracy, logged(options.script), options.script)
+    items = records.recorded(options.accuracy, logged(options.script), options.script, values)
     if len(items) != 1:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     if options.cost not in records.COLUMNS:
@@ -193,7 +196,7 @@ def run(options: Any) -> int:
     study = Study(launch, out.with_suffix(""), items, jobs, again=options.again)
     study.names = list(values)
     records.describe(
-        out, script=str(options.script), variables=values, record=[items[0].word], timed=timed,
+        out, script=str(options.script), variables=values, record=[items[0].text], timed=timed,
         repeat=1, threads=launch.threads, jobs=jobs,
     )  # fmt: skip
     study.on_row = lambda: records.write(out, list(study.rows.values()))

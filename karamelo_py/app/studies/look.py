@@ -39,6 +39,8 @@ FAMILIES = (
 )
 LABELS = {
     "seconds": "time of the stepping loop (s)",
+    "cpu_seconds": "processor time of the stepping loop (s)",
+    "particle_steps": "steps times points",
     "wall_s": "time of the process (s)",
     "peak_memory_mib": "peak memory (MiB)",
     "bytes_per_particle": "bytes per particle",
