@@ -135,6 +135,9 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
     import shlex
 
     from karamelo_py.app.cli import ELSEWHERE
+    from karamelo_py.app.studies.options import zipped
+    from karamelo_py.app.studies.records import recorded
+    from karamelo_py.app.studies.variables import cases, check_script, choices, logged
 
     entries, inputs = atlas.read(ROOT / "docs" / "atlas.toml")
     assert len({entry.name for entry in entries}) == len(entries)
@@ -148,6 +151,11 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
                 options = parser.parse_args(shlex.split(line))
                 script = getattr(options, "script", None)
                 assert script is None or script.is_file(), line
+                if line.startswith("sweep"):
+                    values = choices(options.var, {n for g in zipped(options) for n in g})
+                    check_script(script, values)
+                    assert cases(values, zipped(options), options.where)
+                    recorded(options.record, logged(script), script, values)
 
 
 def test_curves_of_a_sweep(folder, capsys):

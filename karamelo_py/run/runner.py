@@ -129,7 +129,7 @@ class Runner:
             self.snapshot = self.hub.simulation.snapshot_from(copies)
 
     def _keep(self, simulation: Simulation) -> None:
-        self.snapshot, self.kept = simulation.snapshot(), simulation.step
+        self.snapshot, self.kept = simulation.snapshot(self.snapshot), simulation.step
 
     @property
     def duration(self) -> float:

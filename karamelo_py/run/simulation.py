@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -574,11 +574,21 @@ class Simulation:
 
     # --- state that can be returned to --------------------------------------------------------
 
-    def snapshot(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Every array that a step changes, with a copy."""
+    def snapshot(
+        self, before: Sequence[tuple[np.ndarray, np.ndarray]] = ()
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Every array that a step changes, with a copy; the copies of the one `before` are lost."""
         s = self.setup
         tiles = [int(block.tiling.colour[-1]) for block in s.blocks]
-        return [(array, array.copy()) for array in self._changing(s.spans, tiles)]
+        room = {(array.shape, array.dtype.str, k): copy for k, (array, copy) in enumerate(before)}
+        found = []
+        for k, array in enumerate(self._changing(s.spans, tiles)):
+            copy = room.get((array.shape, array.dtype.str, k))
+            if copy is None:
+                copy = np.empty_like(array)
+            copy[...] = array
+            found.append((array, copy))
+        return found
 
     def snapshot_from(self, copies: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
         """A snapshot again from its copies, which a file held."""
