@@ -78,7 +78,8 @@ def run(options: Any) -> int:
         return keeps(options, rows, by or variables, variables)
     if options.curve:
         return curves(options, rows, by or variables, made)
-    family = Family(rows, variables, options.accuracy, options.cost, by, options.x)
+    said = made.get("record", ())
+    family = Family(rows, variables, options.accuracy, options.cost, by, options.x, said)
     if len(family.without) == len(rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
     out = out_file(options.o, *SUFFIXES) if options.o else None

@@ -61,26 +61,39 @@ def place(word: str, others: Sequence[str] = ()) -> int:
     return int(hashlib.sha256(word.encode()).hexdigest(), 16) % len(PALETTE)
 
 
-def style(choice: dict[str, str], values: dict[str, list[str]]) -> tuple[str, int, int]:
-    """Colour, number of the marker and number of the dashes of a line.
+def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
+    """Colour, number of the marker and number of the dashes of each line of a chart.
 
-    The first variable gives colour and marker, the second the dashes.
+    The first variable gives colour and marker, the others the dashes: those of their words, or the
+    next that no line of this colour has.
     """
-    names = list(choice)
+    names = list(choices[0]) if choices else []
     if not names:
-        return PALETTE[0], 0, 0
-    first = choice[names[0]]
-    k = place(first, values[names[0]])
-    colour = PALETTE[k]
-    if all(number(v) is not None for v in values[names[0]]) and len(values[names[0]]) > 1:
-        # Numbers are in order: dark to light.
-        from matplotlib import colormaps
-        from matplotlib.colors import to_hex
+        return [(PALETTE[0], 0, 0)] * len(choices)
+    values = {name: list(dict.fromkeys(choice[name] for choice in choices)) for name in names}
+    heads = values[names[0]]
+    numbers = len(heads) > 1 and all(number(v) is not None for v in heads)
+    taken: dict[str, dict[tuple, int]] = {}
+    found = []
+    for choice in choices:
+        head, *rest = (choice[name] for name in names)
+        k = place(head, heads)
+        colour = _in_order(head, heads) if numbers else PALETTE[k]
+        mine = taken.setdefault(head, {})
+        wanted = sum(place(v, values[n]) for n, v in zip(names[1:], rest, strict=True))
+        tries = [(wanted + j) % len(DASHES) for j in range(len(DASHES))]
+        free = [j for j in tries if j not in mine.values()]
+        found.append((colour, k, mine.setdefault(tuple(rest), (free or tries)[0])))
+    return found
 
-        ranked = sorted(values[names[0]], key=number)
-        colour = to_hex(colormaps["viridis"](0.85 * ranked.index(first) / (len(ranked) - 1)))
-    rest = [place(choice[n], values[n]) for n in names[1:]]
-    return colour, k, sum(rest) % len(DASHES)
+
+def _in_order(value: str, values: Sequence[str]) -> str:
+    """The colour of a number among others: dark to light."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    ranked = sorted(values, key=number)
+    return to_hex(colormaps["viridis"](0.85 * ranked.index(value) / (len(ranked) - 1)))
 
 
 def label(name: str) -> str:
