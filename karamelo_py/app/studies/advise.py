@@ -147,6 +147,11 @@ class Adviser:
                 return best
             self.go_on(min(doubtful, key=lambda c: c.cost).choice)
 
+    def hopeful(self) -> Candidate | None:
+        """The cheapest variant that may meet the target though none is expected to."""
+        found = [c for choice in self.choices for c in self.candidates(choice, hope=True)]
+        return min((c for c in found if c.forecast), key=lambda c: c.cost, default=None)
+
 
 def add_parser(subparsers: Any) -> None:
     """The subcommand for the command line."""
@@ -205,12 +210,11 @@ def run(options: Any) -> int:
     adviser.pilot(options.pilot)
     best = adviser.best()
     tell(adviser)
-    if best is None:
+    if best is not None:
+        advise(adviser, best, options.script)
+    elif not options.run:
         return _nothing(adviser)
-    advise(adviser, best, options.script)
-    if not options.run:
-        return 0
-    return carry_out(adviser, best, options.script)
+    return carry_out(adviser, best, options.script) if options.run else 0
 
 
 def coarse_first(
@@ -299,11 +303,22 @@ def _nothing(adviser: Adviser) -> int:
             f"nearest: {choice.label}, {adviser.name} = {row[adviser.name]} with {error:.3g}; "
             f"finer values of {adviser.name} or other choices may do"
         )
+    hope = adviser.hopeful()
+    if hope is not None:
+        print(
+            f"{hope.choice.label}, {adviser.name} = {adviser.values[hope.step]} may do, at about "
+            f"{adviser.cost} {hope.cost:.3g}: expected {hope.error:.3g}, at best "
+            f"{hope.forecast.low:.3g}; with -run it is tried"
+        )
     return 1
 
 
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
-    """Run what is advised; where it misses the target, go on with what is known then."""
+    """Run what is advised; where it misses the target, go on with what is known then.
+
+    Where nothing is expected to meet it, what may is tried.
+    """
+    best = best or adviser.hopeful()
     while best is not None and best.forecast is not None:
         advised = best.step == len(best.choice.rows)
         adviser.go_on(best.choice)
@@ -317,6 +332,7 @@ def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
         best = adviser.best()
         if best is not None and best.forecast is not None:
             advise(adviser, best, script)
+        best = best or adviser.hopeful()
     if best is None:
         return _nothing(adviser)
     row = best.choice.rows[best.step]
