@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
+import karamelo_py
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import atlas
 
@@ -68,6 +70,8 @@ def test_an_atlas_runs_its_commands_once_and_writes_a_page(folder, capsys):
     assert "$ karamelo-py chart runs.csv -curve err" in page
     assert "1/2" not in page
     assert str(folder) not in page
+    made = json.loads((place / "entry.json").read_text(encoding="utf-8"))
+    assert f"*karamelo-py {karamelo_py.__version__}, {made['processor']}, 2" in page
     assert (folder / "_static/atlas/laws/power/power.png").read_bytes()[1:4] == b"PNG"
     assert main(words) == 0
     assert "laws/power known" in capsys.readouterr().out

@@ -168,14 +168,13 @@ CASES = [
 ]  # fmt: skip
 
 
-def farthest(basis, which, ppc):
+def farthest(basis, ppc):
     """Beyond how many times the stable step all is lost.
 
-    2 by the limits of `SCRIPT`; smooth functions see less of the shortest waves, as do single
-    points with the mean of two strains.
+    2, as in `SCRIPT`, where nodes and points see all waves; splines and single points see less of
+    the shortest ones, and bear more in 1D (in the plane cubic splines 1.8 to 2.2).
     """
-    smooth = {"quadratic-spline": 2.5, "cubic-spline": 3.0}
-    return max(smooth.get(basis, 2.0), 2.5 if (which, ppc) == ("usavg", 1) else 2.0)
+    return {"quadratic-spline": 2.5, "cubic-spline": 3.0}.get(basis, 2.5 if ppc == 1 else 2.0)
 
 
 @pytest.mark.parametrize(("basis", "which", "body", "ppc"), parameters(*covering(CASES)))
@@ -185,11 +184,11 @@ def test_the_own_step_is_stable_and_not_far_from_the_edge(run_interpreted, basis
     options = [w for name, value in words.items() for w in ("-var", name, str(value))]
 
     own = run_interpreted(SHAKEN.format(step=""), *options, folder="own", status=None)
-    assert settled(own)
-    far = f"dt_factor({farthest(basis, which, ppc)})"
-    assert not settled(
-        run_interpreted(SHAKEN.format(step=far), *options, folder="far", status=None)
-    )
+    # What jumps at cell faces is told beforehand.
+    assert settled(own) or (drift and "points that cross cells" in own.err)
+    step = f"dt_factor({farthest(basis, ppc)})"
+    far = run_interpreted(SHAKEN.format(step=step), *options, folder="far", status=None)
+    assert not settled(far)
 
 
 def settled(result) -> bool:
