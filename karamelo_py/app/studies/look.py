@@ -112,13 +112,26 @@ def tick_text(a: float, _: Any = None) -> str:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Round numbers on a logarithmic axis: at 1, 2 and 5, at 1, or at every so many decades."""
+    """Round numbers on a logarithmic axis: at 1, 2 and 5, at 1, or at every so many decades.
+
+    At more leading digits where a short axis would have fewer than three.
+    """
     decades = log10(high / low)
-    leads = (1, 2, 5) if decades < 2.5 else (1,)
     every = 1 if decades < 9 else ceil(decades / 8)
     exponents = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)
-    ticks = [lead * 10.0**k for k in exponents if k % every == 0 for lead in leads]
-    return [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+    finest = [k / 20 for k in range(20, 200)]
+    for leads in (
+        (1,),
+        (1, 2, 5),
+        (1, 1.5, 2, 3, 4, 5, 6, 8),
+        [k / 5 for k in range(5, 50)],
+        finest,
+    ):
+        ticks = [lead * 10.0**k for k in exponents if k % every == 0 for lead in leads]
+        ticks = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+        if len(ticks) >= 3:
+            break
+    return ticks
 
 
 def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None = None) -> None:

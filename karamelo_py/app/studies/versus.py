@@ -130,7 +130,7 @@ def draw(
     right.barh(up, np.nan_to_num(ratios), height=0.55, color="0.7", zorder=2)
     for at, a in zip(up, ratios, strict=True):
         if np.isfinite(a):
-            right.text(a + 0.02, at, f"{a:.2f}", va="center", fontsize=8, zorder=4)
+            right.text(0.04, at, f"{a:.2f}", va="center", fontsize=8, zorder=4)
     right.axvline(1.0, color="0.3", linewidth=1, linestyle=look.DASHES[1], zorder=3)
     right.set_xlim(0, 1.15 * max(1.0, float(np.nanmax(ratios, initial=1.0))))
     left.set_yticks(up, [pair.label for pair in found])
