@@ -43,9 +43,9 @@ def _prepared(folder: Path, script: str | Path) -> Path:
     return path
 
 
-def _checked(result: Result, status: int) -> Result:
+def _checked(result: Result, status: int | None) -> Result:
     assert "Traceback" not in result.out + result.err
-    assert result.status == status, result.err
+    assert status is None or result.status == status, result.err
     return result
 
 
@@ -100,9 +100,14 @@ def _ask(process: subprocess.Popen, request: dict) -> dict:
 
 @pytest.fixture
 def run_interpreted(tmp_path, _interpreter) -> Callable[..., Result]:
-    """As `run_script`, but interpreted: for many kinds of tiny scenes, which need no compiling."""
+    """As `run_script`, but interpreted: for many kinds of tiny scenes, which need no compiling.
 
-    def run(script: str | Path, *options: str, status: int = 0, folder: str = "run") -> Result:
+    With ``status=None`` it may end as it likes.
+    """
+
+    def run(
+        script: str | Path, *options: str, status: int | None = 0, folder: str = "run"
+    ) -> Result:
         place = tmp_path / folder
         place.mkdir(exist_ok=True)
         arguments = [str(_prepared(place, script)), *options]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
+import karamelo_py
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import atlas
 
@@ -68,6 +70,8 @@ def test_an_atlas_runs_its_commands_once_and_writes_a_page(folder, capsys):
     assert "$ karamelo-py chart runs.csv -curve err" in page
     assert "1/2" not in page
     assert str(folder) not in page
+    made = json.loads((place / "entry.json").read_text(encoding="utf-8"))
+    assert f"*karamelo-py {karamelo_py.__version__}, {made['processor']}, 2" in page
     assert (folder / "_static/atlas/laws/power/power.png").read_bytes()[1:4] == b"PNG"
     assert main(words) == 0
     assert "laws/power known" in capsys.readouterr().out
@@ -135,6 +139,9 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
     import shlex
 
     from karamelo_py.app.cli import ELSEWHERE
+    from karamelo_py.app.studies.options import zipped
+    from karamelo_py.app.studies.records import recorded
+    from karamelo_py.app.studies.variables import cases, check_script, choices, logged
 
     entries, inputs = atlas.read(ROOT / "docs" / "atlas.toml")
     assert len({entry.name for entry in entries}) == len(entries)
@@ -148,6 +155,11 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
                 options = parser.parse_args(shlex.split(line))
                 script = getattr(options, "script", None)
                 assert script is None or script.is_file(), line
+                if line.startswith("sweep"):
+                    values = choices(options.var, {n for g in zipped(options) for n in g})
+                    check_script(script, values)
+                    assert cases(values, zipped(options), options.where)
+                    recorded(options.record, logged(script), script, values)
 
 
 def test_curves_of_a_sweep(folder, capsys):

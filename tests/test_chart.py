@@ -129,13 +129,24 @@ def test_pictures_are_written(table, suffix):
 
 
 def test_a_method_has_its_colour_in_every_chart():
-    alone = look.style({"basis": "cubic-spline"}, {"basis": ["cubic-spline"]})
-    among = look.style(
-        {"basis": "cubic-spline", "N": "3"}, {"basis": list(ORDERS), "N": ["3", "4"]}
-    )
-    assert alone[:2] == among[:2]
+    (alone,) = look.styles([{"basis": "cubic-spline"}])
+    among = look.styles([{"basis": basis, "N": N} for basis in ORDERS for N in "34"])
+    assert among[-1][:2] == among[-2][:2] == alone[:2] and among[-1] != among[-2]
     methods = {name: look.place(name) for name in look.FAMILIES[0]}
     assert len(set(methods.values())) == len(methods)
+
+
+def test_no_two_lines_look_alike():
+    """Of cpgimp and stretch the numbers add up to those of linear and mechanical."""
+    cantilevers = [
+        {"kind": "ulmpm", "basis": "linear", "domains": "mechanical"},
+        {"kind": "ulmpm", "basis": "cpgimp", "domains": "stretch"},
+        {"kind": "ulcpdi", "basis": "linear", "domains": "R4"},
+    ]
+    assert len(set(look.styles(cantilevers))) == 3
+    everything = [{"basis": b, "transfer": t} for b in look.FAMILIES[0] for t in look.FAMILIES[1]]
+    few = [choice for choice in everything if look.place(choice["transfer"]) < len(look.DASHES)]
+    assert len(set(look.styles(few))) == len(few)
 
 
 def test_round_ticks():

@@ -15,8 +15,10 @@ from conftest import INPUTS, ROOT
 
 from karamelo_py.app.cli import main
 from karamelo_py.compiler.fields import name_of
+from karamelo_py.compiler.fingerprint import classes_in, contents
 from karamelo_py.kernels.g2p import NodalMean
 from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.step import advance
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.report import bytes_per_point, node_fields, point_fields
@@ -119,6 +121,37 @@ def test_fields_come_with_what_needs_them(lowered, name):
 def test_only_what_averages_has_a_nodal_mean(lowered):
     kinds = [type(one) for one in lowered(plane()).simulation.setup.nodes.fields]
     assert NodalMean not in kinds
+
+
+IN_KERNEL = {
+    # what the scene has: kinematics, method, law, scheme
+    "PlaneStrain", "Grid", "Linear", "FLIP", "Updated", "Serial",
+    # that it has no more: heat, contact, fixes at every step, a frame that moves
+    "Insulated", "NoContact", "NoHooks", "FixedFrame",
+    # what is done at points and nodes in the two visits of musl, four points at once or one by one
+    "OldWeights", "PresentWeights", "Strain", "Move", "MassMomentum", "MomentumAgain",
+    "InternalForce", "Update", "MomentumToVelocity", "ClearSums", "ClearVelocity", "Fours",
+    "PointByPoint",
+}  # fmt: skip
+
+
+@pytest.mark.xdist_group("disks")
+def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script):
+    """All that was chosen by type while the steps of two elastic disks were compiled.
+
+    Nothing in it is of heat that flows, contact, damage, plastic flow or a third direction: what is
+    absent cannot branch.
+    """
+    text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
+    run_script(text.replace("run_time(3.5)", "run(2)"))
+    found = []
+    for arguments, compiled in advance.overloads.items():
+        classes = {one.__name__ for argument in arguments for one in classes_in(argument)}
+        kinds = {name for c in contents(compiled.library).choices for name in c.classes}
+        words = {name.rpartition(":")[2] for name in kinds if name}
+        if {"PlaneStrain", "FLIP", "MUSL", "Linear", "Insulated", "NoContact"} <= classes:
+            found.append(words)
+    assert IN_KERNEL in found
 
 
 # --- Bytes of every script -----------------------------------------------------------------------

@@ -47,8 +47,9 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
-    words = ["-var", "N=2,4", "-var", "kind=linear,cubic", "-var", "speed=3", "-record"]
-    assert main(["sweep", "in.flight", *words, "v_x,mean:c_x,min:c_x,max:Step", "-jobs", "2"]) == 0
+    words = ["-var", "N=2,4", "-var", "kind=linear,cubic", "-var", "speed=3", "-jobs", "2"]
+    recorded = "v_x,mean:c_x,min:c_x,max:Step,when:c_x:1.575,way=max(max:c_x - first:c_x, 0)/N"
+    assert main(["sweep", "in.flight", *words, "-record", recorded]) == 0
     table = pandas.read_csv(folder / "sweep.csv")
     assert list(table["N"]) == [2, 2, 4, 4] and list(table["kind"]) == ["linear", "cubic"] * 2
     good, bad = table[table.kind == "linear"], table[table.kind == "cubic"]
@@ -57,6 +58,8 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     assert good["v_x"].to_numpy() == pytest.approx(3)
     assert good["mean:c_x"].to_numpy() == pytest.approx(1.5 + 3 * 0.02)
     assert good["min:c_x"].to_numpy() == pytest.approx(1.5)
+    assert good["when:c_x:1.575"].to_numpy() == pytest.approx(0.075 / 3)
+    assert good["way"].to_numpy() == pytest.approx(3 * 0.04 / np.array([2, 4]))
     assert list(good["max:Step"]) == list(good["steps"]) == [4, 4]
     assert list(good["points"]) == [4, 8]  # two in each of N cells, N a unit of length
     assert (good[["seconds", "particle_steps_per_s", "peak_memory_mib", "wall_s"]] > 0).all(
@@ -160,6 +163,10 @@ def test_times_are_medians_of_repetitions(folder):
         (["-var", "N=1,2", "-where", "N >"], "error: "),
         (["-var", "N=1", "-record", "v_y"], "did you mean 'v_x'?"),
         (["-var", "N=1", "-record", "mx:v_x"], "did you mean 'max:v_x'?"),
+        (["-var", "N=1", "-record", "when:v_x"], "'when:v_x' is not complete"),
+        (["-var", "N=1", "-record", "a=2*max:v_y"], "did you mean 'v_x'?"),
+        (["-var", "N=1", "-record", "a=2*speed"], "does not log 'speed'"),
+        (["-var", "N=1", "-record", "a=2*"], "error: "),
         (["-var", "N=1", "-time", "-jobs", "2"], "one at a time"),
         (["-var", "N=1", "-o", "sweep.txt"], "unknown kind of file"),
         (["-var", "N=1", "-o", "none/sweep.csv"], "mkdir none"),
@@ -182,7 +189,7 @@ def test_combinations():
     values = variables.choices(["a=1,2", "b=x,y-z", "c=0:1:3"])
     assert values["c"] == ["0", "0.5", "1"]
     assert len(variables.cases(values)) == 12
-    some = variables.cases(values, where=['a < 2 || b == "y-z"', "c == 0.5"])
+    some = variables.cases(values, where=['a < 2 || b == "y-z"', "abs(c) == 0.5"])
     assert [(c["a"], c["b"]) for c in some] == [("1", "x"), ("1", "y-z"), ("2", "y-z")]
     together = variables.cases({"a": ["1", "2"], "b": ["3", "4"], "c": ["5"]}, [["a", "b"]])
     assert together == [{"a": "1", "b": "3", "c": "5"}, {"a": "2", "b": "4", "c": "5"}]
@@ -241,17 +248,21 @@ Run finished
   wall time         0.7 s
   steps             252
   particle-steps/s  2e+05
+  processor time    0.4 s in steps, of all threads
     steps           0.5 s       7 %
 Run
   points     1 300
 Run finished
   steps             100
+  processor time    0.2 s in steps, of all threads
     steps           0.25 s       7 %
 """
     facts = case.read_facts(said)
     assert facts["points"] == 1234 and facts["stable_dt"] == 0.02
     assert facts["steps"] == 352 and facts["seconds"] == 0.75
+    assert facts["particle_steps"] == 352 * 1234
     assert facts["particle_steps_per_s"] == pytest.approx(352 * 1234 / 0.75)
+    assert facts["cpu_seconds"] == pytest.approx(0.6)
     (tmp_path / "log.mpm").write_text("Step a\n0 1\n1 2\n# Step b\n2 nan\n3 4\n3 ", "utf-8")
     log = case.read_log(tmp_path)
     assert list(log["Step"]) == [0, 1, 2, 3] and list(log["a"]) == [1, 2]

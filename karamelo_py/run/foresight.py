@@ -75,8 +75,8 @@ class Foreseen:
     @cached_property
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
         """(N, d) positions and velocities of the points that there are."""
-        here = self.simulation.present
-        return self.simulation.x[here], self.simulation.v[here]
+        here, x, v = self.simulation.present, self.simulation.x, self.simulation.v
+        return (x, v) if here.all() else (x[here], v[here])
 
     @cached_property
     def turn(self) -> float:
@@ -84,18 +84,25 @@ class Foreseen:
         if self.d == 1 or self.hub.domain.axisymmetric:
             return 0.0
         largest = 0.0
+        x, v = self.motion
         mass, present = self.simulation.mass, self.simulation.present
+        of_solid = self.simulation.solid_of
+        if not present.all():
+            mass, of_solid = mass[present], of_solid[present]
         for k in range(len(self.hub.solids)):
-            of = present & (self.simulation.solid_of == k)
-            m = mass[of][:, None]
+            of = of_solid == k
+            m = mass[of]
             if m.sum() > 0:
-                x, v = (
-                    np.pad(a[of] - (m * a[of]).sum(axis=0) / m.sum(), ((0, 0), (0, 3 - self.d)))
-                    for a in (self.simulation.x, self.simulation.v)
-                )
-                inertia = (m * x**2).sum()
-                spin = np.linalg.norm((m * np.cross(x, v)).sum(axis=0))
-                largest = max(largest, spin / inertia if inertia > 0 else 0.0)
+                # Component by component: scenes of millions of points have little memory to spare.
+                here, fast = ([a[of, i] for i in range(self.d)] for a in (x, v))
+                for a in (*here, *fast):
+                    a -= np.average(a, weights=m)
+                inertia = sum(float((m * a**2).sum()) for a in here)
+                spin = [
+                    float((m * (here[i] * fast[j] - here[j] * fast[i])).sum())
+                    for i in range(self.d) for j in range(i)
+                ]  # fmt: skip
+                largest = max(largest, np.linalg.norm(spin) / inertia if inertia > 0 else 0.0)
         return largest * self.duration
 
     @cached_property

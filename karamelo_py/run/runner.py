@@ -77,6 +77,7 @@ class Runner:
         self.kept = -1  # its step
         self.place = hub.place
         self.spent = {"compilation": 0.0, "steps": 0.0, "output": 0.0}
+        self.processor = {"compilation": 0.0, "steps": 0.0}  # seconds of all threads
         self.interrupted = 0  # the signal
 
     def run(self) -> None:
@@ -127,7 +128,7 @@ class Runner:
             self.kept, self.snapshot = state
 
     def _keep(self, simulation: Simulation) -> None:
-        self.snapshot, self.kept = simulation.snapshot(), simulation.step
+        self.snapshot, self.kept = simulation.snapshot(self.snapshot), simulation.step
 
     @property
     def duration(self) -> float:
@@ -222,9 +223,12 @@ class Runner:
             if due and grown_little(simulation):
                 self._keep(simulation)
             begun, compiled = time.perf_counter(), self.spent["compilation"]
+            worked = time.process_time() - self.processor["compilation"]
             status = simulation.advance(int(target) - step)
             elapsed = time.perf_counter() - begun - (self.spent["compilation"] - compiled)
             self.spent["steps"] += elapsed
+            worked = time.process_time() - self.processor["compilation"] - worked
+            self.processor["steps"] += worked
             if status != DONE:
                 if status == STOPPED and boundary.delete_leaving(hub, simulation, self.snapshot):
                     self._keep(simulation)
@@ -328,13 +332,13 @@ class Runner:
 
         class Listener(event.Listener):
             depth = 0
-            begun = 0.0
+            begun = worked = 0.0
             said = False
 
             def on_start(self, _: Any) -> None:
                 self.depth += 1
                 if self.depth == 1:
-                    self.begun = time.perf_counter()
+                    self.begun, self.worked = time.perf_counter(), time.process_time()
                     if not self.said:
                         self.said = True
                         about = f": about {duration(expected)}" if expected else ""
@@ -347,6 +351,7 @@ class Runner:
                 self.depth -= 1
                 if self.depth == 0:
                     runner.spent["compilation"] += time.perf_counter() - self.begun
+                    runner.processor["compilation"] += time.process_time() - self.worked
 
         listener = Listener()
         event.register("numba:compile", listener)
@@ -389,6 +394,7 @@ class Runner:
                 "steps": steps,
                 "time": simulation.time,
                 "particle-steps/s": f"{rate:.3g}",
+                "processor time": f"{self.processor['steps']:.3g} s in steps, of all threads",
                 **boundary.counted(self.hub, simulation),
             },
             [(name, seconds) for name, seconds in stages if seconds > 0],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -576,10 +576,19 @@ class Simulation:
 
     # --- state that can be returned to --------------------------------------------------------
 
-    def snapshot(self) -> dict[str, np.ndarray]:
-        """Copies of every array that a step changes, and of the published values."""
-        copies = {name: array.copy() for name, array in changing(self)}
-        return copies | {"values": self.setup.control.values.copy()}
+    def snapshot(self, before: Mapping[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
+        """Copies of every array that a step changes, and of the published values.
+
+        The copies of the snapshot `before`, which is lost, are used again where they fit.
+        """
+        found = {}
+        for name, array in (*changing(self), ("values", self.setup.control.values)):
+            copy = (before or {}).get(name)
+            if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
+                copy = np.empty_like(array)
+            copy[...] = array
+            found[name] = copy
+        return found
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot."""

@@ -153,8 +153,11 @@ class Tiles:
         tiling.range[:count] = np.stack([begins[chosen], ends[chosen]], axis=1)
         tiling.grid[:count] = grid[by_colour]
         tiling.colour[:] = np.searchsorted(np.sort(colour), np.arange(len(tiling.colour)))
+        del tile, cells, bins  # their memory is needed again at once
         for _, array in arrays_of(points):
-            array[:] = array[..., order]
+            # Component by component: a copy of a whole field would be the peak of the set-up.
+            for k in np.ndindex(array.shape[:-1]):
+                array[k] = array[k][order]
 
     def _find_nodes(
         self, lattice: Lattice, shape: np.ndarray, first: int, spans: np.ndarray

@@ -103,7 +103,7 @@ class ParticleGroup(Group):
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
         """See `Group.add`."""
         found = self.find(region, solids)
-        self._members = np.union1d(self._members, found)
+        self._members = united(self._members, found)
         return len(found)
 
     def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
@@ -118,6 +118,13 @@ class ParticleGroup(Group):
                 inside = region.inside(solid.x0[start : start + CHUNK])
                 found.append(np.flatnonzero(inside) + (solid.first_id + start))
         return np.concatenate(found)
+
+
+def united(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The numbers in one or the other of two ascending arrays, each once, ascending."""
+    if not len(a) or not len(b):
+        return a if len(a) else b  # millions would be sorted for nothing
+    return np.union1d(a, b)
 
 
 class NodeGroup(Group):
@@ -156,7 +163,7 @@ class NodeGroup(Group):
         if self._found is None or self._found[0] is not lattices:
             members = np.empty(0, dtype=np.int64)
             for part in self._parts:
-                members = np.union1d(members, self.find(*part))
+                members = united(members, self.find(*part))
             self._found = lattices, members
         return self._found[1]
 

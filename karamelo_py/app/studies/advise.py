@@ -147,6 +147,11 @@ class Adviser:
                 return best
             self.go_on(min(doubtful, key=lambda c: c.cost).choice)
 
+    def hopeful(self) -> Candidate | None:
+        """The cheapest variant that may meet the target though none is expected to."""
+        found = [c for choice in self.choices for c in self.candidates(choice, hope=True)]
+        return min((c for c in found if c.forecast), key=lambda c: c.cost, default=None)
+
 
 def add_parser(subparsers: Any) -> None:
     """The subcommand for the command line."""
@@ -156,7 +161,10 @@ def add_parser(subparsers: Any) -> None:
     add_family(parser)
     add_combinations(parser)
     parser.add_argument(
-        "-accuracy", required=True, metavar="COLUMN", help="log column: err, max:err"
+        "-accuracy",
+        required=True,
+        metavar="COLUMN",
+        help="log column: err, max:err, or a formula: off=abs(max:u/3.28 - 1)",
     )
     parser.add_argument("-target", required=True, type=seconds, help="the error that is allowed")
     parser.add_argument("-cost", default="seconds", help="what counts as cost (seconds)")
@@ -171,7 +179,7 @@ def run(options: Any) -> int:
     out = out_file(options.o, ".csv")
     timed = options.cost in ("seconds", "wall_s", "particle_steps_per_s")
     values, launch, jobs = family(options, timed=timed)
-    items = records.recorded(options.accuracy, logged(options.script), options.script)
+    items = records.recorded(options.accuracy, logged(options.script), options.script, values)
     if len(items) != 1:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     if options.cost not in records.COLUMNS:
@@ -193,7 +201,7 @@ def run(options: Any) -> int:
     study = Study(launch, out.with_suffix(""), items, jobs, again=options.again)
     study.names = list(values)
     records.describe(
-        out, script=str(options.script), variables=values, record=[items[0].word], timed=timed,
+        out, script=str(options.script), variables=values, record=[items[0].text], timed=timed,
         repeat=1, threads=launch.threads, jobs=jobs,
     )  # fmt: skip
     study.on_row = lambda: records.write(out, list(study.rows.values()))
@@ -202,12 +210,11 @@ def run(options: Any) -> int:
     adviser.pilot(options.pilot)
     best = adviser.best()
     tell(adviser)
-    if best is None:
+    if best is not None:
+        advise(adviser, best, options.script)
+    elif not options.run:
         return _nothing(adviser)
-    advise(adviser, best, options.script)
-    if not options.run:
-        return 0
-    return carry_out(adviser, best, options.script)
+    return carry_out(adviser, best, options.script) if options.run else 0
 
 
 def coarse_first(
@@ -296,11 +303,22 @@ def _nothing(adviser: Adviser) -> int:
             f"nearest: {choice.label}, {adviser.name} = {row[adviser.name]} with {error:.3g}; "
             f"finer values of {adviser.name} or other choices may do"
         )
+    hope = adviser.hopeful()
+    if hope is not None:
+        print(
+            f"{hope.choice.label}, {adviser.name} = {adviser.values[hope.step]} may do, at about "
+            f"{adviser.cost} {hope.cost:.3g}: expected {hope.error:.3g}, at best "
+            f"{hope.forecast.low:.3g}; with -run it is tried"
+        )
     return 1
 
 
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
-    """Run what is advised; where it misses the target, go on with what is known then."""
+    """Run what is advised; where it misses the target, go on with what is known then.
+
+    Where nothing is expected to meet it, what may is tried.
+    """
+    best = best or adviser.hopeful()
     while best is not None and best.forecast is not None:
         advised = best.step == len(best.choice.rows)
         adviser.go_on(best.choice)
@@ -314,6 +332,7 @@ def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
         best = adviser.best()
         if best is not None and best.forecast is not None:
             advise(adviser, best, script)
+        best = best or adviser.hopeful()
     if best is None:
         return _nothing(adviser)
     row = best.choice.rows[best.step]

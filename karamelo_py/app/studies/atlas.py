@@ -229,7 +229,8 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
             print(done.stdout, end="")
             return "failed"
     part = record.with_name(KEPT + ".part")
-    part.write_text(json.dumps({"key": key, "commands": lines}, indent=1), encoding="utf-8")
+    made = {"key": key, "commands": lines, **records.surroundings()}
+    part.write_text(json.dumps(made, indent=1), encoding="utf-8")
     part.replace(record)
     return "done"
 
@@ -271,8 +272,17 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
             parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})\n")
         said = (place / SAID).read_text(encoding="utf-8").replace(str(inputs), "inputs")
         parts.append(f"```text\n{abridged(said)}\n```\n")
+        parts.append(f"{made_with(place / KEPT)}\n")
     page.write_text("\n".join(parts), encoding="utf-8")
     print(f"written: {page}; pictures are in {shown}")
+
+
+def made_with(record: Path) -> str:
+    """When an entry was made, with which version, and where."""
+    made = json.loads(record.read_text(encoding="utf-8"))
+    version = made.get("versions", {}).get("karamelo-py", karamelo_py.__version__)
+    said = [f"karamelo-py {version}", made.get("processor"), made.get("date", "")[:10]]
+    return "*" + ", ".join(filter(None, said)) + "*"
 
 
 def abridged(said: str) -> str:

@@ -54,8 +54,10 @@ class Outcome:
 # What is measured of every run beside the log, with its meaning.
 COLUMNS = {
     "seconds": "seconds in the stepping loop, without compilation and output",
+    "cpu_seconds": "seconds of processors in the stepping loop, of all threads",
     "seconds_spread": "largest less smallest of the repetitions",
     "particle_steps_per_s": "steps times points over seconds",
+    "particle_steps": "steps times points",
     "steps": "steps of all runs of the script",
     "points": "points at the beginning",
     "dt": "the first step",
@@ -128,14 +130,14 @@ class Launch:
             if outcomes[-1].status != "done":
                 break
         outcome = outcomes[-1]
-        seconds = [o.facts["seconds"] for o in outcomes if "seconds" in o.facts]
-        if self.repeat > 1 and seconds:
-            facts = outcome.facts
-            facts["seconds"] = statistics.median(seconds)
-            facts["seconds_spread"] = max(seconds) - min(seconds)
-            if facts["seconds"] > 0:
-                work = facts["steps"] * facts["points"]
-                facts["particle_steps_per_s"] = work / facts["seconds"]
+        facts = outcome.facts
+        for name in ("cpu_seconds", "seconds"):
+            seconds = [o.facts[name] for o in outcomes if name in o.facts]
+            if self.repeat > 1 and seconds:
+                facts[name] = statistics.median(seconds)
+                facts["seconds_spread"] = max(seconds) - min(seconds)
+        if "particle_steps" in facts and facts["seconds"] > 0:
+            facts["particle_steps_per_s"] = facts["particle_steps"] / facts["seconds"]
         record = {
             "key": self.key(case),
             "variables": dict(case),
@@ -215,7 +217,7 @@ def environment() -> dict[str, str]:
 def read_facts(said: str) -> dict[str, float]:
     """The numbers in what the program says at the beginning and the end of each run."""
     facts: dict[str, float] = {}
-    seconds = steps = 0.0
+    seconds = cpu = steps = 0.0
     for line in said.splitlines():
         match = _FACT.match(line)
         if not match:
@@ -230,11 +232,14 @@ def read_facts(said: str) -> dict[str, float]:
             seconds += value
         elif name == "steps":
             steps += value
+        elif name == "processor time":
+            cpu += value
     if steps:
-        facts["steps"] = steps
-        facts["seconds"] = seconds
-        if seconds > 0 and "points" in facts:
-            facts["particle_steps_per_s"] = steps * facts["points"] / seconds
+        facts.update(steps=steps, seconds=seconds, cpu_seconds=cpu)
+        if "points" in facts:
+            facts["particle_steps"] = steps * facts["points"]
+            if seconds > 0:
+                facts["particle_steps_per_s"] = facts["particle_steps"] / seconds
     return facts
 
 

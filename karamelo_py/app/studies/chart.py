@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies import histories, keeping, pictures, records
+from karamelo_py.app.studies import histories, keeping, pictures, records, versus
 from karamelo_py.app.studies.curves import Family, missing, order
 from karamelo_py.app.studies.options import new_parser, out_file
 from karamelo_py.app.studies.study import shown, terminal
@@ -23,14 +24,18 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
   karamelo-py chart sweep.csv -accuracy err -heat N,ppc -o heat.pdf  over two variables
   karamelo-py chart sweep.csv -accuracy err -o chart.html            a page of runs
   karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs
-  karamelo-py chart sweep.csv -keeps E -by basis,transfer -o E.md    does an energy stay?"""
+  karamelo-py chart sweep.csv -keeps E -by basis,transfer -o E.md    does an energy stay?
+  karamelo-py chart a.csv b.csv -accuracy err -versus digits -o d.png  two values, scene by scene"""
 SUFFIXES = (".png", ".svg", ".pdf", ".html")
 
 
 def add_parser(subparsers: Any) -> None:
     """The subcommand for the command line."""
     parser = new_parser(subparsers, "chart", "draw a table of runs", DESCRIPTION, run)
-    parser.add_argument("table", type=Path, help="what karamelo-py sweep has written")
+    parser.add_argument(
+        "tables", type=Path, nargs="+", metavar="table",
+        help="what karamelo-py sweep has written; several with -versus",
+    )  # fmt: skip
     wanted = parser.add_mutually_exclusive_group(required=True)
     wanted.add_argument("-accuracy", metavar="COLUMN", help="the error")
     wanted.add_argument(
@@ -48,6 +53,9 @@ def add_parser(subparsers: Any) -> None:
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("-x", metavar="NAME", help="errors over this variable, not over cost")
     kinds.add_argument("-heat", metavar="A,B", help="errors over two variables, as colours")
+    kinds.add_argument(
+        "-versus", metavar="NAME", help="its two values side by side, for each of the tables"
+    )
     parser.add_argument("-exact", metavar="COLUMN", help="of -curve: the exact log column")
     parser.add_argument("-names", default="", help="of -curve: what to call the runs, with commas")
     parser.add_argument("-log", default="log.mpm", metavar="FILE", help="of -curve: another log")
@@ -59,25 +67,19 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
-    rows = records.read(options.table)
-    made = {"table": options.table.name, **records.beside(options.table)}
-    if "folder" not in rows[0] and "variables" not in made:
-        raise ScriptError(
-            f"{options.table} does not say which columns are variables",
-            expected=f"{options.table.with_suffix('.json')}, which sweep writes beside it",
-        )
-    variables = list(made.get("variables") or list(rows[0])[: list(rows[0]).index("seconds")])
-    words = {row[name] for row in rows for name in variables}
-    for condition in options.where:
-        rows = [r for r in rows if holds(condition, {n: r[n] for n in variables}, words)]
-    if not rows:
-        raise ScriptError("no row fulfils -where " + " and ".join(options.where))
+    if options.versus:
+        return side_by_side(options)
+    if len(options.tables) > 1:
+        raise ScriptError(f"{len(options.tables)} tables", expected="one, or several with -versus")
+    options.table = options.tables[0]
+    rows, variables, made = read(options.table, options.where)
     by = [name.strip() for name in options.by.split(",") if name.strip()]
     if options.keeps:
         return keeps(options, rows, by or variables, variables)
     if options.curve:
         return curves(options, rows, by or variables, made)
-    family = Family(rows, variables, options.accuracy, options.cost, by, options.x)
+    said = made.get("record", ())
+    family = Family(rows, variables, options.accuracy, options.cost, by, options.x, said)
     if len(family.without) == len(rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
     out = out_file(options.o, *SUFFIXES) if options.o else None
@@ -104,6 +106,53 @@ def run(options: Any) -> int:
     else:
         pictures.lines(family, out, convergence=bool(options.x), title=title)
     print(f"drawn: {out}")
+    return 0
+
+
+def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
+    """The rows of a table that fulfil the conditions, its variables, and how it was made.
+
+    Raises
+    ------
+    ScriptError
+        If it does not say which columns are variables, or no row is left.
+    """
+    rows = records.read(path)
+    made = {"table": path.name, **records.beside(path)}
+    if "folder" not in rows[0] and "variables" not in made:
+        raise ScriptError(
+            f"{path} does not say which columns are variables",
+            expected=f"{path.with_suffix('.json')}, which sweep writes beside it",
+        )
+    variables = list(made.get("variables") or list(rows[0])[: list(rows[0]).index("seconds")])
+    words = {row[name] for row in rows for name in variables}
+    for condition in where:
+        rows = [r for r in rows if holds(condition, {n: r[n] for n in variables}, words)]
+    if not rows:
+        raise ScriptError("no row fulfils -where " + " and ".join(where))
+    return rows, variables, made
+
+
+def side_by_side(options: Any) -> int:
+    """Draw two values of a variable beside each other, for the scenes of all tables."""
+    if not options.accuracy:
+        raise ScriptError(f"-versus {options.versus}", expected="-accuracy COLUMN with it")
+    out = out_file(options.o, *SUFFIXES[:-1]) if options.o else None
+    found, known = [], []
+    for path in options.tables:
+        rows, variables, made = read(path, options.where)
+        some, values = versus.pairs(
+            rows, made, variables, options.versus, options.accuracy, options.cost
+        )
+        if known and values != known:
+            raise ScriptError(f"{path}: {options.versus} is {', '.join(values)}",
+                              expected=", ".join(known) + ", as in the first table")  # fmt: skip
+        known = values
+        found += some
+    versus.tell(found, known, options.accuracy, options.cost)
+    if out is not None:
+        versus.draw(found, known, out, options.accuracy, options.cost, options.title or "")
+        print(f"drawn: {out}")
     return 0
 
 

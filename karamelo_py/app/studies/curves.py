@@ -9,9 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.app.studies import look
 from karamelo_py.app.studies.records import value
 from karamelo_py.app.studies.variables import number
 from karamelo_py.script.errors import ScriptError, nearest
+
+NONE = "mechanical"  # what a script says where a method has no such word
 
 
 @dataclass
@@ -77,13 +80,18 @@ class Line:
 
     @property
     def label(self) -> str:
-        """The choice in words; a bare number says what it is the value of."""
-        parts = [v if number(v) is None else f"{n} = {v}" for n, v in self.choice.items()]
+        """The choice in words; what says nothing alone says what it is the value of."""
+        choice = {n: v for n, v in self.choice.items() if v != NONE} or self.choice
+        parts = [v if _tells(v) else f"{n} = {v}" for n, v in choice.items()]
         return ", ".join(parts) or "all"
 
     def shown(self, along: np.ndarray) -> np.ndarray:
         """Which members have a place in a diagram of errors over `along`."""
         return np.isfinite(self.error) & (self.error > 0) & np.isfinite(along) & (along > 0)
+
+
+def _tells(value: str) -> bool:
+    return number(value) is None and value not in ("true", "false", NONE)
 
 
 class Family:
@@ -101,6 +109,8 @@ class Family:
         Variables whose values tell the lines apart; others that differ are added.
     along
         The variable that differs along a line; by default the number with the most values.
+    recorded
+        What the sweep was asked to record: a column that is a formula is shown as such.
 
     Raises
     ------
@@ -116,7 +126,9 @@ class Family:
         cost: str,
         by: Sequence[str] = (),
         along: str | None = None,
+        recorded: Sequence[str] = (),
     ):
+        self.formulas = dict(word.split("=", 1) for word in recorded if "=" in word)
         for option, name in (("-accuracy", accuracy), ("-cost", cost)):
             require(rows, option, name)
         for option, names in (("-by", by), ("-x", [along] if along else [])):
@@ -147,6 +159,12 @@ class Family:
             line.x = column(line.rows, self.along) if self.along else np.zeros(len(line.rows))
             line.cost, line.error = column(line.rows, self.cost), column(line.rows, self.accuracy)
         return list(found.values())
+
+    @property
+    def error_label(self) -> str:
+        """What the error is, for an axis."""
+        formula = self.formulas.get(self.accuracy)
+        return f"{self.accuracy} = {formula}" if formula else look.label(self.accuracy)
 
     def front(self) -> list[Mapping[str, str]]:
         """The Pareto front: runs that none beats in both cost and error, cheapest first."""

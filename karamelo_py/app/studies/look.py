@@ -39,6 +39,8 @@ FAMILIES = (
 )
 LABELS = {
     "seconds": "time of the stepping loop (s)",
+    "cpu_seconds": "processor time of the stepping loop (s)",
+    "particle_steps": "steps times points",
     "wall_s": "time of the process (s)",
     "peak_memory_mib": "peak memory (MiB)",
     "bytes_per_particle": "bytes per particle",
@@ -59,26 +61,39 @@ def place(word: str, others: Sequence[str] = ()) -> int:
     return int(hashlib.sha256(word.encode()).hexdigest(), 16) % len(PALETTE)
 
 
-def style(choice: dict[str, str], values: dict[str, list[str]]) -> tuple[str, int, int]:
-    """Colour, number of the marker and number of the dashes of a line.
+def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
+    """Colour, number of the marker and number of the dashes of each line of a chart.
 
-    The first variable gives colour and marker, the second the dashes.
+    The first variable gives colour and marker, the others the dashes: those of their words, or the
+    next that no line of this colour has.
     """
-    names = list(choice)
+    names = list(choices[0]) if choices else []
     if not names:
-        return PALETTE[0], 0, 0
-    first = choice[names[0]]
-    k = place(first, values[names[0]])
-    colour = PALETTE[k]
-    if all(number(v) is not None for v in values[names[0]]) and len(values[names[0]]) > 1:
-        # Numbers are in order: dark to light.
-        from matplotlib import colormaps
-        from matplotlib.colors import to_hex
+        return [(PALETTE[0], 0, 0)] * len(choices)
+    values = {name: list(dict.fromkeys(choice[name] for choice in choices)) for name in names}
+    heads = values[names[0]]
+    numbers = len(heads) > 1 and all(number(v) is not None for v in heads)
+    taken: dict[str, dict[tuple, int]] = {}
+    found = []
+    for choice in choices:
+        head, *rest = (choice[name] for name in names)
+        k = place(head, heads)
+        colour = _in_order(head, heads) if numbers else PALETTE[k]
+        mine = taken.setdefault(head, {})
+        wanted = sum(place(v, values[n]) for n, v in zip(names[1:], rest, strict=True))
+        tries = [(wanted + j) % len(DASHES) for j in range(len(DASHES))]
+        free = [j for j in tries if j not in mine.values()]
+        found.append((colour, k, mine.setdefault(tuple(rest), (free or tries)[0])))
+    return found
 
-        ranked = sorted(values[names[0]], key=number)
-        colour = to_hex(colormaps["viridis"](0.85 * ranked.index(first) / (len(ranked) - 1)))
-    rest = [place(choice[n], values[n]) for n in names[1:]]
-    return colour, k, sum(rest) % len(DASHES)
+
+def _in_order(value: str, values: Sequence[str]) -> str:
+    """The colour of a number among others: dark to light."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    ranked = sorted(values, key=number)
+    return to_hex(colormaps["viridis"](0.85 * ranked.index(value) / (len(ranked) - 1)))
 
 
 def label(name: str) -> str:
@@ -97,13 +112,26 @@ def tick_text(a: float, _: Any = None) -> str:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Round numbers on a logarithmic axis: at 1, 2 and 5, at 1, or at every so many decades."""
+    """Round numbers on a logarithmic axis: at 1, 2 and 5, at 1, or at every so many decades.
+
+    At more leading digits where a short axis would have fewer than three.
+    """
     decades = log10(high / low)
-    leads = (1, 2, 5) if decades < 2.5 else (1,)
     every = 1 if decades < 9 else ceil(decades / 8)
     exponents = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)
-    ticks = [lead * 10.0**k for k in exponents if k % every == 0 for lead in leads]
-    return [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+    finest = [k / 20 for k in range(20, 200)]
+    for leads in (
+        (1,),
+        (1, 2, 5),
+        (1, 1.5, 2, 3, 4, 5, 6, 8),
+        [k / 5 for k in range(5, 50)],
+        finest,
+    ):
+        ticks = [lead * 10.0**k for k in exponents if k % every == 0 for lead in leads]
+        ticks = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+        if len(ticks) >= 3:
+            break
+    return ticks
 
 
 def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None = None) -> None:

@@ -14,7 +14,6 @@ import numpy as np
 
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import Family, column
-from karamelo_py.app.studies.pictures import values_of
 from karamelo_py.script.errors import ScriptError
 
 _WIDEST = 480  # pixels of a picture in the page
@@ -90,7 +89,6 @@ def write(
         raise ScriptError(
             "a page needs the package plotly", hint='pip install "karamelo-py[studies]"'
         ) from None
-    values = values_of(family)
     number_of = {id(row): k for k, row in enumerate(rows)}
     figure = graph_objects.Figure()
     front = family.front()
@@ -101,10 +99,10 @@ def write(
             line={"shape": "hv", "width": 8, "color": "#cccccc"},
             marker={"size": 18, "color": "#cccccc"},
         )  # fmt: skip
-    for line in family.lines:
+    styles = look.styles([line.choice for line in family.lines])
+    for line, (colour, marker, dash) in zip(family.lines, styles, strict=True):
         along = line.x if convergence else line.cost
         shown = np.flatnonzero(line.shown(along))
-        colour, marker, dash = look.style(line.choice, values)
         figure.add_scatter(
             x=along[shown], y=line.error[shown], mode="lines+markers", name=line.label,
             customdata=[number_of[id(line.rows[k])] for k in shown],
@@ -120,7 +118,7 @@ def write(
     figure.update_layout(
         template="plotly_white", margin={"l": 70, "r": 20, "t": 20, "b": 60}, hovermode="closest",
         xaxis={**axis, "title": family.along if convergence else look.label(family.cost)},
-        yaxis={**axis, "title": look.label(family.accuracy)},
+        yaxis={**axis, "title": family.error_label},
         legend={"orientation": "h", "y": -0.15},
     )  # fmt: skip
     for k, along in (("xaxis", 0), ("yaxis", 1)):

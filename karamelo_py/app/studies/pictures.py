@@ -15,18 +15,11 @@ from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tidy
 
 
-def values_of(family: Family) -> dict[str, list[str]]:
-    """The values of the variables that tell lines apart."""
-    return {
-        name: list(dict.fromkeys(line.choice[name] for line in family.lines)) for name in family.by
-    }
-
-
 def lines(family: Family, path: Path, *, convergence: bool, title: str = "") -> None:
     """Errors over costs with the Pareto front, or over the variable along lines."""
     figure = blank_figure(8.4, 5.2)
     axes = figure.subplots()
-    values = values_of(family)
+    styles = look.styles([line.choice for line in family.lines])
     across = [line.x if convergence else line.cost for line in family.lines]
     drawn = [line.shown(x) for line, x in zip(family.lines, across, strict=True)]
     xs = np.concatenate([x[k] for x, k in zip(across, drawn, strict=True)])
@@ -39,8 +32,8 @@ def lines(family: Family, path: Path, *, convergence: bool, title: str = "") -> 
     if not convergence:
         _front(axes, family)
     ends = []
-    for line, x, k in zip(family.lines, across, drawn, strict=True):
-        colour, marker, dash = look.style(line.choice, values)
+    for line, x, k, style in zip(family.lines, across, drawn, styles, strict=True):
+        colour, marker, dash = style
         way = np.argsort(line.x[k], kind="stable")
         px, py = x[k][way], line.error[k][way]
         if len(px):
@@ -50,11 +43,10 @@ def lines(family: Family, path: Path, *, convergence: bool, title: str = "") -> 
             )  # fmt: skip
             last = int(np.argmax(px))
             ends.append((px[last], py[last], line.label, colour))
-    _gone(axes, [(x, look.style(line.choice, values)[0]) for line, gone in
-                 zip(family.lines, failed, strict=False) for x in gone])  # fmt: skip
+    _gone(axes, [(x, style[0]) for style, gone in zip(styles, failed, strict=False) for x in gone])
     look.direct_labels(axes, ends)
     axes.set_xlabel(family.along if convergence else look.label(family.cost))
-    axes.set_ylabel(look.label(family.accuracy))
+    axes.set_ylabel(family.error_label)
     axes.set_title(title, loc="left", fontsize=10)
     tidy(axes)
     _footnote(figure, family, convergence, not convergence and family.front())
@@ -144,7 +136,7 @@ def heat(family: Family, rows: Sequence[Any], x: str, y: str, path: Path, title:
     figure.supxlabel(x, fontsize=10)
     figure.supylabel(y, fontsize=10)
     ticks = look.log_ticks(*norm_ends(norm))
-    bar = figure.colorbar(mesh, ax=list(all_axes), label=look.label(family.accuracy))
+    bar = figure.colorbar(mesh, ax=list(all_axes), label=family.error_label)
     bar.set_ticks(ticks, labels=[look.tick_text(tick) for tick in ticks])
     bar.minorticks_off()
     figure.suptitle(title, fontsize=10, x=0.02, ha="left")

@@ -6,7 +6,8 @@ import csv
 import json
 import os
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Container, Iterable, Mapping, Sequence
 from datetime import datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -16,37 +17,125 @@ import numpy as np
 
 import karamelo_py
 from karamelo_py.app.studies.case import COLUMNS, Outcome, read_log
-from karamelo_py.app.studies.variables import number
+from karamelo_py.app.studies.variables import Scope, number
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.expressions import evaluate
+from karamelo_py.script.functions import CONSTANTS
+from karamelo_py.script.parser import parse_text
 
-REDUCTIONS = {"last": lambda v: v[-1], "max": np.max, "min": np.min, "mean": np.mean}
+REDUCTIONS = {
+    "last": lambda v: v[-1], "first": lambda v: v[0], "max": np.max, "min": np.min,
+    "mean": np.mean,
+}  # fmt: skip
+_WORDS = "max:, min:, mean:, last:, first: and the name of a log column, or when:column:value"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_PART = re.compile(rf"\b([^\W\d]\w*):([^\W\d]\w*)(?::({_NUMBER}))?")
+_NAME = re.compile(r"\b([^\W\d]\w*)\b(?!\s*\()")
 
 
-class Recorded:
-    """What is recorded of a log column: ``err`` (its last value), ``max:err``, ``mean:err``, ..."""
+class Part:
+    """A number of a log column: its last value, ``max`` and so on, ``when`` it reaches a value."""
 
-    def __init__(self, word: str):
-        reduction, colon, column = word.partition(":")
-        self.word = word
-        self.reduction = reduction if colon else "last"
-        name = "".join((column if colon else word).split())
-        self.column = KEYWORDS.get(name, name)
-        if self.reduction not in REDUCTIONS or not self.column:
-            close = nearest(self.reduction, REDUCTIONS)
+    def __init__(self, reduction: str, column: str, level: str | None, word: str):
+        column = "".join(column.split())
+        self.reduction, self.column = reduction, KEYWORDS.get(column, column)
+        self.level = None if level is None else number(level)
+        known = [*REDUCTIONS, "when"]
+        if reduction not in known or not column or (reduction == "when") == (self.level is None):
+            close = nearest(reduction, known) if reduction not in known else None
             raise ScriptError(
-                f"-record {word}: unknown word '{self.reduction}'",
-                expected="the name of a log column, or max:, min:, mean:, last: and the name",
+                f"-record {word}: unknown word '{reduction}'"
+                if reduction not in known
+                else f"-record {word}: '{reduction}:{column}' is not complete",
+                expected=_WORDS,
                 hint=f"did you mean '{close}:{self.column}'?" if close else None,
             )
 
     def of(self, log: Mapping[str, np.ndarray]) -> float | None:
-        """The number, if the log has the column."""
+        """The number, if the log has it."""
         values = log.get(self.column)
-        return float(REDUCTIONS[self.reduction](values)) if values is not None else None
+        if values is None or not len(values):
+            return None
+        if self.level is None:
+            return float(REDUCTIONS[self.reduction](values))
+        # Between the first row beyond the level and the one before it.
+        above = values >= self.level if values[0] < self.level else values <= self.level
+        if not above.any() or "Time" not in log:
+            return None
+        k = max(int(np.argmax(above)), 1)
+        share = (self.level - values[k - 1]) / (values[k] - values[k - 1])
+        return float(log["Time"][k - 1] + share * (log["Time"][k] - log["Time"][k - 1]))
+
+    def missing(self, log: Mapping[str, np.ndarray]) -> str:
+        """Why there is no such number."""
+        if self.column not in log:
+            return f"the log has no column '{self.column}'"
+        return f"{self.column} does not reach {self.level:g}"
 
 
-def recorded(text: str, headings: Sequence[str] | None, script: Path) -> list[Recorded]:
+class Recorded:
+    """What is recorded of a log: ``err`` (the last value of that column), ``max:err``, ...
+
+    ``off=abs(max:depth/3.28 - 1)`` is a formula of such numbers under a name of its own, in the
+    language of scripts; it knows the variables of the study as well.
+    """
+
+    def __init__(self, word: str):
+        name, equals, formula = (part.strip() for part in word.partition("="))
+        self.text, self.raw = word, None
+        self.parts: dict[str, Part] = {}
+        self.names: list[str] = []
+        if not equals:
+            self.word = word
+            reduction, colon, rest = word.partition(":")
+            column, level = (rest.split(":", 1) + [None])[:2] if colon else (word, None)
+            self.parts[""] = Part(reduction if colon else "last", column, level, word)
+            return
+        if not name.isidentifier() or not formula:
+            raise ScriptError(f"-record {word}", expected="name=formula, as in off=abs(max:s - 1)")
+        self.word = name
+
+        def named(match: re.Match) -> str:
+            self.parts[f"part{len(self.parts)}"] = Part(*match.groups(), word)
+            return f"part{len(self.parts) - 1}"
+
+        formula = _PART.sub(named, formula)
+        self.raw, self.node = parse_text(formula, f"-record {name}")
+        names = {*_NAME.findall(formula)}
+        self.names = sorted(names - {*self.parts, *CONSTANTS})
+
+    @property
+    def columns(self) -> list[str]:
+        """The log columns that it names, each with what is taken of it."""
+        return [part.column for part in self.parts.values()]
+
+    def of(self, log: Mapping[str, np.ndarray], case: Mapping[str, Any]) -> float | None:
+        """The number, if the log has what it takes."""
+        found = {name: part.of(log) for name, part in self.parts.items()}
+        if self.raw is None:
+            return found[""]
+        for name in self.names:
+            last = Part("last", name, None, self.text)
+            found[name] = number(case[name]) if name in case else last.of(log)
+        if None in found.values():
+            return None
+        try:
+            value = evaluate(self.node, self.raw, Scope("-record", found))
+        except ScriptError:  # such as a division by zero, in this run
+            return None
+        return value if isinstance(value, float) else None
+
+    def missing(self, log: Mapping[str, np.ndarray]) -> str:
+        """Why there is no number."""
+        plain = [Part("last", name, None, self.text) for name in self.names]
+        parts = [p for p in [*self.parts.values(), *plain] if p.of(log) is None]
+        return parts[0].missing(log) if parts else f"'{self.text}' has no value"
+
+
+def recorded(
+    text: str, headings: Sequence[str] | None, script: Path, variables: Container[str] = ()
+) -> list[Recorded]:
     """What -record asks for.
 
     Raises
@@ -54,19 +143,33 @@ def recorded(text: str, headings: Sequence[str] | None, script: Path) -> list[Re
     ScriptError
         For a column that the script does not log, as far as that is known beforehand.
     """
-    found = [Recorded(word.strip()) for word in text.split(",") if word.strip()]
+    found = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
     for item in found:
-        if headings is not None and item.column not in headings:
+        for column in [*item.columns, *(n for n in item.names if n not in variables)]:
+            if headings is None or column in headings:
+                continue
             known = list(dict.fromkeys(headings))
-            close = nearest(item.column, known)
+            close = nearest(column, known)
             raise ScriptError(
-                f"-record {item.word}: {script} does not log '{item.column}'",
+                f"-record {item.text}: {script} does not log '{column}'",
                 expected="one of " + ", ".join(known),
                 hint=f"did you mean '{close}'?"
                 if close
-                else f"log_modify(custom, step, dt, time, {item.column}) in the script",
+                else f"log_modify(custom, step, dt, time, {column}) in the script",
             )
     return found
+
+
+def _apart(text: str) -> list[str]:
+    """The words between commas that stand in no parentheses."""
+    words, depth = [""], 0
+    for sign in text:
+        depth += (sign == "(") - (sign == ")")
+        if sign == "," and depth <= 0:
+            words.append("")
+        else:
+            words[-1] += sign
+    return words
 
 
 def row(
@@ -79,7 +182,7 @@ def row(
     log = read_log(outcome.folder) if outcome.status == "done" else {}
     found: dict[str, Any] = dict(case)
     for item in items:
-        found[item.word] = item.of(log)
+        found[item.word] = item.of(log, case)
     for name in COLUMNS:
         found[name] = outcome.facts.get(name)
     found["status"], found["reason"] = outcome.status, outcome.reason

@@ -40,6 +40,7 @@ run. The table is written beside the picture (map.csv); -var with one value is p
 The script logs an energy that should stay about the same, such as Ek + Es."""
 ENERGIES = ("Etot", "E_total", "Ek+Es", "Ek_s+Es_s", "Ek+Es+Ed", "Ek", "Ek_s")
 CLASSES = ("stable", "growing", "failed")
+FEW = 9  # values of a variable that stand at the axis one by one
 COLOURS = {"stable": "#d9ecf7", "growing": "#f0a53c", "failed": "#7d2a3a"}  # light to dark
 # What the program says of failures, in short.
 REASONS = {
@@ -110,7 +111,7 @@ def energy_column(asked: str | None, headings: Sequence[str] | None, script: Pat
         If the script does not log it, or logs no energy that is known by its name.
     """
     if asked is not None:
-        return records.recorded(asked, headings, script)[0].column
+        return records.recorded(asked, headings, script)[0].columns[0]
     for name in ENERGIES:
         if headings is None or name in headings:
             return name
@@ -294,11 +295,12 @@ class Map:
             Patch(facecolor="none", edgecolor="none", label=f"{k}  {reason}")
             for reason, k in number_of.items()
         ]  # fmt: skip
-        own = [(limit, y[j]) for j in range(len(y)) if (limit := self.limit(j)) is not None]
+        limits = [self.limit(j) for j in range(len(y))]
+        rows = edges(y)
+        own = [(limit, up) for limit, *ends in zip(limits, rows, rows[1:], strict=False)
+               if limit is not None for up in ends]  # fmt: skip
         if own:
             at, up = zip(*own, strict=True)
-            if len(up) == 1:
-                at, up = at * 2, axes.get_ylim()
             line = axes.plot(at, up, "k--", linewidth=1.4, label="first step = the program's limit")
             handles += line
         handles.append(Patch(facecolor="none", edgecolor="none", label="·  run; others inferred"))
@@ -310,8 +312,8 @@ class Map:
         axes.set_ylabel(self.axes[1] if two else "")
         fixed = [f"{n} = {v[0]}" for n, v in self.values.items() if len(v) == 1]
         axes.set_title(", ".join([title, *fixed]), loc="left", fontsize=10)
-        if not two:
-            axes.set_yticks([])
+        if len(y) <= FEW:
+            axes.set_yticks(y if two else [])
         savefig(figure, path)
 
 

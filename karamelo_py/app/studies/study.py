@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies.case import Launch, Outcome, folder_name
+from karamelo_py.app.studies.case import Launch, Outcome, folder_name, read_log
 from karamelo_py.app.studies.records import Recorded, row
 from karamelo_py.app.studies.variables import number
 from karamelo_py.output.console import duration
@@ -136,9 +136,9 @@ class Study:
 
     def _put(self, case: Mapping[str, str], outcome: Outcome) -> None:
         found = row(case, outcome, self.items, self.folder.parent)
-        if outcome.status == "done" and any(found[item.word] is None for item in self.items):
-            missing = next(item for item in self.items if found[item.word] is None)
-            found["reason"] = f"the log has no column '{missing.column}'"
+        lacking = [item for item in self.items if found[item.word] is None]
+        if outcome.status == "done" and lacking:
+            found["reason"] = lacking[0].missing(read_log(outcome.folder))
         self.rows[tuple(case.values())] = found
 
 

@@ -38,7 +38,8 @@ def add_parser(subparsers: Any) -> None:
     add_combinations(parser)
     parser.add_argument(
         "-record", default="", metavar="COLUMNS",
-        help="log columns: err (the last value), max:err, min:err, mean:err; with commas",
+        help="log columns: err (the last value), max:err, min:err, mean:err, first:err, the time "
+        "when:err:0.1; formulas of them: off=abs(max:u/3.28 - 1); with commas",
     )  # fmt: skip
     parser.add_argument(
         "-time", action="store_true",
@@ -54,7 +55,7 @@ def run(options: Any) -> int:
     repeat = options.repeat if options.time else 1
     values, launch, jobs = family(options, timed=options.time, repeat=repeat)
     combinations = cases(values, zipped(options), options.where)
-    items = records.recorded(options.record, logged(options.script), options.script)
+    items = records.recorded(options.record, logged(options.script), options.script, values)
     folder = out.with_suffix("")
     if folder.exists() and not folder.is_dir():
         raise ScriptError(f"{folder} is a file", expected="a free name for the folder of the runs")
@@ -63,7 +64,7 @@ def run(options: Any) -> int:
         out,
         script=str(options.script),
         variables=values,
-        record=[item.word for item in items],
+        record=[item.text for item in items],
         timed=options.time,
         repeat=repeat,
         threads=launch.threads,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import evaluate
+from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text
 from karamelo_py.script.syntax import Assignment, Call
 
@@ -127,34 +128,48 @@ def cases(
     return found
 
 
-class _Scope:
-    """The names in a condition: variables of a case, and words that are values of variables."""
+class Scope:
+    """The names in a formula of an option: numbers and texts, and words that stand for themselves.
 
-    def __init__(self, case: dict[str, str], words: Iterable[str]):
-        self.case = case
-        self.words = words
+    Parameters
+    ----------
+    option
+        Whose formula it is, for messages.
+    known
+        Values of the names.
+    words
+        Words that may stand in the formula without quotes.
+    """
+
+    def __init__(self, option: str, known: Mapping[str, Any], words: Iterable[str] = ()):
+        self.option, self.known, self.words = option, {**CONSTANTS, **known}, words
 
     def name(self, name: str, node: Any, raw: Any) -> Any:
-        if name in self.case:
-            value = number(self.case[name])
-            return self.case[name] if value is None else value
+        if name in self.known:
+            value = self.known[name]
+            plain = number(value) if isinstance(value, str) else value
+            return value if plain is None else plain
         if name in self.words:
             return name
         raise ScriptError(
-            f"-where: unknown name '{name}'",
+            f"{self.option}: unknown name '{name}'",
             expected="a variable of the study, or one of its values (in quotes where it has signs "
             'such as -): basis == "quadratic-spline"',
-            hint=_meant(nearest(name, [*self.case, *self.words])),
+            hint=_meant(nearest(name, [*self.known, *self.words])),
         )
 
+    def hides(self, name: str) -> bool:
+        """No command has the name of a function here."""
+        return False
+
     def command(self, node: Any, raw: Any) -> Any:
-        raise ScriptError(f"-where: unknown function '{node.name}'")
+        raise ScriptError(f"{self.option}: unknown function '{node.name}'")
 
 
-def holds(condition: str, case: dict[str, str], words: Iterable[str] = ()) -> bool:
+def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) -> bool:
     """Whether a condition in the language of scripts holds for a case."""
     raw, node = parse_text(condition, "-where")
-    value = evaluate(node, raw, _Scope(case, words))
+    value = evaluate(node, raw, Scope("-where", case, words))
     if not isinstance(value, float):
         raise ScriptError(f"-where {condition} is neither true nor false")
     return value != 0
