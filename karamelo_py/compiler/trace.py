@@ -283,6 +283,16 @@ _copies: dict[Any, Any] = {}
 _choosers: dict[Callable, list[Callable]] = {}
 
 
+class _Module:
+    """A module, whose functions are seen like globals."""
+
+    def __init__(self, module: python.ModuleType):
+        self.module = module
+
+    def __getattr__(self, name: str) -> Any:
+        return _seen(getattr(self.module, name))
+
+
 class _Emitted:
     """A function that compiled code has a version of its own of."""
 
@@ -315,21 +325,34 @@ def _seen(thing: Any) -> Any:
         return _class_of
     if thing is isinstance:
         return _is_instance
+    if isinstance(thing, python.ModuleType):
+        return _Module(thing)
     if not isinstance(thing, Hashable) or not callable(thing) or isinstance(thing, _Emitted):
         return thing
+    of_numbers = thing in _OF_NUMBERS or isinstance(thing, types.Number)
+    if isinstance(thing, type):
+        of_numbers |= issubclass(thing, np.generic)
     native = isinstance(thing, type) or getattr(thing, "__module__", "") == "builtins"
-    if native and thing not in _OF_NUMBERS:
+    if native and not of_numbers:
         return thing
     if thing not in _copies:
         if thing in _choosers:
             _copies[thing] = _Dispatched(thing)
-        elif hasattr(thing, "py_func") or cpu_target.typing_context._lookup_global(thing):
+        elif (
+            of_numbers
+            or hasattr(thing, "py_func")
+            or cpu_target.typing_context._lookup_global(thing)
+        ):
             _copies[thing] = _Emitted(thing)
         elif isinstance(thing, python.FunctionType):
             _copies[thing] = _copied(thing)
         else:
             return thing
     return _noted(_copies[thing])
+
+
+def _known_to_numba(thing: Any) -> bool:
+    return hasattr(thing, "py_func") or cpu_target.typing_context._lookup_global(thing) is not None
 
 
 def _noted(made: Any) -> Any:

@@ -1,22 +1,11 @@
 """Algebra on flat tuples of any length: sums, multiples, products.
 
-Tuples have no length-generic arithmetic in Numba, so each operation is written out for the length
-it meets (`spell` builds the text once per length); in plain Python they are comprehensions.
+Comprehensions, which Numba does not know of tuples: kernels run them (`compiler/trace.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from numba import types
-
-from karamelo_py.compiler.compile import by_type, define, fma, lanes_of, shared
-
-
-def spell(parameters: str, term: str, length: int) -> Callable:
-    """The function ``(term with k = 0, ..., term with k = length - 1)`` of `parameters`."""
-    items = "".join(term.replace("[k]", f"[{k}]") + ", " for k in range(length))
-    return define(parameters, f"return ({items})", fma=fma)
+from karamelo_py.compiler.compile import choose, fma, lanes_of, shared
 
 
 @shared
@@ -77,55 +66,31 @@ def add_optional(a, factor, b):
     return add_scaled(a, factor, b) if len(b) else a
 
 
+@shared
 def clear_optional(array, i):
     """Set row `i` of an array that may be absent (None) to zero."""
     if array is not None:
-        array[i, :] = 0
-
-
-@by_type(clear_optional)
-def _clear_optional(array, i):
-    if isinstance(array, types.NoneType):
-        return lambda array, i: None
-
-    def clear(array, i):
         for k in range(array.shape[1]):
             array[i, k] = 0
 
-    return clear
 
-
+@shared
 def clear_first(array, i):
     """Set the first number of row `i` of an array that may be absent (None) to zero."""
     if array is not None:
         array[i, 0] = 0
 
 
-@by_type(clear_first)
-def _clear_first(array, i):
-    if isinstance(array, types.NoneType):
-        return lambda array, i: None
-
-    def clear(array, i):
-        array[i, 0] = 0
-
-    return clear
-
-
+@shared
 def add_row(a, first, b):
     """`a` with b[k] added to a[first + k]."""
-    return tuple(x + (b[k - first] if first <= k < first + len(b) else 0) for k, x in enumerate(a))
 
-
-@by_type(add_row)
-def _add_row(a, first, b):
-    items = []
-    for k in range(len(a)):
-        term = f"a[{k}]"
+    def sum_at(k, x):
         for j in range(min(len(b), k + 1)):
-            term = f"(a[{k}] + b[{j}] if first == {k - j} else {term})"
-        items.append(term)
-    return define("a, first, b", f"return ({''.join(item + ', ' for item in items)})")
+            x = choose(first == k - j, a[k] + b[j], x)
+        return x
+
+    return tuple(sum_at(k, x) for k, x in enumerate(a))
 
 
 @shared

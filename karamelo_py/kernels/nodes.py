@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import types
-
-from karamelo_py.compiler.compile import by_type, point_function, real, shared
+from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_first, clear_optional
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
@@ -162,6 +160,7 @@ def _(task, kin, nodes, n, dt):
         nodes.velocity[n, k] = nodes.sums[n, of_momentum(kin) + k] * factor
 
 
+@shared
 def unlimited(seen, n, mass, light):
     """The share of its change of velocity that a node shows: all where it is not light."""
     if seen is None:
@@ -169,13 +168,6 @@ def unlimited(seen, n, mass, light):
     square = mass * mass
     least = light * seen[n, 0]
     return square / least if square < least else real(1, mass)
-
-
-@by_type(unlimited)
-def _unlimited(seen, n, mass, light):
-    if isinstance(seen, types.NoneType):
-        return lambda seen, n, mass, light: real(1, mass)
-    return unlimited
 
 
 @at_node.on(UpdateToVelocity)
