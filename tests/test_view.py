@@ -77,6 +77,23 @@ def test_view_takes_files_in_the_order_of_their_steps(tmp_path, monkeypatch, cap
     assert (tmp_path / "f.16.png").exists()
 
 
+def test_colours_mean_the_same_in_all_pictures(tmp_path, monkeypatch, capsys):
+    """The first picture knows of the larger values of the second, which is as if drawn alone."""
+    monkeypatch.chdir(tmp_path)
+    low, high = tmp_path / "p.0.dump", tmp_path / "p.8.dump"
+    for path, step, speed in ((low, 0, 1), (high, 8, 9)):
+        path.write_text(
+            f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS sm sm sm\n"
+            "0 1\n0 1\n0 0\nITEM: ATOMS id type tag x y z vx\n"
+            f"1 1 1 0.1 0.1 0 0\n2 1 2 0.2 0.2 0 {speed}\n"
+        )
+    for files, name in (([low], "a"), ([high], "b"), ([low, high], "c")):
+        words = [str(file) for file in files]
+        assert call(capsys, "view", *words, "-c", "vx", "-o", f"{name}.*.png")[0] == 0
+    assert (tmp_path / "c.8.png").read_bytes() == (tmp_path / "b.8.png").read_bytes()
+    assert (tmp_path / "c.0.png").read_bytes() != (tmp_path / "a.0.png").read_bytes()
+
+
 @pytest.mark.parametrize(
     ("arguments", "remedy"),
     [

@@ -61,7 +61,10 @@ def run(options: argparse.Namespace) -> int:
     with unwarned():
         picture = None
         for snapshot in (snapshot for file in files for snapshot in read(file)):
-            picture = picture or _picture(snapshot, options)
+            if picture is None:
+                picture = _picture(snapshot, options)
+                # The colours mean the same in all pictures.
+                picture.begin_with(_range(files, _coloured_by(snapshot, options.column)))
             _show(picture, snapshot, options.column)
             drawn += 1
             if movie:
@@ -95,9 +98,7 @@ def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
             expected="one of " + " ".join(first.columns),
             hint=f"did you mean '{close}'?" if close else None,
         )
-    # A dump holds zeros where the scene has no direction.
-    dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
-    column = options.column or ("type" if dimension > 1 else "x")
+    dimension, column = _dimension(first), _coloured_by(first, options.column)
     limits = (options.vmin, options.vmax)
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
     look = picture.Options(
@@ -113,6 +114,25 @@ def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
     made = picture.make(domain, size, DPI, look)
     made.side = _side(np.column_stack([first.columns[name] for name in "xyz"]))
     return made
+
+
+def _dimension(snapshot: Snapshot) -> int:
+    # A dump holds zeros where the scene has no direction.
+    return 3 if snapshot.columns["z"].any() else 2 if snapshot.columns["y"].any() else 1
+
+
+def _coloured_by(snapshot: Snapshot, column: str | None) -> str:
+    return column or ("type" if _dimension(snapshot) > 1 else "x")
+
+
+def _range(files: Iterable[Path], column: str) -> tuple[float, float] | None:
+    """Limits of the values of a column in all snapshots."""
+    from karamelo_py.styles.dumps.picture import grown
+
+    found = [s.columns[column] for file in files for s in read(file) if column in s.columns]
+    finite = [values[np.isfinite(values)] for values in found]
+    ends = [end for values in finite if len(values) for end in (values.min(), values.max())]
+    return grown(None, np.array(ends)) if ends else None
 
 
 def _show(picture: Any, snapshot: Snapshot, column: str | None) -> None:
