@@ -7,7 +7,7 @@ import pytest
 from fakes import FakeHub
 from PIL import Image
 
-from karamelo_py.app import plot
+from karamelo_py.app import plot, view
 from karamelo_py.app.cli import main
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import read
@@ -92,6 +92,20 @@ def test_colours_mean_the_same_in_all_pictures(tmp_path, monkeypatch, capsys):
         assert call(capsys, "view", *words, "-c", "vx", "-o", f"{name}.*.png")[0] == 0
     assert (tmp_path / "c.8.png").read_bytes() == (tmp_path / "b.8.png").read_bytes()
     assert (tmp_path / "c.0.png").read_bytes() != (tmp_path / "a.0.png").read_bytes()
+
+
+def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
+    """A .pvd has no domain: the picture shows where the points are at any time."""
+    monkeypatch.chdir(tmp_path)
+    hub = FakeHub(tmp_path)
+    hub.dumps["d"] = Vtk(hub, 5, "p.*.vtu", "vx")
+    x = hub.fields.points["x"].copy()
+    hub.dumps["d"].write()
+    hub.update.step, hub.update.time = 5, 0.5
+    hub.fields.points["x"] = x + 3
+    hub.dumps["d"].write()
+    lo, hi, _ = view._all([tmp_path / "p.pvd"], "vx")
+    assert lo[0] < x.min() and hi[0] > x.max() + 3
 
 
 @pytest.mark.parametrize(

@@ -61,10 +61,7 @@ def run(options: argparse.Namespace) -> int:
     with unwarned():
         picture = None
         for snapshot in (snapshot for file in files for snapshot in read(file)):
-            if picture is None:
-                picture = _picture(snapshot, options)
-                # The colours mean the same in all pictures.
-                picture.begin_with(_range(files, _coloured_by(snapshot, options.column)))
+            picture = picture or _picture(snapshot, files, options)
             _show(picture, snapshot, options.column)
             drawn += 1
             if movie:
@@ -86,8 +83,8 @@ def _number(path: Path) -> int:
     return int(digits[-1]) if digits else -1
 
 
-def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
-    """The empty picture that suits the first snapshot."""
+def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace) -> Any:
+    """The empty picture that suits the first snapshot; place and colours suit all of them."""
     from karamelo_py.styles.dumps import picture
     from karamelo_py.styles.dumps.pyplot import colours_of
 
@@ -109,9 +106,11 @@ def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
         azimuth=options.azimuth,
         elevation=options.elevation,
     )
-    domain = SimpleNamespace(dimension=dimension, lo=first.lo, hi=first.hi)
+    lo, hi, span = _all(files, column)
+    domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
     size = tuple(pixels / DPI for pixels in options.size)
     made = picture.make(domain, size, DPI, look)
+    made.begin_with(span)
     made.side = _side(np.column_stack([first.columns[name] for name in "xyz"]))
     return made
 
@@ -125,14 +124,18 @@ def _coloured_by(snapshot: Snapshot, column: str | None) -> str:
     return column or ("type" if _dimension(snapshot) > 1 else "x")
 
 
-def _range(files: Iterable[Path], column: str) -> tuple[float, float] | None:
-    """Limits of the values of a column in all snapshots."""
+def _all(files: Iterable[Path], column: str) -> tuple[np.ndarray, np.ndarray, Any]:
+    """Corners around all snapshots, and limits of the values of a column in them."""
     from karamelo_py.styles.dumps.picture import grown
 
-    found = [s.columns[column] for file in files for s in read(file) if column in s.columns]
-    finite = [values[np.isfinite(values)] for values in found]
-    ends = [end for values in finite if len(values) for end in (values.min(), values.max())]
-    return grown(None, np.array(ends)) if ends else None
+    corners, ends = [], []
+    for snapshot in (snapshot for file in files for snapshot in read(file)):
+        corners.append((snapshot.lo, snapshot.hi))
+        values = snapshot.columns.get(column, np.empty(0))
+        values = values[np.isfinite(values)]
+        ends += [values.min(), values.max()] if len(values) else []
+    lo, hi = zip(*corners, strict=True)
+    return np.min(lo, axis=0), np.max(hi, axis=0), grown(None, np.array(ends)) if ends else None
 
 
 def _show(picture: Any, snapshot: Snapshot, column: str | None) -> None:
