@@ -123,6 +123,9 @@ def test_names_are_used_once(hub):
     say(hub, "save_plot(p.png)\ndump(q, all, pyplot, 1, q.png, 3, 3)")
     assert "save_plot already writes" in refused(hub, "dump(r, all, pyplot, 1, p.png, 3, 3)")[0]
     assert "dump 'q' already writes to q.png" in refused(hub, "save_plot(q.png)")[0]
+    say(hub, "restart(5, r.h5)\nrestart(9, r.h5)")
+    assert "restart already writes to r.h5" in refused(hub, "dump(r, all, hdf5, 1, r.h5)")[0]
+    assert "dump 'd' already writes to f" in refused(hub, "restart(5, f)")[0]
     # What a deleted dump has written is not overwritten either.
     say(hub, "delete_dump(d)")
     assert "already writes" in refused(hub, "dump(d, all, particle, 1, f)")[0]

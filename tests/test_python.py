@@ -162,7 +162,9 @@ def test_a_function_of_a_module(run_interpreted, tmp_path):
         ("rops.pull", "the module rops cannot be imported"),
         ("pull", "'pull' names no module"),
         ("ropes.pull, final", "one of post_particles_to_grid"),
-        ("ropes.broken", "ZeroDivisionError: division by zero (ropes.py:4)"),
+        ("ropes.broken", "fix python: broken: ZeroDivisionError: division by zero (ropes.py:4)"),
+        ("ropes.leaves", "fix python: leaves: SystemExit: 0 (ropes.py:6)"),
+        ("ropes.two", "two cannot be called with one argument: missing a required argument: 'b'"),
         ("ropes.pull", "the method has to be thermo-mechanical"),
     ],
 )
@@ -170,6 +172,7 @@ def test_functions_with_faults(run_interpreted, tmp_path, line, says):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "ropes.py").write_text(
         "def pull(points):\n    return points.heat_supply\n\ndef broken(points): return 1/0\n"
+        "\ndef leaves(points): raise SystemExit(0)\n\ndef two(points, b): pass\n"
     )
     result = run_interpreted(block(2, f"fix(p, python, all, {line})", "run(1)"), status=1)
     assert says in result.err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import pytest
 from scenes import block
 
 from karamelo_py import Simulation, SimulationError
-from karamelo_py.scene.meshes.reading import refuse_commands
+from karamelo_py.scene.meshes.geometry import refuse_commands
 from karamelo_py.script.errors import ScriptError
 
 RUN = block(2, "fix(v, initial_velocity_particles, all, 0.1, 0)", "set_dt(0.001)", "run(2)")
@@ -88,6 +89,17 @@ ACTS = [
     'Merge "other.geo";',
     'name = "other.geo";\nInclude Str(name);',
     'Parse["SystemCall hacked"];',
+    # Texts that hide what follows: Gmsh has two kinds of quotes, over lines too, up to a length.
+    "Printf('\"'); SystemCall 'touch hacked'; Printf('\"');",
+    'Printf("x\n"); SystemCall "touch hacked"; Printf("");',
+    f'Printf("{"x" * 2000}; SystemCall touch hacked; ");',
+    # What Gmsh does not know it reads as its own language.
+    'Include "other.txt";',
+    'Merge "other.pos";',
+    'Merge "other.msh";',
+    'Printf("Include "); Printf("x"); name = "other.geo"; Include Str(name);',
+    'General.OptionsFileName = "hacked"; General.SaveOptions = 1;',
+    "Exit;",
 ]
 
 
@@ -95,20 +107,33 @@ ACTS = [
 def test_a_geometry_that_acts(run_interpreted, tmp_path, line):
     folder = tmp_path / "run"
     folder.mkdir()
-    (folder / "other.geo").write_text('\n\nSystemCall "touch hacked";\n')
+    for name in ("other.geo", "other.txt", "other.pos", "other.msh"):
+        (folder / name).write_text('\n\nSystemCall "touch hacked";\n')
     (folder / "box.geo").write_text(SQUARE + line + "\n")
     script = block(2).replace("region, box, 2,", "mesh, box.geo,")
     result = run_interpreted(script, status=1)
-    assert "would run a program or write a file" in result.err
+    says = "would end this program" if line == "Exit;" else "run a program or write a file"
+    assert says in result.err
     assert "--trust-geometries" in result.err
-    where = "other.geo, line 3" if '"other' in line and "name" not in line else "box.geo, line"
-    assert where in result.err
+    read = re.fullmatch(r'(?:Include|Merge) "(other\.(?!txt)\w+)";', line)
+    assert (f"{read[1]}, line 3" if read else "box.geo, line") in result.err
     assert not list(folder.glob("hacked*"))
+
+
+def test_options_beside_a_geometry(tmp_path):
+    """Gmsh reads box.geo.opt with box.geo."""
+    path = tmp_path / "box.geo"
+    path.write_text(SQUARE)
+    refuse_commands(path)
+    (tmp_path / "box.geo.opt").write_text('SystemCall "touch hacked";\n')
+    with pytest.raises(ScriptError, match=r"box\.geo\.opt, line 1: SystemCall"):
+        refuse_commands(path)
 
 
 @pytest.mark.parametrize(
     "text",
-    ["// SystemCall\n", "/* Save\n Print */\n", 'Printf("SystemCall");\n', "SystemCalls = 1;\n"],
+    ["// SystemCall\n", "/* Save\n Print */\n", 'Printf("SystemCall");\n', "SystemCalls = 1;\n",
+     "General.Terminal = 1; // it's \"\n"],
 )  # fmt: skip
 def test_a_geometry_that_only_speaks(tmp_path, text):
     path = tmp_path / "a.geo"

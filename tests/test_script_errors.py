@@ -196,7 +196,7 @@ LAMMPS = [
     ("thermo_style custom step pe", 14, "log_modify(custom, "),
     ("velocity(all, set, 1, 0)", 1, "initial_velocity_particles"),
     ("variable a equal 3", 10, "name = expression"),
-    ("units si", 7, "units(si)"),
+    ("units si", 7, "units(m, kg, s)"),
     ("lattice", 1, "solid(ID, region, "),
     ("fix(f, all, nve)", 13, "points move without a fix"),
     ("fix(f, nve, all)", 8, "points move without a fix"),

@@ -96,6 +96,9 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("strength(s, johnson_cook, 1, 1, 1, 1, 0, 0)", "n, epsdot0, C, 0, 0, 1)"),
         ("damage(d, damage_johnson_cook, 1, 1, 1, 0, 1)", "d3, d4, 0, epsdot0, 0, 1)"),
         ("fix(f, indent/pinball, all)", "indent/minimize_penetration"),
+        ("my speed = 3", "a name has no blanks: my_speed = ..."),
+        ("x AND y", "write and"),
+        ("w = sin(t)", "did you mean 'time'?"),
     ],
 )
 def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):

@@ -7,7 +7,7 @@ import pytest
 from fakes import FakeHub
 from PIL import Image
 
-from karamelo_py.app import plot
+from karamelo_py.app import plot, view
 from karamelo_py.app.cli import main
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import read
@@ -75,6 +75,37 @@ def test_view_takes_files_in_the_order_of_their_steps(tmp_path, monkeypatch, cap
     status, out, _ = call(capsys, "view", *sorted(files), "-o", "f.*.png")
     assert (status, out) == (0, "f.*.png: 3 pictures\n")
     assert (tmp_path / "f.16.png").exists()
+
+
+def test_colours_mean_the_same_in_all_pictures(tmp_path, monkeypatch, capsys):
+    """The first picture knows of the larger values of the second, which is as if drawn alone."""
+    monkeypatch.chdir(tmp_path)
+    low, high = tmp_path / "p.0.dump", tmp_path / "p.8.dump"
+    for path, step, speed in ((low, 0, 1), (high, 8, 9)):
+        path.write_text(
+            f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS sm sm sm\n"
+            "0 1\n0 1\n0 0\nITEM: ATOMS id type tag x y z vx\n"
+            f"1 1 1 0.1 0.1 0 0\n2 1 2 0.2 0.2 0 {speed}\n"
+        )
+    for files, name in (([low], "a"), ([high], "b"), ([low, high], "c")):
+        words = [str(file) for file in files]
+        assert call(capsys, "view", *words, "-c", "vx", "-o", f"{name}.*.png")[0] == 0
+    assert (tmp_path / "c.8.png").read_bytes() == (tmp_path / "b.8.png").read_bytes()
+    assert (tmp_path / "c.0.png").read_bytes() != (tmp_path / "a.0.png").read_bytes()
+
+
+def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
+    """A .pvd has no domain: the picture shows where the points are at any time."""
+    monkeypatch.chdir(tmp_path)
+    hub = FakeHub(tmp_path)
+    hub.dumps["d"] = Vtk(hub, 5, "p.*.vtu", "vx")
+    x = hub.fields.points["x"].copy()
+    hub.dumps["d"].write()
+    hub.update.step, hub.update.time = 5, 0.5
+    hub.fields.points["x"] = x + 3
+    hub.dumps["d"].write()
+    lo, hi, _ = view._all([tmp_path / "p.pvd"], "vx")
+    assert lo[0] < x.min() and hi[0] > x.max() + 3
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,9 @@ from karamelo_py.output.plots import Curve, Plots
 from karamelo_py.script.errors import ScriptError, nearest
 
 SUMMARY = "Draw columns of a log."
-TEXT = "The log is log.mpm or log.csv. Without columns, lists those that there are."
+TEXT = """\
+The log is log.mpm or log.csv. Without columns, lists those that there are. The command of scripts
+is explained by karamelo-py help command plot."""
 
 
 def add_parser(subparsers: Any) -> argparse.ArgumentParser:

@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     with unwarned():
         picture = None
         for snapshot in (snapshot for file in files for snapshot in read(file)):
-            picture = picture or _picture(snapshot, options)
+            picture = picture or _picture(snapshot, files, options)
             _show(picture, snapshot, options.column)
             drawn += 1
             if movie:
@@ -83,8 +83,8 @@ def _number(path: Path) -> int:
     return int(digits[-1]) if digits else -1
 
 
-def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
-    """The empty picture that suits the first snapshot."""
+def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace) -> Any:
+    """The empty picture that suits the first snapshot; place and colours suit all of them."""
     from karamelo_py.styles.dumps import picture
     from karamelo_py.styles.dumps.pyplot import colours_of
 
@@ -95,9 +95,7 @@ def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
             expected="one of " + " ".join(first.columns),
             hint=f"did you mean '{close}'?" if close else None,
         )
-    # A dump holds zeros where the scene has no direction.
-    dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
-    column = options.column or ("type" if dimension > 1 else "x")
+    dimension, column = _dimension(first), _coloured_by(first, options.column)
     limits = (options.vmin, options.vmax)
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
     look = picture.Options(
@@ -108,11 +106,36 @@ def _picture(first: Snapshot, options: argparse.Namespace) -> Any:
         azimuth=options.azimuth,
         elevation=options.elevation,
     )
-    domain = SimpleNamespace(dimension=dimension, lo=first.lo, hi=first.hi)
+    lo, hi, span = _all(files, column)
+    domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
     size = tuple(pixels / DPI for pixels in options.size)
     made = picture.make(domain, size, DPI, look)
+    made.begin_with(span)
     made.side = _side(np.column_stack([first.columns[name] for name in "xyz"]))
     return made
+
+
+def _dimension(snapshot: Snapshot) -> int:
+    # A dump holds zeros where the scene has no direction.
+    return 3 if snapshot.columns["z"].any() else 2 if snapshot.columns["y"].any() else 1
+
+
+def _coloured_by(snapshot: Snapshot, column: str | None) -> str:
+    return column or ("type" if _dimension(snapshot) > 1 else "x")
+
+
+def _all(files: Iterable[Path], column: str) -> tuple[np.ndarray, np.ndarray, Any]:
+    """Corners around all snapshots, and limits of the values of a column in them."""
+    from karamelo_py.styles.dumps.picture import grown
+
+    corners, ends = [], []
+    for snapshot in (snapshot for file in files for snapshot in read(file)):
+        corners.append((snapshot.lo, snapshot.hi))
+        values = snapshot.columns.get(column, np.empty(0))
+        values = values[np.isfinite(values)]
+        ends += [values.min(), values.max()] if len(values) else []
+    lo, hi = zip(*corners, strict=True)
+    return np.min(lo, axis=0), np.max(hi, axis=0), grown(None, np.array(ends)) if ends else None
 
 
 def _show(picture: Any, snapshot: Snapshot, column: str | None) -> None:

@@ -55,21 +55,13 @@ def dump(
     _check_order(hub, arguments)
     new = signature.call(target, hub, list(arguments), f"dump {style}")
     new.style = style
-    writer = hub.output.files.get(new.file)
-    if writer is not None and ID not in hub.dumps:
-        raise ScriptError(
-            f"dump '{writer}' already writes to {new.file}",
-            place=arguments[1].place,
-            expected="a file name of its own for each dump",
-        )
-    if new.file == hub.output.plots.file:
-        raise ScriptError(
-            f"save_plot already writes to {new.file}",
-            place=arguments[1].place,
-            expected="a file name of its own for each dump",
-        )
+    hub.dumps.refuse(ID)
+    try:
+        hub.output.claim(new.file, f"dump '{ID}'")
+    except ScriptError as error:
+        error.place = arguments[1].place
+        raise
     hub.dumps.add(ID, new)
-    hub.output.files[new.file] = ID
 
 
 def _check_order(hub: Hub, arguments: tuple[Argument, ...]) -> None:
@@ -271,13 +263,9 @@ def save_plot(hub: Hub, file: OutputFile) -> None:
     """
     picture_format(file)
     hub.output.check_file(file)
-    if file in hub.output.files:
-        raise ScriptError(
-            f"dump '{hub.output.files[file]}' already writes to {file}",
-            argument="file",
-            expected="a file name of its own",
-        )
     plots = hub.output.plots
+    hub.output.files.pop(plots.file, None)
+    hub.output.claim(file, "save_plot")
     plots.file, plots.place = file, hub.place
     if not hub.rehearsing:
         plots.finish()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from karamelo_py.language.signature import Argument, OutputFile
 from karamelo_py.output.rhythm import ByTime, Every
+from karamelo_py.output.schedule import RESTART
 from karamelo_py.run import restart as files
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -67,6 +68,7 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     new = files.Restarts(hub, every, Path(file))
     new.place = hub.place
     hub.output.check_file(new.file)
+    hub.output.claim(new.file, RESTART)
     hub.output.last.append(new)
 
 
@@ -91,6 +93,7 @@ def write_restart(hub: Hub, file: OutputFile) -> None:
     restart, read_restart
     """
     hub.output.check_file(Path(file))
+    hub.output.claim(Path(file), RESTART)
     if hub.rehearsing or hub.checking:
         return
     if hub.update.method is None or not hub.solids:

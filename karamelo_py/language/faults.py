@@ -42,7 +42,7 @@ def told(name: str, where: str, code: Any, place: Place | None) -> Iterator[None
     except KNOWN:
         raise
     except Exception as error:
-        what = f"{cause_of(error)}{_place(error, code)}"
+        what = f"{cause_of(error)}{place_in(code, error)}"
         raise fault(name, f"{where}: {what}", place, TRACEBACK) from error
 
 
@@ -103,8 +103,8 @@ def places_of(error: Exception) -> list[tuple[str, int]]:
     return [*named, *((code.co_filename, code.co_firstlineno) for code in codes), *here]
 
 
-def _place(error: Exception, code: Any) -> str:
-    """`` (spring.py:28)``: the last line of the style's own file that took part."""
+def place_in(code: Any, error: BaseException) -> str:
+    """`` (spring.py:28)``: the last line of the own file of `code` that took part."""
     try:
         own = inspect.getsourcefile(code)
     except TypeError:

@@ -571,7 +571,11 @@ class Interpreter:
         published = [value for value in self.hub.values.names() if value not in SEEDS]
         known = [*self.variables, *published, *SEEDS, *CONSTANTS]
         by_style = self._values_by_style()
-        close = nearest(name, known) or by_style.get(nearest(name, by_style) or "")
+        close = (
+            "time"
+            if name == "t"
+            else nearest(name, known) or by_style.get(nearest(name, by_style) or "")
+        )
         hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
         if re.match("leq|geq", name) and not close:
             hint = f"{name[:3]} stands in front of a bound in fix velocity_nodes only"

@@ -16,6 +16,8 @@ from karamelo_py.output.rhythm import ByTime, is_due, next_step
 from karamelo_py.output.units import Units
 from karamelo_py.script.errors import ScriptError
 
+RESTART = "restart"
+
 
 class Periodic(Protocol):
     """Something written again and again; `last_step` is the step it last wrote."""
@@ -47,7 +49,7 @@ class Output:
         self.writes = True
         # Written after all others, which then have nothing to write of the same state.
         self.last: list[Periodic] = []
-        # Which dump a file belongs to.
+        # Who writes to a file.
         self.files: dict[Path, str] = {}
 
     def check_file(self, file: Path) -> None:
@@ -71,6 +73,23 @@ class Output:
         else:
             return
         raise ScriptError(what, argument="file", expected="the name of another file")
+
+    def claim(self, file: Path, writer: str) -> None:
+        """Keep `file` for one writer, such as a dump; only restart files may be written again.
+
+        Raises
+        ------
+        ScriptError
+            With the argument ``file`` if it is another one's.
+        """
+        other = self.files.get(file)
+        if other is not None and not other == writer == RESTART:
+            raise ScriptError(
+                f"{other} already writes to {file}",
+                argument="file",
+                expected="the name of another file",
+            )
+        self.files[file] = writer
 
     def begin(self, *, within: bool = False) -> None:
         """Write the headers and the first state of a run; not that of one gone on `within`."""

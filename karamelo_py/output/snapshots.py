@@ -24,7 +24,7 @@ class Snapshot(NamedTuple):
     columns
         (n,) arrays by name, with x, y and z among them.
     lo, hi
-        (3,) corners of the domain, or of the points where the file does not say.
+        (3,) corners of the domain, or around the points where the file does not say.
     """
 
     step: int
@@ -105,4 +105,6 @@ def _vtu(path: Path, time: float = np.nan) -> Iterator[Snapshot]:
     number = re.search(r"(\d+)\D*$", path.stem)
     columns = dict(zip("xyz", mesh.points.T, strict=True)) | mesh.point_data
     lo, hi = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    margin = np.where(hi > lo, 0.03 * (hi - lo).max(), 0)
+    lo, hi = lo - margin, hi + margin
     yield Snapshot(int(number[1]) if number else 0, time, columns, lo, hi)

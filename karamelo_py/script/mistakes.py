@@ -10,7 +10,7 @@ import re
 from typing import Any, NamedTuple
 
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.other_programs import instead
+from karamelo_py.script.other_programs import OTHERWISE, instead
 from karamelo_py.script.syntax import Source
 
 
@@ -334,10 +334,15 @@ def _side_by_side(at: _Stop) -> Mistake:
         )
     if len(at.before) == 1 and before.type == "NAME":
         words = [word.strip(",") for word in code[at.start :].strip().rstrip(",").split()]
+        hint = _block_or_call(before, words)
+        if re.match(r"\s*=(?!=)", code[at.end :]):
+            hint = f"a name has no blanks: {before}_{here} = ..."
+        if here.lower() in ("and", "or", "not"):
+            hint = f"write {here.lower()}"
         return at.mistake(
             f"'{here}' follows '{before}' without an operator",
             "name = expression, or command(arguments)",
-            _block_or_call(before, words),
+            hint,
         )
     hint = None
     if at.after_call and at.kind == "NAME":
@@ -360,7 +365,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
     """What to write instead of ``name word word``."""
     if name in _BLOCKS:
         return _NO_BLOCKS
-    if other := instead("command", name):
+    if other := OTHERWISE.get(name) or instead("command", name):
         return other
     if name in ("fix", "compute") and len(words) > 2:
         other = instead(name, words[2]) or ""

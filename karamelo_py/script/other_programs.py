@@ -56,7 +56,6 @@ INSTEAD = {
         "neigh_modify": f"{_NEEDLESS}: points interact by the grid",
         "newton": _NEEDLESS,
         "processors": "karamelo-py SCRIPT --threads N",
-        "units": "units(m, kg, s) names the units of all numbers; or leave it out",
         "write_data": "write_restart(file), or dump(ID, all, particle, every, file, ...)",
         "write_dump": "dump(ID, all, particle, every, file, ...) writes the last state, too",
         "minimize": "fix(ID, local_damping, all, 0.8) and run_while(Ek > ...)",
@@ -121,6 +120,9 @@ INSTEAD = {
     },
 }
 
+
+# Commands that there are here, too, with other arguments.
+OTHERWISE = {"units": "units(m, kg, s) names the units of all numbers; or leave it out"}
 
 # What stands for the arguments that earlier forms of Karamelo's laws did not have.
 SHORTER = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import re
 import tempfile
 import warnings
 from functools import lru_cache
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from karamelo_py.scene.meshes.geometry import refuse_commands
 from karamelo_py.script.errors import ScriptError, nearest
 
 if TYPE_CHECKING:
@@ -44,8 +44,8 @@ def read(path: Path, dimension: int, trusted: bool = False) -> meshio.Mesh:
         raise ScriptError(
             f"the file {path.name} is empty", argument="file", expected="a mesh or a geometry"
         )
-    if path.suffix.lower() in GEOMETRIES and not trusted:
-        refuse_commands(path)
+    if path.suffix.lower() in GEOMETRIES:
+        refuse_commands(path, trusted=trusted)
     # Regions and solids often come from the same file.
     return _read(path.resolve(), dimension, (status.st_mtime_ns, status.st_size))
 
@@ -105,44 +105,6 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, SystemExit) or not str(error).strip():
         return "its content does not fit its ending"
     return f"{' '.join(str(error).split())} ({type(error).__name__})"
-
-
-_TEXT = re.compile(r'"[^"\n]*"|//[^\n]*|/\*.*?\*/', re.S)
-# Words of Gmsh's language that run programs, read further files, or write some.
-_ACTS = re.compile(
-    r"\b(?:(?:NonBlocking)?System(?:Call)?|OnelabRun|Parse|CreateDir|Plugin|Save|Print)\b"
-    r"|\bPrintf\b[^;]*>|\b(?:Include|Merge|ShapeFromFile)\b"
-)
-_READS = re.compile(r'\b(?:Include|Merge)\s*\(?\s*"([^"\n]*)"')
-
-
-def refuse_commands(path: Path, seen: tuple[Path, ...] = ()) -> None:
-    """Refuse a geometry that would do more than describe one, in files that it reads, too.
-
-    Raises
-    ------
-    ScriptError
-        Naming file, line and word.
-    """
-    if path in seen or not path.is_file():
-        return
-    code = path.read_text(encoding="utf-8", errors="replace")
-    plain = _TEXT.sub(lambda m: '""' if m[0][0] == '"' else "\n" * m[0].count("\n"), code)
-    files = iter(_READS.findall(re.sub(r"//[^\n]*|/\*.*?\*/", "", code, flags=re.S)))
-    for match in _ACTS.finditer(plain):
-        word = match[0].split("(")[0].strip()
-        if word in ("Include", "Merge") and (other := next(files, None)) is not None:
-            other = path.parent / other
-            if other.suffix.lower() in (*GEOMETRIES, ""):
-                refuse_commands(other, (*seen, path))
-            continue
-        raise ScriptError(
-            f"{path.name}, line {plain.count(chr(10), 0, match.start()) + 1}: {word} would run a "
-            "program or write a file",
-            argument="file",
-            expected="a geometry that describes a shape and no more",
-            hint="the option --trust-geometries lets it",
-        )
 
 
 def _mesh_geometry(path: Path, dimension: int, target: Path) -> None:

@@ -32,6 +32,8 @@ def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
                 f"more components than the {d} dimension{'s' if d > 1 else ''} of the domain",
                 expected=f"{wanted} (a further one may only be NULL or 0)",
             )
+    if all(formula is None for formula in formulas[:d]):
+        hub.warn("all components are NULL: it leaves everything alone")
     return formulas[:d]
 
 

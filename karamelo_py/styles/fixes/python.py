@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -12,7 +13,7 @@ import numpy as np
 
 from karamelo_py.kernels.hooks import ACTS_ON, STAGES
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.language.faults import cause_of, told
+from karamelo_py.language.faults import KNOWN, cause_of, place_in
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.group import AnyGroup, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -52,7 +53,7 @@ class PythonFunction:
             if beside.is_file() and not _is_of(sys.modules.get(module), beside):
                 sys.modules.pop(module, None)
             found = import_module(module)
-        except Exception as error:  # a module may fail in any way
+        except (Exception, SystemExit) as error:  # a module may fail in any way
             raise ScriptError(
                 f"the module {module} cannot be imported: {cause_of(error)}", place=argument.place
             ) from error
@@ -125,14 +126,26 @@ class Python(Fix):
                 expected="one of "
                 + ", ".join(m for m in MOMENTS if (ACTS_ON[m] == "nodes") == on_nodes),
             )
+        _check_arguments(function)
         super().__init__(hub, group)
         self.function = function
         self.point_fields = () if on_nodes else (Force,)
         setattr(self, moment, self._act)
 
     def _act(self, view: Any) -> None:
-        with told(f"fix {self.style}", self.function.__name__, self.function, self.place):
+        try:
             given = self.function(view)
+        except KNOWN:
+            raise
+        except (Exception, SystemExit) as error:  # exit() would end the program without a word
+            what = f"{cause_of(error)}{place_in(self.function, error)}"
+            told = ScriptError(
+                f"fix python: {_name(self.function)}: {what}",
+                place=self.place,
+                hint="the function has to be mended there; --debug shows the traceback",
+            )
+            told.complete = True
+            raise told from error
         if given is None:
             return
         numbers = np.asarray(given, float)
@@ -140,3 +153,21 @@ class Python(Fix):
             self.publish("", numbers)
         else:
             self.publish_components(numbers)
+
+
+def _name(function: Any) -> str:
+    return getattr(function, "__name__", type(function).__name__)
+
+
+def _check_arguments(function: Any) -> None:
+    """Refuse a function that cannot be called with the view alone."""
+    try:
+        inspect.signature(function).bind(None)
+    except TypeError as error:
+        raise ScriptError(
+            f"{_name(function)} cannot be called with one argument: {error}",
+            argument="function",
+            expected="a function of one argument, the points or nodes of the group",
+        ) from None
+    except ValueError:  # nobody knows what it takes
+        pass
