@@ -28,6 +28,7 @@ from karamelo_py.compiler.compile import entered, point_function, subkernel
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
+from karamelo_py.kernels.loss import Rubbed, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.kernels.step import touch, touch_velocity
 from karamelo_py.points.basis.surface import ENTRIES
@@ -44,6 +45,7 @@ class SeparateFields(NamedTuple):
 
     stride: int  # from a node to the same place in the next field
     friction: np.ndarray  # (F, F) coefficient of each pair of fields; infinite: no slip
+    warmth: np.ndarray  # (F, F) share of the heat of friction that goes to the first of two fields
     pair: np.ndarray  # (F, F) slot of the published force of a pair on its first field, or -1
     slot: np.ndarray  # (F,) slot of the published force on each field
     copies: np.ndarray  # (k, 2) slots: from a field to the other solids that share it
@@ -326,6 +328,16 @@ def _rub(contact, d, nodes, pair, friction, push, size, across, share):
 
 
 @subkernel
+def _work_of_friction(contact, d, nodes, pair, push, across, rub):
+    """What friction takes of the energy of two bodies: impulse times mean of the sliding speeds."""
+    work = 0.0
+    for k in range(d):
+        slide = _slide(contact, nodes, pair, k, push, across)
+        work += rub * slide * slide * (1.0 - 0.5 * rub * _yielding(contact, pair, k))
+    return work
+
+
+@subkernel
 def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
@@ -346,6 +358,11 @@ def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     values, kick = control.values, control.clock[0].kick
     step = int(values[TIMESTEP]) + 1
     contact.touched[pair.n, b] = -step if sticks else step
+    if rub > 0:
+        heat = _work_of_friction(contact, d, nodes, pair, push / size, across, rub)
+        share = contact.warmth[a, b]
+        warm_node(field(nodes.fields, Rubbed), pair.n, share * heat * pair.per_a)
+        warm_node(field(nodes.fields, Rubbed), pair.m, (1.0 - share) * heat * pair.per_b)
     for k in range(d):
         impulse = push * _outward(nodes, pair, k) / size
         if rub > 0:

@@ -20,7 +20,7 @@ from karamelo_py.compiler.fields import (
 )
 from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
 from karamelo_py.kernels.arrays import of_change
-from karamelo_py.kernels.loss import Lost, warm
+from karamelo_py.kernels.loss import Lost, Rubbed, warm, warm_by_friction
 from karamelo_py.kernels.visit import (
     deformation_of,
     for_tags,
@@ -467,6 +467,7 @@ def _move(w, stencil, p, dt, total):
     displacing = displacing_velocity(w.transfer, v, total[0], j)
     step = scale(dt, constrained_velocity(law, v, displacing))
     y = add_scaled(x, real(1, dt), step)
+    warm_by_friction(field(w.nodes.fields, Rubbed), w, stencil, p, v[0])
     warm(field(w.nodes.fields, Lost), w, stencil, p, subtract(total[0], total[1]))
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, total[2])
     increase(field(w.points.fields, Bounces), p, hits)

@@ -26,13 +26,19 @@ from karamelo_py.compiler.compile import (
     round_off,
     shared,
 )
-from karamelo_py.compiler.fields import store
+from karamelo_py.compiler.fields import scalar, store
 from karamelo_py.compiler.tuples import row, subtract
 from karamelo_py.kernels.arrays import MASS, of_change, of_momentum
 from karamelo_py.kernels.visit import law_of, state_of
 from karamelo_py.points.basis import entry, support
 from karamelo_py.points.kinematics import dimension
-from karamelo_py.points.laws import specific_volume, warmed
+from karamelo_py.points.laws import (
+    heat_capacity,
+    specific_volume,
+    temperature,
+    warmed,
+    with_temperature,
+)
 from karamelo_py.points.transfers import (
     add_moment,
     add_momentum,
@@ -56,6 +62,45 @@ class Lost(NamedTuple):
     def shape(kin):
         """Two numbers."""
         return 2
+
+
+class Rubbed(NamedTuple):
+    """Heat of friction at a node, per mass: of contact between solids and of walls."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+
+
+@shared
+def warm_node(rubbed, n, heat):
+    """Add `heat` per mass to a node, where the array is there for it."""
+    if rubbed is not None:
+        rubbed[n, 0] += heat
+
+
+@shared
+def warm_by_friction(rubbed, w, stencil, p, like):
+    """Point `p` takes the heat of friction at its nodes by its weights: none is lost."""
+    if rubbed is not None:
+        law = law_of(w, p)
+        state = state_of(w, law, p, like)
+        heat = _heat_of_nodes(rubbed, w, stencil, like)
+        capacity = heat_capacity(law, like)
+        warms = capacity > 0
+        rise = choose(warms, heat, like - like) / choose(warms, capacity, real(1, like))
+        T = temperature(law, w.kin, state) + rise
+        store(w.points.state, p, with_temperature(law, w.kin, state, T))
+
+
+@looping
+def _heat_of_nodes(rubbed, w, stencil, like):
+    heat = like - like
+    for k in range(support(w.basis, w.kin)):
+        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+        heat += weight * rubbed[i, 0]
+    return heat
 
 
 @shared

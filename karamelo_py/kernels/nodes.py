@@ -9,7 +9,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_first, clear_optional
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.g2p import NodalMean, NodalStress
-from karamelo_py.kernels.loss import Lost, keep_loss
+from karamelo_py.kernels.loss import Lost, Rubbed, keep_loss
 from karamelo_py.kernels.p2g import Centre, Led, Normal, SeenMass
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
@@ -65,6 +65,12 @@ class KeepLoss(NamedTuple):
     """What a node does not keep of the kinetic energy that it was brought."""
 
     goes_through = ("sums", "lost", "lost")
+
+
+class ClearRubbed(NamedTuple):
+    """Heat of friction starts from zero."""
+
+    goes_through = ("rubbed",)
 
 
 class Update(NamedTuple):
@@ -129,6 +135,11 @@ def _(task, kin, nodes, n, dt):
 @at_node.on(KeepLoss)
 def _(task, kin, nodes, n, dt):
     keep_loss(field(nodes.fields, Lost), kin, nodes.sums, n)
+
+
+@at_node.on(ClearRubbed)
+def _(task, kin, nodes, n, dt):
+    clear_optional(field(nodes.fields, Rubbed), n)
 
 
 @at_node.on(ClearVelocity)

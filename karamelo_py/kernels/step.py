@@ -43,9 +43,10 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.g2p import STRAINS, AverageStress, FBar, Move, SeriesTerm, TrialStrain
 from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks
-from karamelo_py.kernels.loss import Lost
+from karamelo_py.kernels.loss import Lost, Rubbed
 from karamelo_py.kernels.nodes import (
     ClearMean,
+    ClearRubbed,
     ClearSums,
     ClearVelocity,
     ExtendSeries,
@@ -438,9 +439,11 @@ def _(averaging, s, mode):
 
 
 @shared
-def sum_loss(lost, s, mode):
+def sum_loss(s, mode):
     """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
-    if lost is not None:
+    if field(s.nodes.fields, Rubbed) is not None:
+        sweep_nodes(mode, ClearRubbed(), s.kin, s.nodes, s.spans, step_size(s))
+    if field(s.nodes.fields, Lost) is not None:
         sweep_nodes(mode, KeepLoss(), s.kin, s.nodes, s.spans, step_size(s))
 
 
@@ -477,7 +480,7 @@ HEAT = _call(
     ),
 )
 LOSS = _call(
-    "sum_loss(field(s.nodes.fields, Lost), s, mode)",
+    "sum_loss(s, mode)",
     lambda s: (
         None
         if field(s.nodes.fields, Lost) is None

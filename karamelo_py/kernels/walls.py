@@ -10,7 +10,9 @@ from __future__ import annotations
 from math import sqrt
 
 from karamelo_py.compiler.compile import subkernel
+from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
+from karamelo_py.kernels.loss import Rubbed, warm_node
 from karamelo_py.points.kinematics import dimension
 
 FRICTION = 3  # the program of the coefficient, behind those of the components
@@ -41,6 +43,8 @@ def rub(kin, nodes, programs, n, mu, dt, kept, reaction):
         return
     speed = sqrt(along)
     stop = min(max(mu, 0.0) * sqrt(across), speed)
+    # The work of friction, with the mean of the speeds before and after; a wall takes no heat.
+    warm_node(field(nodes.fields, Rubbed), n, stop * (speed - 0.5 * stop))
     for c in range(d):
         if programs[c].begin < 0:
             taken = nodes.update[n, c] * (stop / speed)

@@ -28,7 +28,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.g2p import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
-from karamelo_py.kernels.loss import Lost
+from karamelo_py.kernels.loss import Lost, Rubbed
 from karamelo_py.kernels.step import Insulated
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried, deformed
@@ -205,6 +205,8 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     ]
     if returns_loss(hub):
         at_nodes.append(Lost)
+    if warms_by_friction(hub):
+        at_nodes.append(Rubbed)
     setup = Setup(
         frame=method.frame,
         kin=kin,
@@ -233,6 +235,15 @@ def returns_loss(hub: Hub) -> bool:
     if not lost_shares.defined(type(transfer)) or getattr(transfer, "alpha", 0) == 1:
         return False
     return any(can(solid.material.law, taken_heat) for solid in hub.solids.values())
+
+
+def warms_by_friction(hub: Hub) -> bool:
+    """Whether friction on the grid heats points of the scene."""
+    on_grid = hub.update.method.fields_per_solid
+    rubs = any(
+        fix.wall_friction is not None or (on_grid and fix.friction) for fix in hub.fixes.values()
+    )
+    return rubs and any(heat_capacity(s.material.law, 1.0) > 0 for s in hub.solids.values())
 
 
 def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> Nodes:

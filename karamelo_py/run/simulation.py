@@ -53,6 +53,7 @@ from karamelo_py.run.lowering import (
     lower,
     stable_courant,
     thread_count,
+    warms_by_friction,
 )
 from karamelo_py.run.stable import ruling_limit, shares_of_limits
 from karamelo_py.run.state import changing
@@ -83,6 +84,7 @@ def scene_key(hub: Hub) -> tuple:
         fields.declared(hub.fixes.values(), "point_fields"),
         fields.declared(hub.fixes.values(), "node_fields"),
         hub.fields.rate_is_asked_for(),
+        update.method is not None and warms_by_friction(hub),
         hub.settings.precision,
         hub.settings.threads,
     )

@@ -12,6 +12,7 @@ from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.run.lowering import warms_by_friction
 from karamelo_py.run.stable import USUAL, keeping_share, sparse
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.fixes.pairs import PairContact
@@ -62,8 +63,8 @@ def internal_energy(blocks: tuple) -> float:
 
 
 def unknown_heat(hub: Hub) -> bool:
-    """Whether a fix in Python may bring heat."""
-    return any(
+    """Whether a fix in Python may bring heat, or friction does."""
+    return warms_by_friction(hub) or any(
         name in HEAT_STAGES and not isinstance(hook, CompiledHook)
         for fix in hub.fixes.values()
         for name, hook in fix.hooks().items()

@@ -32,6 +32,10 @@ class ContactFriction(Fix):
     -----
     Publishes the contact force of solid2 on solid1 as ID_x, ID_y, ID_z.
 
+    The work of friction heats solids that have a temperature: half each, or all the one that has.
+    In methods with ``thermo-mechanical`` it is shared by the effusivities sqrt(kappa rho cp), as
+    between half-spaces.
+
     See Also
     --------
     contact/minimize_penetration, method ulmpm/contacts

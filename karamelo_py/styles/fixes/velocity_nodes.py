@@ -100,6 +100,7 @@ class VelocityNodes(Fix):
     Notes
     -----
     Publishes the reaction, the force that holds the nodes, as ID_x, ID_y, ID_z, friction among it.
+    The work of friction heats the points, where they have a temperature; the wall takes none of it.
     Where two such fixes hold a node in one direction, the later one decides, and has the rest of
     the reaction.
 

@@ -9,7 +9,13 @@ import numpy as np
 
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.points.basis.surface import surface_table
-from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.points.laws import (
+    can,
+    conductivity,
+    constrained_velocity,
+    heat_capacity,
+    specific_volume,
+)
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice, numbered
 from karamelo_py.scene.modify import Fix
@@ -25,6 +31,21 @@ def fields(hub: Hub) -> list[int]:
         other = solid.glued_to
         found[solid.id] = max(found.values(), default=-1) + 1 if other is None else found[other.id]
     return list(found.values())
+
+
+def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
+    """(F, F): the share of the heat of friction that the first of two solids takes.
+
+    Where heat flows, by their effusivities sqrt(kappa rho cp), as between two half-spaces in
+    contact (Carslaw & Jaeger 1959, section 2.15); half each where none does. A solid without a
+    temperature takes none.
+    """
+    takes = np.array([float(heat_capacity(law, 1.0)) > 0 for law in laws], float)
+    root = [conductivity(law, 1.0) * heat_capacity(law, 1.0) / specific_volume(law) for law in laws]
+    if conducting and max(root) > 0:
+        takes = np.sqrt(root)
+    total = takes[:, None] + takes[None, :]
+    return np.where(total > 0, takes[:, None] / np.where(total > 0, total, 1), 0.5)
 
 
 class ULMPMContacts(Method):
@@ -110,6 +131,9 @@ class ULMPMContacts(Method):
         return SeparateFields(
             stride=lattices[0].node_count,
             friction=np.zeros((count, count)),
+            warmth=heat_shares(
+                [first[k].material.law for k in range(count)], conducting=hub.update.thermal
+            ),
             pair=np.full((count, count), -1, np.int64),
             slot=np.array([hub.values.slot(f"{force_on(first[k])}_x") for k in range(count)]),
             copies=np.array(copies, np.int64).reshape(-1, 2),
