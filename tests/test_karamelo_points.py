@@ -131,7 +131,7 @@ def test_solids_as_in_2020(run_interpreted):
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("method_modify(FLIP, 0.99)", "method(ulmpm, FLIP, linear, 0.99)"),
+        ("method_modify(FLIP, 0.99)", "method(tlmpm, FLIP, linear, 0.99)"),
         ("solid(s, block, 0, 1, 0, 1, 2, rubber, 0.1)", "region(box, block, ...)"),
         ("solid(s, cylinder, 0.5, 0.5, 0.1, 2, rubber, 0.1)", "region(box, cylinder, ...)"),
         ("solid(s, rectangle, 0, 1, 0, 1, 2, rubber, 0.1)", "solid(ID, region, box, ppc"),
