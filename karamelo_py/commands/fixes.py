@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from karamelo_py.language import registry, signature
-from karamelo_py.language.interpreter import MEANINGS
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
+from karamelo_py.language.unknown import MEANINGS
 from karamelo_py.scene.guests import check_fix
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.script.errors import ScriptError

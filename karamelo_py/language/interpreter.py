@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -12,12 +11,21 @@ from typing import Any, Protocol, runtime_checkable
 from karamelo_py.language import registry, signature
 from karamelo_py.language.further_mistakes import further_errors
 from karamelo_py.language.replay import Record, Replay, spelled
+from karamelo_py.language.unknown import (
+    check_name,
+    defined_later,
+    listed,
+    no_value,
+    unknown_call,
+    unknown_name,
+    unknown_statement,
+)
 from karamelo_py.script import expressions
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
-from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
-from karamelo_py.script.other_programs import KARAMELO_COMMANDS, instead
+from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
 from karamelo_py.script.parser import parse, parse_expression, parse_text
+from karamelo_py.script.reading import read_script
 from karamelo_py.script.syntax import (
     Assignment,
     Binary,
@@ -31,13 +39,6 @@ from karamelo_py.script.syntax import (
 )
 
 _WORD = r"[^\W\d]\w*"
-_LARGEST_SCRIPT = 100_000_000
-MEANINGS = {
-    "time": "the time of the run",
-    "timestep": "the number of the step",
-    "dt": "the time step",
-    "PI": "the number pi",
-}
 
 
 @runtime_checkable
@@ -88,7 +89,7 @@ class Interpreter:
         self.variables: dict[str, Value] = {}
         self.files: list[Path] = []
         self._presets: dict[str, str] = {}
-        self._frames: list[_Frame] = []
+        self.frames: list[_Frame] = []
         self.statement: Statement | None = None  # the last that was begun
         self.record = Record()
         self.replay: Replay | None = None
@@ -121,12 +122,12 @@ class Interpreter:
     @property
     def waits(self) -> bool:
         """Whether a script is in the midst of its statements."""
-        return bool(self._frames)
+        return bool(self.frames)
 
     def include(self, name: str) -> None:
         """Run another script at this place; the name is relative to the script that asks."""
         path = self._included(name, self.folder)
-        if any(frame.path and _same(frame.path, path) for frame in self._frames):
+        if any(frame.path and _same(frame.path, path) for frame in self.frames):
             raise ScriptError(
                 f"{name} includes itself",
                 expected="a script that is not in progress already",
@@ -141,11 +142,11 @@ class Interpreter:
         try:
             statements = parse(text, str(path))
         except ScriptError as error:
-            error.included = self._including(len(self._frames))
+            error.included = self._including(len(self.frames))
             raise
-        self._frames.append(_Frame(statements, path))
-        self._go_on(self._frames[-1])
-        self._frames.pop()
+        self.frames.append(_Frame(statements, path))
+        self._go_on(self.frames[-1])
+        self.frames.pop()
 
     def _included(self, name: str, folder: Path) -> Path:
         path = folder / name
@@ -164,9 +165,9 @@ class Interpreter:
         """
         other = self._copy(hub)
         try:
-            while other._frames:
-                other._go_on(other._frames[-1])
-                other._frames.pop()
+            while other.frames:
+                other._go_on(other.frames[-1])
+                other.frames.pop()
         except Quit:
             return
         except ScriptError as error:
@@ -179,14 +180,14 @@ class Interpreter:
         other.variables = dict(self.variables)
         other.files = list(self.files)
         other._presets = dict(self._presets)
-        other._frames = [_Frame(f.statements, f.path, f.next) for f in self._frames]
+        other.frames = [_Frame(f.statements, f.path, f.next) for f in self.frames]
         other.statement = self.statement
         return other
 
     @property
     def folder(self) -> Path:
         """Folder of the script in progress."""
-        for frame in reversed(self._frames):
+        for frame in reversed(self.frames):
             if frame.path is not None:
                 return frame.path.parent
         return self._working_folder
@@ -196,37 +197,37 @@ class Interpreter:
         return getattr(self.hub, "folder", None) or Path.cwd()
 
     def _run(self, statements: list[Statement], path: Path | None) -> None:
-        self._frames.append(_Frame(statements, path))
+        self.frames.append(_Frame(statements, path))
         try:
             if self._presets:
                 self._refuse_unused_presets(statements)
             self.go_on()
         except ScriptError:
-            self._frames.clear()
+            self.frames.clear()
             raise
 
     def go_on(self) -> None:
         """Carry out what is left of all scripts in progress, such as one that waits (`Pause`)."""
         try:
-            while self._frames:
-                self._go_on(self._frames[-1])
-                self._frames.pop()
+            while self.frames:
+                self._go_on(self.frames[-1])
+                self.frames.pop()
             if self.replay is not None:
                 raise self.replay.other_script("this one ends before")
         except Pause:
             raise
         except Quit:
-            self._frames.clear()
+            self.frames.clear()
             if self.replay is not None:
                 raise self.replay.other_script("this one ends before") from None
         except ScriptError as error:
             # Once a run has begun, the rest of the script has been tried.
             if isinstance(self.hub, Rehearsed) and not self.hub.rehearsed:
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
-            self._frames.clear()
+            self.frames.clear()
             raise
         except BaseException:
-            self._frames.clear()
+            self.frames.clear()
             raise
 
     def _go_on(self, frame: _Frame) -> None:
@@ -236,25 +237,25 @@ class Interpreter:
                 self.execute(frame.statements[frame.next - 1])
             except Pause:
                 # In the script that has the run; those that include it are at their next line.
-                if frame is self._frames[-1]:
+                if frame is self.frames[-1]:
                     frame.next -= 1
                 raise
 
     def next_statement(self) -> Statement | None:
         """The statement that comes next, in whichever file; it counts as carried out."""
-        while self._frames:
-            frame = self._frames[-1]
+        while self.frames:
+            frame = self.frames[-1]
             if frame.next < len(frame.statements):
                 frame.next += 1
                 return frame.statements[frame.next - 1]
-            self._frames.pop()
+            self.frames.pop()
         return None
 
     def execute(self, statement: Statement) -> None:
         """Carry out one statement; errors know its place, and which scripts include it."""
         self.statement = statement
         self.hub.place = statement.place
-        depth = len(self._frames)
+        depth = len(self.frames)
         done = len(self.record.statements)
         try:
             self._execute_recorded(statement)
@@ -293,7 +294,7 @@ class Interpreter:
 
     def _including(self, depth: int) -> list[Place]:
         """The include statements of the first `depth` scripts in progress, the nearest first."""
-        frames = self._frames[:depth]
+        frames = self.frames[:depth]
         return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
 
     def _execute(self, statement: Statement) -> None:
@@ -307,7 +308,7 @@ class Interpreter:
             if isinstance(node, Name) and node.name == "quit":
                 raise Quit
             if isinstance(node, Name) and not self._means_something(node.name):
-                raise self._unknown_statement(node.name)
+                raise unknown_statement(self, node.name)
             if isinstance(node, Binary) and node.operator == "==" and isinstance(node.left, Name):
                 right = statement.raw.code[node.right.start : node.right.end]
                 raise ScriptError(
@@ -319,23 +320,13 @@ class Interpreter:
 
     def _means_something(self, name: str) -> bool:
         known = self.knows(name) or name in WORDS or name in FUNCTIONS
-        return known or registry.knows("command", name) or self._later(name) is not None
-
-    def _unknown_statement(self, name: str) -> ScriptError:
-        close = nearest(name, ["quit", *registry.names("command"), *self.variables])
-        if name.lower() in ("exit", "stop", "end"):
-            close = "quit"
-        return ScriptError(
-            f"'{name}' is neither a command nor a variable",
-            expected="name = expression, or command(arguments)",
-            hint=instead("command", name) or _meant(close),
-        )
+        return known or registry.knows("command", name) or defined_later(self, name) is not None
 
     # -- assignments ------------------------------------------------------------------------------
 
     def _assign(self, statement: Assignment) -> None:
         name = statement.name
-        _check_name(name)
+        check_name(name)
         if name in self._presets:
             # What was a word at first may have become an expression of variables.
             if isinstance(self.variables.get(name), str):
@@ -371,7 +362,7 @@ class Interpreter:
                 expected="letters, digits and _, as in -var h 0.05",
             )
         try:
-            _check_name(name)
+            check_name(name)
         except ScriptError as error:
             raise ScriptError(f"-var: {error.message}", hint=error.hint) from None
         self._presets[name] = text
@@ -402,7 +393,7 @@ class Interpreter:
                 close = nearest(name, assigned)
                 raise ScriptError(
                     f"-var {name}: the script has no variable '{name}'",
-                    expected=f"one of those that it assigns ({_listed(assigned)})",
+                    expected=f"one of those that it assigns ({listed(assigned)})",
                     hint=f"did you mean '{close}'?" if close else None,
                 )
 
@@ -439,7 +430,7 @@ class Interpreter:
     def _call(self, statement: Call) -> None:
         name = statement.name
         if self.hides(name):
-            raise self._unknown_call(name, statement.place, statement=True)
+            raise unknown_call(self, name, statement.place, statement=True)
         if registry.knows("command", name):
             arguments = [signature.Argument(raw, self) for raw in statement.arguments]
             signature.call(registry.find("command", name), self.hub, arguments, name)
@@ -448,7 +439,7 @@ class Interpreter:
             raw = statement.raw
             self.evaluate(parse_expression(raw), raw)
         else:
-            raise self._unknown_call(name, statement.place, statement=True)
+            raise unknown_call(self, name, statement.place, statement=True)
 
     def command(self, node: Function, raw: Raw) -> Value:
         """The value of a call inside an expression that is not a function."""
@@ -456,11 +447,11 @@ class Interpreter:
         begin = raw.start + node.start
         place = raw.source.place(begin, begin + len(name))
         if not registry.knows("command", name) or self.hides(name):
-            raise self._unknown_call(name, place, statement=False)
+            raise unknown_call(self, name, place, statement=False)
         target = registry.find("command", name)
         # What gives no value must not be carried out here, least of all a run.
         if getattr(target, "__annotations__", {}).get("return", "") in (None, "None"):
-            raise self._no_value(name, place)
+            raise no_value(name, place)
         arguments = [
             signature.Argument(Raw(raw.source, raw.start + o.start, raw.start + o.end), self)
             for o in node.operands
@@ -476,36 +467,7 @@ class Interpreter:
             return float(value)
         if isinstance(value, (str, Formula)):
             return value
-        raise self._no_value(name, place)
-
-    def _no_value(self, name: str, place: Any) -> ScriptError:
-        return ScriptError(
-            f"{name}(...) gives no value",
-            place=place,
-            expected="a function, or a command that gives a value, such as value(...)",
-            hint=f"{name}(...) stands on a line of its own",
-        )
-
-    def _unknown_call(self, name: str, place: Any, statement: bool) -> ScriptError:
-        commands = registry.names("command")
-        what = "command" if statement else "function"
-        other = instead("command", name) if statement else None
-        if self.knows(name) and not other:
-            return ScriptError(
-                f"'{name}' is not a {what} but a variable",
-                place=place,
-                expected="an operator between the name and the parenthesis",
-                hint=f"{name}*(...)",
-            )
-        known = [*commands, *FUNCTIONS] if statement else [*FUNCTIONS, *commands]
-        close = nearest(name, known)
-        shown = commands if statement else sorted(FUNCTIONS)
-        return ScriptError(
-            f"unknown {what} '{name}'",
-            place=place,
-            expected="one of " + ", ".join(shown),
-            hint=other or _meant(close),
-        )
+        raise no_value(name, place)
 
     # -- expressions ------------------------------------------------------------------------------
 
@@ -533,116 +495,7 @@ class Interpreter:
             return CONSTANTS[name]
         if name in self.hub.values:
             return Formula.seed(name)
-        raise self._unknown_name(name, mark(raw, node))
-
-    def _unknown_name(self, name: str, place: Any) -> ScriptError:
-        if name in WORDS:
-            return ScriptError(
-                f"{name} is not a number",
-                place=place,
-                expected="a number or a formula; NULL, INF and EDGE are words that stand alone, "
-                "where a command knows them",
-            )
-        if registry.knows("command", name):
-            return ScriptError(
-                f"'{name}' is a command and needs parentheses",
-                place=place,
-                expected=f"{name}(...)",
-            )
-        if name in FUNCTIONS:
-            return ScriptError(
-                f"'{name}' is a function and needs parentheses",
-                place=place,
-                expected=expressions.usage(name),
-            )
-        other = self._not_published(name, place)
-        if other:
-            return other
-        later = self._later(name)
-        if later:
-            return later(place)
-        if name == "i":
-            return ScriptError(
-                "'i' is the number of a point in Karamelo, which no formula knows here",
-                place=place,
-                expected="a formula of positions",
-                hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) scatters over 0 to 1 as well",
-            )
-        published = [value for value in self.hub.values.names() if value not in SEEDS]
-        known = [*self.variables, *published, *SEEDS, *CONSTANTS]
-        by_style = self._values_by_style()
-        close = (
-            "time"
-            if name == "t"
-            else nearest(name, known) or by_style.get(nearest(name, by_style) or "")
-        )
-        hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
-        if re.match("leq|geq", name) and not close:
-            hint = f"{name[:3]} stands in front of a bound in fix velocity_nodes only"
-        if name.upper() in WORDS:
-            hint = f"write {name.upper()}"
-        if name.lower() in ("true", "false"):
-            hint = f"write {int(name.lower() == 'true')}"
-        return ScriptError(
-            f"unknown name '{name}'",
-            place=place,
-            expected=f"a variable that is set ({_listed(self.variables)}), a value of a fix or a "
-            f"compute ({_listed(published)}), or x, y, z, x0, y0, z0, time, timestep, dt, PI",
-            hint=hint,
-        )
-
-    def _values_by_style(self) -> dict[str, str]:
-        """For each style of a fix or compute that publishes: the first value of the last one."""
-        items = [
-            *getattr(self.hub, "fixes", {}).items(), *getattr(self.hub, "computes", {}).items()
-        ]  # fmt: skip
-        return {
-            item.style: f"{ID}_{item.published[0]}" if item.published[0] else ID
-            for ID, item in items
-            if item.published
-        }
-
-    def _not_published(self, name: str, place: Any) -> ScriptError | None:
-        """The error for a value that the fix or compute of this ID does not set."""
-        for kind, items in (("fix", "fixes"), ("compute", "computes")):
-            for ID, item in getattr(self.hub, items, {}).items():
-                if name not in (ID, f"{ID}_{name[-1]}"):
-                    continue
-                names = [f"{ID}_{s}" if s else ID for s in item.published]
-                what = ", ".join(names) or "nothing"
-                close = nearest(name, names) or (names[0] if names else None)
-                return ScriptError(
-                    f"{kind} {item.style} publishes {what}, not {name}",
-                    place=place,
-                    hint=f"did you mean '{close}'?" if close else None,
-                )
-        return None
-
-    def _later(self, name: str) -> Any:
-        """How to say that `name` is defined further down, if it is."""
-        ID = re.sub(r"_[^_]+$", "", name)
-        for frame in reversed(self._frames):
-            for statement in frame.statements[max(frame.next - 1, 0) :]:
-                line = statement.place.line
-                if isinstance(statement, Assignment) and statement.name == name:
-                    what, where = f"'{name}' is used before it is set", f"it is set in line {line}"
-                elif (
-                    isinstance(statement, Call)
-                    and statement.name in ("fix", "compute")
-                    and statement.arguments
-                    and statement.arguments[0].code.strip() in (name, ID)
-                ):
-                    what = f"'{name}' is used before its {statement.name} is defined"
-                    where = f"the {statement.name} is in line {line}"
-                else:
-                    continue
-                hint = f"move line {line} up"
-                if frame is self._frames[-1] and statement.place == self.hub.place:
-                    where, hint = f"it is set in this very line {line}", "give it a value first"
-                return lambda place, what=what, where=where, hint=hint: ScriptError(
-                    what, place=place, expected=f"a name that is known here; {where}", hint=hint
-                )
-        return None
+        raise unknown_name(self, name, mark(raw, node))
 
 
 def shown(value: Value) -> str:
@@ -654,81 +507,8 @@ def shown(value: Value) -> str:
     return number_text(value)
 
 
-def read_script(path: Path) -> str:
-    """The text of a script file.
-
-    Raises
-    ------
-    ScriptError
-        If there is no such file, it cannot be read, or it is no text.
-    """
-    try:
-        if path.is_dir():
-            raise ScriptError(f"{path} is a folder", expected="the name of a script")
-        if path.stat().st_size > _LARGEST_SCRIPT:
-            raise ScriptError(f"{path} is too large for a script", expected="at most 100 MB")
-        data = path.read_bytes()
-    except FileNotFoundError:
-        parent = path.parent
-        siblings = sorted(p.name for p in parent.iterdir()) if parent.is_dir() else []
-        close = difflib.get_close_matches(path.name, siblings, n=1)
-        raise ScriptError(
-            f"there is no file {path}"
-            if parent.is_dir()
-            else f"there is no file {path}: the folder {parent} does not exist",
-            expected="the name of a script",
-            hint=f"did you mean {parent / close[0]}?" if close else None,
-        ) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ScriptError(f"{path} cannot be read: {reason}") from None
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", errors="replace")
-    if b"\0" in data:
-        raise ScriptError(f"{path} is not a text file", expected="a script")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        # Old editors write comments in Latin-1, where every byte is a character.
-        return data.decode("latin-1")
-
-
-def _meant(close: str | None) -> str | None:
-    return f"did you mean '{close}'?" if close else None
-
-
-def _check_name(name: str) -> None:
-    """Refuse to assign what already means something else."""
-    if name in ("and", "or", "not"):
-        what = "a logical operator"
-    elif name in MEANINGS:
-        what = MEANINGS[name]
-    elif name in SEEDS:
-        what = "a coordinate of points"
-    elif name in WORDS or name == "quit":
-        what = "a word of the language"
-    elif registry.knows("command", name) and name in KARAMELO_COMMANDS:
-        what = "a command"
-    elif name in RESERVED:
-        what = "a function"
-    else:
-        return
-    free = f"another name, such as {name}_1 or my_{name}"
-    other = f"{name}(...) calls it" if what == "a command" else instead("command", name)
-    raise ScriptError(
-        f"'{name}' is {what} and cannot be assigned",
-        expected="a name that is free",
-        hint=f"{other}; or choose {free}" if other else f"choose {free}",
-    )
-
-
 def _same(a: Path, b: Path) -> bool:
     try:
         return a.samefile(b)
     except OSError:
         return False
-
-
-def _listed(names: Iterable[str]) -> str:
-    text = ", ".join(names) or "none so far"
-    return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."

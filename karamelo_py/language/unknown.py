@@ -1,0 +1,226 @@
+"""Names that nothing answers to, or that cannot be given: what may have been meant."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any, Protocol
+
+from karamelo_py.language import registry
+from karamelo_py.script import expressions
+from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.expressions import SEEDS
+from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
+from karamelo_py.script.other_programs import KARAMELO_COMMANDS, instead
+from karamelo_py.script.syntax import Assignment, Call
+
+MEANINGS = {
+    "time": "the time of the run",
+    "timestep": "the number of the step",
+    "dt": "the time step",
+    "PI": "the number pi",
+}
+
+
+class Names(Protocol):
+    """What names mean while a script runs."""
+
+    hub: Any
+    variables: dict[str, Any]
+    frames: list[Any]  # scripts in progress, the innermost last
+
+    def knows(self, name: str) -> bool:
+        """Whether a name means something in an expression."""
+
+
+def unknown_statement(script: Names, name: str) -> ScriptError:
+    """The error for a statement that is no more than a name nobody knows."""
+    close = nearest(name, ["quit", *registry.names("command"), *script.variables])
+    if name.lower() in ("exit", "stop", "end"):
+        close = "quit"
+    return ScriptError(
+        f"'{name}' is neither a command nor a variable",
+        expected="name = expression, or command(arguments)",
+        hint=instead("command", name) or _meant(close),
+    )
+
+
+def unknown_call(script: Names, name: str, place: Any, statement: bool) -> ScriptError:
+    """The error for a call of what is no command, or no function."""
+    commands = registry.names("command")
+    what = "command" if statement else "function"
+    other = instead("command", name) if statement else None
+    if script.knows(name) and not other:
+        return ScriptError(
+            f"'{name}' is not a {what} but a variable",
+            place=place,
+            expected="an operator between the name and the parenthesis",
+            hint=f"{name}*(...)",
+        )
+    known = [*commands, *FUNCTIONS] if statement else [*FUNCTIONS, *commands]
+    close = nearest(name, known)
+    shown = commands if statement else sorted(FUNCTIONS)
+    return ScriptError(
+        f"unknown {what} '{name}'",
+        place=place,
+        expected="one of " + ", ".join(shown),
+        hint=other or _meant(close),
+    )
+
+
+def no_value(name: str, place: Any) -> ScriptError:
+    """The error for a command that gives no value in an expression."""
+    return ScriptError(
+        f"{name}(...) gives no value",
+        place=place,
+        expected="a function, or a command that gives a value, such as value(...)",
+        hint=f"{name}(...) stands on a line of its own",
+    )
+
+
+def unknown_name(script: Names, name: str, place: Any) -> ScriptError:
+    """The error for a name in an expression."""
+    if name in WORDS:
+        return ScriptError(
+            f"{name} is not a number",
+            place=place,
+            expected="a number or a formula; NULL, INF and EDGE are words that stand alone, "
+            "where a command knows them",
+        )
+    if registry.knows("command", name):
+        return ScriptError(
+            f"'{name}' is a command and needs parentheses",
+            place=place,
+            expected=f"{name}(...)",
+        )
+    if name in FUNCTIONS:
+        return ScriptError(
+            f"'{name}' is a function and needs parentheses",
+            place=place,
+            expected=expressions.usage(name),
+        )
+    other = _not_published(script, name, place)
+    if other:
+        return other
+    further_down = defined_later(script, name)
+    if further_down:
+        return further_down(place)
+    if name == "i":
+        return ScriptError(
+            "'i' is the number of a point in Karamelo, which no formula knows here",
+            place=place,
+            expected="a formula of positions",
+            hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) scatters over 0 to 1 as well",
+        )
+    published = [value for value in script.hub.values.names() if value not in SEEDS]
+    known = [*script.variables, *published, *SEEDS, *CONSTANTS]
+    by_style = _values_by_style(script)
+    close = (
+        "time"
+        if name == "t"
+        else nearest(name, known) or by_style.get(nearest(name, by_style) or "")
+    )
+    hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
+    if re.match("leq|geq", name) and not close:
+        hint = f"{name[:3]} stands in front of a bound in fix velocity_nodes only"
+    if name.upper() in WORDS:
+        hint = f"write {name.upper()}"
+    if name.lower() in ("true", "false"):
+        hint = f"write {int(name.lower() == 'true')}"
+    return ScriptError(
+        f"unknown name '{name}'",
+        place=place,
+        expected=f"a variable that is set ({listed(script.variables)}), a value of a fix or a "
+        f"compute ({listed(published)}), or x, y, z, x0, y0, z0, time, timestep, dt, PI",
+        hint=hint,
+    )
+
+
+def _values_by_style(script: Names) -> dict[str, str]:
+    """For each style of a fix or compute that publishes: the first value of the last one."""
+    items = [
+        *getattr(script.hub, "fixes", {}).items(), *getattr(script.hub, "computes", {}).items()
+    ]  # fmt: skip
+    return {
+        item.style: f"{ID}_{item.published[0]}" if item.published[0] else ID
+        for ID, item in items
+        if item.published
+    }
+
+
+def _not_published(script: Names, name: str, place: Any) -> ScriptError | None:
+    """The error for a value that the fix or compute of this ID does not set."""
+    for kind, items in (("fix", "fixes"), ("compute", "computes")):
+        for ID, item in getattr(script.hub, items, {}).items():
+            if name not in (ID, f"{ID}_{name[-1]}"):
+                continue
+            names = [f"{ID}_{s}" if s else ID for s in item.published]
+            what = ", ".join(names) or "nothing"
+            close = nearest(name, names) or (names[0] if names else None)
+            return ScriptError(
+                f"{kind} {item.style} publishes {what}, not {name}",
+                place=place,
+                hint=f"did you mean '{close}'?" if close else None,
+            )
+    return None
+
+
+def defined_later(script: Names, name: str) -> Any:
+    """How to say that `name` is defined further down, if it is."""
+    ID = re.sub(r"_[^_]+$", "", name)
+    for frame in reversed(script.frames):
+        for statement in frame.statements[max(frame.next - 1, 0) :]:
+            line = statement.place.line
+            if isinstance(statement, Assignment) and statement.name == name:
+                what, where = f"'{name}' is used before it is set", f"it is set in line {line}"
+            elif (
+                isinstance(statement, Call)
+                and statement.name in ("fix", "compute")
+                and statement.arguments
+                and statement.arguments[0].code.strip() in (name, ID)
+            ):
+                what = f"'{name}' is used before its {statement.name} is defined"
+                where = f"the {statement.name} is in line {line}"
+            else:
+                continue
+            hint = f"move line {line} up"
+            if frame is script.frames[-1] and statement.place == script.hub.place:
+                where, hint = f"it is set in this very line {line}", "give it a value first"
+            return lambda place, what=what, where=where, hint=hint: ScriptError(
+                what, place=place, expected=f"a name that is known here; {where}", hint=hint
+            )
+    return None
+
+
+def check_name(name: str) -> None:
+    """Refuse to assign what already means something else."""
+    if name in ("and", "or", "not"):
+        what = "a logical operator"
+    elif name in MEANINGS:
+        what = MEANINGS[name]
+    elif name in SEEDS:
+        what = "a coordinate of points"
+    elif name in WORDS or name == "quit":
+        what = "a word of the language"
+    elif registry.knows("command", name) and name in KARAMELO_COMMANDS:
+        what = "a command"
+    elif name in RESERVED:
+        what = "a function"
+    else:
+        return
+    free = f"another name, such as {name}_1 or my_{name}"
+    other = f"{name}(...) calls it" if what == "a command" else instead("command", name)
+    raise ScriptError(
+        f"'{name}' is {what} and cannot be assigned",
+        expected="a name that is free",
+        hint=f"{other}; or choose {free}" if other else f"choose {free}",
+    )
+
+
+def _meant(close: str | None) -> str | None:
+    return f"did you mean '{close}'?" if close else None
+
+
+def listed(names: Iterable[str]) -> str:
+    text = ", ".join(names) or "none so far"
+    return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."
