@@ -179,6 +179,31 @@ def test_names_that_the_system_cannot_write(tmp_path):
         assert "tell the author" not in done.stderr
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limits of files")
+@pytest.mark.parametrize("room", [8, 60])
+def test_no_room_for_a_dump_in_hdf5(tmp_path, room):
+    """Told once, in the words of the system; HDF5 itself cannot close a file that does not fit."""
+    import h5py
+
+    (tmp_path / "in.a").write_text(
+        RUN.replace("run(2)", "dump(d, all, hdf5, 1, d.h5, x, y, vx, vy, s11, s22, s12)\nrun(40)")
+    )
+    limited = (
+        "import resource, sys; from karamelo_py.app.cli import main; "
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({room} * 1024,) * 2); sys.exit(main(['in.a']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", limited], cwd=tmp_path, capture_output=True, text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count("error:") == 1 and "Traceback" not in done.stderr
+    assert "cannot write" in done.stderr and "File too large" in done.stderr
+    if room > 10:  # what was written before stays
+        with h5py.File(tmp_path / "d.h5", swmr=True) as file:
+            assert len(file["step"]) > 0
+
+
 # --- the first moment ---------------------------------------------------------------------------
 
 

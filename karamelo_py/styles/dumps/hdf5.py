@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.output.files import reported, whole
+from karamelo_py.output.files import whole
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.table import OfPoints, TableDump
 
@@ -54,14 +57,16 @@ class Hdf5Dump(TableDump):
         import h5py
 
         if k == 0 or self.one_file_per_step:
-            with (
-                whole(path) as file,
-                h5py.File(file.name, "w", libver="latest", locking=False) as root,
-            ):
+            # In memory at first: HDF5 cannot close a file for which there is no room.
+            with h5py.File("new", "w", driver="core", backing_store=False, libver="latest") as root:
                 self._prepare(root, rows.ids)
                 self._append(root, 0, rows)
+                root.flush()
+                image = root.id.get_file_image()
+            with whole(path) as file:
+                file.write(image)
             return
-        with reported(path), _opened_to_append(path) as root:
+        with _reported(path), _opened_to_append(path) as root:
             try:
                 self._append(root, k, rows)
             except BaseException:
@@ -152,6 +157,17 @@ class Hdf5Dump(TableDump):
             root[name][k] = row
 
 
+@contextmanager
+def _reported(path: Path) -> Iterator[None]:
+    """Turn what HDF5 says against writing `path` into a ScriptError, in the words of the system."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        reason = re.search("error message = '([^']*)'", str(error))
+        what = reason[1] if reason else str(error).splitlines()[0]
+        raise ScriptError(f"cannot write {path}: {what}") from error
+
+
 def _opened_to_append(path: Path) -> Any:
     """The file, such that whatever happens to the program what was written before stays readable.
 
@@ -183,7 +199,8 @@ class Hdf5(OfPoints, Hdf5Dump):
         points.seq.sel(time=0.5, method="nearest").max()
         h5py.File("points.h5")["seq"][-1]
 
-    A file that a killed program was writing is opened with ``h5py.File(name, swmr=True)``.
+    A file that a program was writing when it was killed, or when the disk was full, is opened with
+    ``h5py.File(name, swmr=True)``.
 
     Example
     -------
