@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 from itertools import combinations
 
 import numpy as np
@@ -170,6 +172,27 @@ def test_a_page_needs_nothing_else(table):
     assert len(runs) == 12 and runs[0]["command"] == "karamelo-py in.x -var N 10 -var basis linear"
     assert runs[0]["picture"].startswith("data:image/png;base64,") and not runs[1]["picture"]
     assert "point 3 &lt;leaves&gt;" in page and "<leaves>" not in page.split("const runs")[0]
+
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+@pytest.mark.full
+@pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="no browser to look with")
+def test_a_page_comes_to_life_in_a_browser(table):
+    """What Chromium makes of the file: a chart of all runs with a value, and the facts of one."""
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-by", "basis", "-o", "page.html"]) == 0
+    front = Family(rows(), ["N", "basis"], "err", "seconds").front()
+    browser = next(filter(None, map(shutil.which, BROWSERS)))
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000"]
+    done = subprocess.run(
+        [*command, f"--user-data-dir={table / 'profile'}", "--dump-dom", str(table / "page.html")],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    points = re.findall(r'<path class="point[ "]', done.stdout)
+    # 11 runs have a value; those of them that none beats are in the band as well.
+    assert len(points) == 11 + len(front)
+    assert "<h2>N = 80, basis = cubic-spline</h2>" in done.stdout
 
 
 @pytest.mark.parametrize(

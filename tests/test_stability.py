@@ -67,6 +67,19 @@ def test_failures_have_reasons(folder):
     assert "the step is 3 times the stable one" in table["message"][1]
 
 
+def test_what_limits_the_step_stands_in_the_map(folder):
+    """usl by light nodes, where the step is a share of the stable one; set_dt is no limit."""
+    text = SCRIPT.replace("set_dt(factor*0.1)", "dt_factor(factor)\nscheme(usl)")
+    (folder / "in.bar").write_text(text, encoding="utf-8")
+    words = ["-var", "factor=0.5,3", "-var", "push=0", "-o", "map.svg"]
+    assert main(["stability", "in.bar", *words]) == 0
+    assert set(pandas.read_csv(folder / "map.csv")["limit"]) == {"light_nodes"}
+    assert "(light_nodes)" in (folder / "map.svg").read_text(encoding="utf-8")
+    (folder / "in.bar").write_text(SCRIPT, encoding="utf-8")
+    assert main(["stability", "in.bar", *words]) == 0
+    assert pandas.read_csv(folder / "map.csv")["limit"].isna().all()
+
+
 def test_energy_that_grows_is_told_from_failure(folder):
     """An "energy" that is set to double and to treble beside the bound of 2.5."""
     text = SCRIPT.replace("Ek + Es)", "Etot)").replace(

@@ -148,6 +148,16 @@ def in_short(row: Mapping[str, Any]) -> str:
     return textwrap.shorten(cause, 60, placeholder=" …")
 
 
+def limited_by(folder: Path) -> str:
+    """What limits the first step of a run, by name; nothing where the script says the step."""
+    try:
+        said = (folder / "out.txt").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+    match = re.search(r"^  limited by +(\w+);", said, re.M)
+    return match[1] if match and match[1] not in ("set_dt", "end") else ""
+
+
 class Map:
     """The plane of a stability map.
 
@@ -194,7 +204,9 @@ class Map:
             reason = in_short(row) if kind == "failed" else ""
             if kind == "growing":
                 reason = f"{self.energy} grows {factor:.3g} times"
-            self.found[cell] = {**row, "class": kind, "why": reason, "growth": factor}
+            name = limited_by(self.folder / row["folder"])
+            found = {**row, "class": kind, "why": reason, "growth": factor, "limit": name}
+            self.found[cell] = found
             classes.append(kind)
         return classes
 
@@ -212,6 +224,7 @@ class Map:
                     "growth": row.get("growth"),
                     "dt": row.get("dt"),
                     "stable_dt": row.get("stable_dt"),
+                    "limit": row.get("limit", ""),
                     "message": row.get("reason", ""),
                     "folder": row.get("folder", ""),
                 }
@@ -301,7 +314,9 @@ class Map:
                if limit is not None for up in ends]  # fmt: skip
         if own:
             at, up = zip(*own, strict=True)
-            line = axes.plot(at, up, "k--", linewidth=1.4, label="first step = the program's limit")
+            names = dict.fromkeys(row["limit"] for row in self.found.values() if row["limit"])
+            said = "first step = the program's limit" + (f"\n({', '.join(names)})" if names else "")
+            line = axes.plot(at, up, "k--", linewidth=1.4, label=said)
             handles += line
         handles.append(Patch(facecolor="none", edgecolor="none", label="·  run; others inferred"))
         axes.legend(
