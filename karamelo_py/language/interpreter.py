@@ -22,7 +22,7 @@ from karamelo_py.language.unknown import (
 )
 from karamelo_py.script import expressions
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError, nearest
-from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark, number_text
+from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
 from karamelo_py.script.parser import parse, parse_expression, parse_text
 from karamelo_py.script.reading import read_script
@@ -37,6 +37,7 @@ from karamelo_py.script.syntax import (
     Raw,
     Statement,
 )
+from karamelo_py.script.terms import number_text
 
 _WORD = r"[^\W\d]\w*"
 

@@ -17,8 +17,9 @@ from karamelo_py.language import registry
 from karamelo_py.language.arguments import NULL, NUMBER, Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import Place, ScriptError, meant
-from karamelo_py.script.expressions import Expression, Formula, Value, number_text
+from karamelo_py.script.expressions import Expression, Formula, Value
 from karamelo_py.script.functions import WORDS
+from karamelo_py.script.terms import number_text
 
 # Beyond it a number cannot tell one integer from the next.
 _LARGEST_INTEGER = 2**53

@@ -17,6 +17,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import FUNCTIONS, TAIL, compute, compute_quietly
 from karamelo_py.script.programs import in_order, program
 from karamelo_py.script.syntax import Binary, Function, Name, Node, Number, Raw, Text, Unary
+from karamelo_py.script.terms import REWRITTEN, Term, applied, constant, is_short, text_of
 from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
@@ -24,115 +25,6 @@ GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 
 CHUNK = 1 << 18  # points at which a formula is evaluated together
-
-# Number of operations in all; of those that messages show.
-_MAX_SIZE = 20000
-_MAX_SHOWN = 1000
-_MAX_LEVELS = 100
-
-# Functions that the evaluator does not know as such.
-_REWRITTEN = {
-    "pow": lambda a, b: _term("^", a, b),
-    "mod": lambda a, b: _term("%", a, b),
-    "tgamma": lambda a: _term("gamma", a),
-    "exp2": lambda a: _term("^", _number(2.0), a),
-    "degrees": lambda a: _term("*", a, _number(180 / math.pi)),
-    "radians": lambda a: _term("*", a, _number(math.pi / 180)),
-    "remainder": lambda a, b: _term("-", a, _term("*", b, _term("round", _term("/", a, b)))),
-    "inv_norm": lambda a: _inverse_normal(a),
-}
-
-# Numerators and denominators, from the highest power on, of Wichura's algorithm AS 241 (1988) for
-# the inverse of the normal distribution: around the middle, and towards the tails.
-_MIDDLE = (
-    (
-        2509.0809287301226727, 33430.575583588128105, 67265.770927008700853, 45921.953931549871457,
-        13731.693765509461125, 1971.5909503065514427, 133.14166789178437745, 3.3871328727963666080,
-    ),
-    (
-        5226.4952788528545610, 28729.085735721942674, 39307.895800092710610, 21213.794301586595867,
-        5394.1960214247511077, 687.18700749205790830, 42.313330701600911252, 1.0,
-    ),
-)  # fmt: skip
-_SIDES = (
-    (
-        7.74545014278341407640e-4, 2.27238449892691845833e-2, 2.41780725177450611770e-1,
-        1.27045825245236838258, 3.64784832476320460504, 5.76949722146069140550,
-        4.63033784615654529590, 1.42343711074968357734,
-    ),
-    (
-        1.05075007164441684324e-9, 5.47593808499534494600e-4, 1.51986665636164571966e-2,
-        1.48103976427480074590e-1, 6.89767334985100004550e-1, 1.67638483018380384940,
-        2.05319162663775882187, 1.0,
-    ),
-)  # fmt: skip
-
-_PRECEDENCE = {
-    "||": 1,
-    "&&": 2,
-    "not": 3,
-    **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 4),
-    "+": 5,
-    "-": 5,
-    "*": 6,
-    "/": 6,
-    "%": 6,
-    "neg": 7,
-    "^": 8,
-}
-
-
-class _Term:
-    """A node of a formula: a number, the name of a seed, or an operation on terms."""
-
-    __slots__ = ("names", "operands", "operation", "size", "value")
-
-    def __init__(self, operation: str, operands: tuple[_Term, ...], value: Any):
-        self.operation = operation
-        self.operands = operands
-        self.value = value
-        self.names: frozenset[str] = frozenset()
-        if operation == "name":
-            self.names = frozenset({value})
-        elif operands:
-            self.names = frozenset().union(*(term.names for term in operands))
-        # Operations as if none were shared, counted in earnest only where they seem too many.
-        self.size = 1 + sum(term.size for term in operands)
-        if self.size > _MAX_SIZE:
-            self.size = len(in_order(self))
-        if self.size > _MAX_SIZE:
-            raise ScriptError("the formula is too long", expected=f"at most {_MAX_SIZE} operations")
-
-
-def _number(value: float) -> _Term:
-    return _Term("number", (), float(value))
-
-
-def _term(operation: str, *operands: _Term) -> _Term:
-    return _Term(operation, operands, None)
-
-
-def _quotient(polynomials: tuple[tuple[float, ...], ...], r: _Term) -> _Term:
-    """Two polynomials of `r`, the first over the second."""
-    terms = []
-    for coefficients in polynomials:
-        term = _number(coefficients[0])
-        for coefficient in coefficients[1:]:
-            term = _term("+", _term("*", term, r), _number(coefficient))
-        terms.append(term)
-    return _term("/", *terms)
-
-
-def _inverse_normal(p: _Term) -> _Term:
-    q = _term("-", p, _number(0.5))
-    middle = _quotient(_MIDDLE, _term("-", _number(0.180625), _term("*", q, q)))
-    tail = _term("min", p, _term("-", _number(1.0), p))
-    far = _term("sqrt", _term("neg", _term("log", tail)))
-    side = _quotient(_SIDES, _term("-", far, _number(1.6)))
-    within = _term(">=", tail, _number(TAIL))
-    side = _term("if", within, _term("*", _term("sign", q), side), _number(math.nan))
-    near = _term("<=", _term("abs", q), _number(0.425))
-    return _term("if", near, _term("*", q, middle), side)
 
 
 class Formula:
@@ -146,22 +38,22 @@ class Formula:
 
     __slots__ = ("_term",)
 
-    def __init__(self, term: _Term):
+    def __init__(self, term: Term):
         self._term = term
 
     @classmethod
     def of(cls, value: float | Formula) -> Formula:
         """A number as a formula; a formula as it is."""
-        return value if isinstance(value, Formula) else cls(_number(value))
+        return value if isinstance(value, Formula) else cls(constant(value))
 
     @classmethod
     def seed(cls, name: str) -> Formula:
         """The formula that is nothing but a name."""
-        return cls(_Term("name", (), name))
+        return cls(Term("name", (), name))
 
     def minus(self, other: Formula) -> Formula:
         """The formula of the difference."""
-        return Formula(_term("-", self._term, other._term))
+        return Formula(applied("-", self._term, other._term))
 
     @property
     def names(self) -> frozenset[str]:
@@ -175,9 +67,9 @@ class Formula:
     @property
     def text(self) -> str:
         """The formula as it could stand in a script, down to its seeds, unless it is too long."""
-        if not _is_short(self._term):
+        if not is_short(self._term):
             return f"a long formula of {', '.join(sorted(self.names)) or 'numbers'}"
-        return _text(self._term)
+        return text_of(self._term)
 
     def __repr__(self) -> str:
         return f"Formula({self.text})"
@@ -310,52 +202,7 @@ Value = float | str | Formula
 # ---- formulas: text, numbers, programs ----------------------------------------------------------
 
 
-def number_text(value: float) -> str:
-    """A number as a script says it, exactly."""
-    text = repr(float(value))
-    return text.removesuffix(".0")
-
-
-def _is_short(root: _Term) -> bool:
-    """Whether a term can be written down, where what is shared is written again and again."""
-    levels: dict[int, int] = {}
-    sizes: dict[int, int] = {}
-    for term in in_order(root):
-        levels[id(term)] = 1 + max((levels[id(t)] for t in term.operands), default=0)
-        sizes[id(term)] = 1 + sum(sizes[id(t)] for t in term.operands)
-    return levels[id(root)] <= _MAX_LEVELS and sizes[id(root)] <= _MAX_SHOWN
-
-
-def _text(term: _Term) -> str:
-    operation, operands = term.operation, term.operands
-    if operation == "number":
-        return number_text(term.value)
-    if operation == "name":
-        return term.value
-    level = _PRECEDENCE.get(operation)
-    if level is None:
-        return f"{operation}({', '.join(_text(operand) for operand in operands)})"
-    if operation == "neg":
-        return "-" + _bracketed(operands[0], 7)
-    if operation == "not":
-        return "!" + _bracketed(operands[0], 3)
-    if operation == "^":
-        return _bracketed(operands[0], 9) + "^" + _bracketed(operands[1], 7)
-    left, right = operands
-    blank = "" if level >= 6 else " "
-    return f"{_bracketed(left, level)}{blank}{operation}{blank}{_bracketed(right, level + 1)}"
-
-
-def _bracketed(term: _Term, level: int) -> str:
-    """The text of `term`, in parentheses if it binds less than `level`."""
-    if term.operation == "number":
-        own = 7 if math.copysign(1.0, term.value) < 0 else 9
-    else:
-        own = _PRECEDENCE.get(term.operation, 9)
-    return _text(term) if own >= level else f"({_text(term)})"
-
-
-def _evaluate(root: _Term, values: Values) -> float:
+def _evaluate(root: Term, values: Values) -> float:
     found: dict[int, float] = {}
     for term in in_order(root):
         if term.operation == "number":
@@ -509,10 +356,10 @@ def usage(name: str) -> str:
 def _apply(operation: str, node: Node, values: tuple, raw: Raw) -> float | Formula:
     """The operation on numbers, or a formula if one of the values is."""
     if any(isinstance(value, Formula) for value in values):
-        terms = [v._term if isinstance(v, Formula) else _number(v) for v in values]
+        terms = [v._term if isinstance(v, Formula) else constant(v) for v in values]
         try:
-            rewrite = _REWRITTEN.get(operation)
-            return Formula(rewrite(*terms) if rewrite else _term(operation, *terms))
+            rewrite = REWRITTEN.get(operation)
+            return Formula(rewrite(*terms) if rewrite else applied(operation, *terms))
         except ScriptError as error:
             error.place = mark(raw, node)
             raise

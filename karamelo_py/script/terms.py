@@ -1,0 +1,176 @@
+"""Terms of formulas: numbers, names and operations on them, and how a script would write them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.functions import TAIL
+from karamelo_py.script.programs import in_order
+
+# Number of operations in all; of those that messages show.
+_MAX_SIZE = 20000
+_MAX_SHOWN = 1000
+_MAX_LEVELS = 100
+
+# Functions that the evaluator does not know as such.
+REWRITTEN = {
+    "pow": lambda a, b: applied("^", a, b),
+    "mod": lambda a, b: applied("%", a, b),
+    "tgamma": lambda a: applied("gamma", a),
+    "exp2": lambda a: applied("^", constant(2.0), a),
+    "degrees": lambda a: applied("*", a, constant(180 / math.pi)),
+    "radians": lambda a: applied("*", a, constant(math.pi / 180)),
+    "remainder": lambda a, b: applied(
+        "-", a, applied("*", b, applied("round", applied("/", a, b)))
+    ),
+    "inv_norm": lambda a: _inverse_normal(a),
+}
+
+# Numerators and denominators, from the highest power on, of Wichura's algorithm AS 241 (1988) for
+# the inverse of the normal distribution: around the middle, and towards the tails.
+_MIDDLE = (
+    (
+        2509.0809287301226727, 33430.575583588128105, 67265.770927008700853, 45921.953931549871457,
+        13731.693765509461125, 1971.5909503065514427, 133.14166789178437745, 3.3871328727963666080,
+    ),
+    (
+        5226.4952788528545610, 28729.085735721942674, 39307.895800092710610, 21213.794301586595867,
+        5394.1960214247511077, 687.18700749205790830, 42.313330701600911252, 1.0,
+    ),
+)  # fmt: skip
+_SIDES = (
+    (
+        7.74545014278341407640e-4, 2.27238449892691845833e-2, 2.41780725177450611770e-1,
+        1.27045825245236838258, 3.64784832476320460504, 5.76949722146069140550,
+        4.63033784615654529590, 1.42343711074968357734,
+    ),
+    (
+        1.05075007164441684324e-9, 5.47593808499534494600e-4, 1.51986665636164571966e-2,
+        1.48103976427480074590e-1, 6.89767334985100004550e-1, 1.67638483018380384940,
+        2.05319162663775882187, 1.0,
+    ),
+)  # fmt: skip
+
+_PRECEDENCE = {
+    "||": 1,
+    "&&": 2,
+    "not": 3,
+    **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 4),
+    "+": 5,
+    "-": 5,
+    "*": 6,
+    "/": 6,
+    "%": 6,
+    "neg": 7,
+    "^": 8,
+}
+
+
+class Term:
+    """A node of a formula: a number, the name of a seed, or an operation on terms."""
+
+    __slots__ = ("names", "operands", "operation", "size", "value")
+
+    def __init__(self, operation: str, operands: tuple[Term, ...], value: Any):
+        self.operation = operation
+        self.operands = operands
+        self.value = value
+        self.names: frozenset[str] = frozenset()
+        if operation == "name":
+            self.names = frozenset({value})
+        elif operands:
+            self.names = frozenset().union(*(term.names for term in operands))
+        # Operations as if none were shared, counted in earnest only where they seem too many.
+        self.size = 1 + sum(term.size for term in operands)
+        if self.size > _MAX_SIZE:
+            self.size = len(in_order(self))
+        if self.size > _MAX_SIZE:
+            raise ScriptError("the formula is too long", expected=f"at most {_MAX_SIZE} operations")
+
+
+def constant(value: float) -> Term:
+    """A number."""
+    return Term("number", (), float(value))
+
+
+def applied(operation: str, *operands: Term) -> Term:
+    """An operation on terms."""
+    return Term(operation, operands, None)
+
+
+def _rounded(term: Term) -> Term:
+    return applied("round", term)
+
+
+def _quotient(polynomials: tuple[tuple[float, ...], ...], r: Term) -> Term:
+    """Two polynomials of `r`, the first over the second."""
+    terms = []
+    for coefficients in polynomials:
+        term = constant(coefficients[0])
+        for coefficient in coefficients[1:]:
+            term = applied("+", applied("*", term, r), constant(coefficient))
+        terms.append(term)
+    return applied("/", *terms)
+
+
+def _inverse_normal(p: Term) -> Term:
+    q = applied("-", p, constant(0.5))
+    middle = _quotient(_MIDDLE, applied("-", constant(0.180625), applied("*", q, q)))
+    tail = applied("min", p, applied("-", constant(1.0), p))
+    far = applied("sqrt", applied("neg", applied("log", tail)))
+    side = _quotient(_SIDES, applied("-", far, constant(1.6)))
+    within = applied(">=", tail, constant(TAIL))
+    side = applied("if", within, applied("*", applied("sign", q), side), constant(math.nan))
+    near = applied("<=", applied("abs", q), constant(0.425))
+    return applied("if", near, applied("*", q, middle), side)
+
+
+# ---- as text -------------------------------------------------------------------------------------
+
+
+def number_text(value: float) -> str:
+    """A number as a script says it, exactly."""
+    text = repr(float(value))
+    return text.removesuffix(".0")
+
+
+def is_short(root: Term) -> bool:
+    """Whether a term can be written down, where what is shared is written again and again."""
+    levels: dict[int, int] = {}
+    sizes: dict[int, int] = {}
+    for term in in_order(root):
+        levels[id(term)] = 1 + max((levels[id(t)] for t in term.operands), default=0)
+        sizes[id(term)] = 1 + sum(sizes[id(t)] for t in term.operands)
+    return levels[id(root)] <= _MAX_LEVELS and sizes[id(root)] <= _MAX_SHOWN
+
+
+def text_of(term: Term) -> str:
+    """A term as a script would write it."""
+    operation, operands = term.operation, term.operands
+    if operation == "number":
+        return number_text(term.value)
+    if operation == "name":
+        return term.value
+    level = _PRECEDENCE.get(operation)
+    if level is None:
+        return f"{operation}({', '.join(text_of(operand) for operand in operands)})"
+    if operation == "neg":
+        return "-" + _bracketed(operands[0], 7)
+    if operation == "not":
+        return "!" + _bracketed(operands[0], 3)
+    if operation == "^":
+        return _bracketed(operands[0], 9) + "^" + _bracketed(operands[1], 7)
+    left, right = operands
+    blank = "" if level >= 6 else " "
+    return f"{_bracketed(left, level)}{blank}{operation}{blank}{_bracketed(right, level + 1)}"
+
+
+def _bracketed(term: Term, level: int) -> str:
+    """The text of `term`, in parentheses if it binds less than `level`."""
+    if term.operation == "number":
+        own = 7 if math.copysign(1.0, term.value) < 0 else 9
+    else:
+        own = _PRECEDENCE.get(term.operation, 9)
+    return text_of(term) if own >= level else f"({text_of(term)})"
