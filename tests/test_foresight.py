@@ -44,6 +44,17 @@ FAILURES = {
             {"method": "tlmpm, TPIC, linear"},
         ),
         ({"method": "ulmpm, AFLIP, linear, 1"}, {"method": "ulmpm, APIC, linear"}),
+        ({"method": "ulmpm, MLS, linear"}, {"method": "ulmpm, MLS, quadratic-spline"}),
+        (
+            {"method": "ulmpm, TPIC, ugimp", "more": "scheme(usl)"},
+            {"method": "ulmpm, TPIC, ugimp", "more": "scheme(musl)"},
+        ),
+    ],
+    "strain before the forces": [
+        (
+            {"method": "ulmpm, APIC, quadratic-spline", "v": "-1, 0", "more": "scheme(usavg)"},
+            {"method": "ulmpm, APIC, quadratic-spline", "v": "-0.1, 0", "more": "scheme(usavg)"},
+        )
     ],
     "points that cross cells": [
         (

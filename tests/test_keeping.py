@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,9 @@ def test_what_goes_wrong_in_silence_is_named(tmp_path, values, status, err, word
         assert kept.said[0] == "a cause"
 
 
+ORDERS = "musl", "leapfrog"  # there is no such scheme as the second
+
+
 def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys):
     """The command of docs/energy.md on a coarse disk, one period, with a scheme that there is not.
 
@@ -65,12 +69,12 @@ def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys):
     entries, _ = atlas.read(ROOT / "docs" / "atlas.toml")
     assert {e.name for e in entries} >= {"energy/FLIP", "energy/transfers"}
     entry = next(e for e in entries if e.name == "energy/transfers")
-    entry.small.update(periods="1", transfers="PIC,TPIC", schemes="musl,leapfrog")
+    entry.small.update(periods="1", transfers="PIC,TPIC", schemes=",".join(ORDERS))
     for line in entry.lines(str(ROOT / "inputs"), small=True):
-        assert main(line.replace("ppc=2,1", "ppc=1").split()) == 0
+        assert main([*line.split(), *["-var", "ppc=1"] * line.startswith("sweep")]) == 0
     text = (tmp_path / "energy.md").read_text(encoding="utf-8")
     lines = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
-    cells = {(transfer, order): cell for order, transfer, *_, cell in lines}
+    cells = {(row[0], order): row[-2 + k] for row in lines for k, order in enumerate(ORDERS)}
     assert cells["PIC", "musl"].startswith("damps")
     assert cells["PIC", "leapfrog"].startswith("refused")
     # The cause that the program names beforehand for TPIC with linear functions stands below.
@@ -93,3 +97,34 @@ def test_mistakes(tmp_path, monkeypatch, capsys, words, said):
     (tmp_path / "runs.csv").write_text(head + "linear,1,done,,.\n", encoding="utf-8")
     assert main(["chart", "runs.csv", *words]) == 1
     assert said in capsys.readouterr().err
+
+
+def gaining() -> list[tuple[str, ...]]:
+    """(transfer, basis, scheme, strain) of the cells of docs/energy.md that gain."""
+    text = (ROOT / "docs" / "energy.md").read_text(encoding="utf-8").partition("## Other")[2]
+    rows = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    heads = [head.split() for head in rows[0][2:]]
+    return [
+        (row[0], row[1], scheme, strain)
+        for row in rows[2:]
+        for (scheme, strain, _), cell in zip(heads, row[2:], strict=True)
+        if "gains" in cell
+    ]
+
+
+def test_what_gains_is_told_beforehand(tmp_path, monkeypatch, capsys):
+    """Of every transfer and scheme a cell that gains, on a coarser disk with the same speeds."""
+    monkeypatch.chdir(tmp_path)
+    cells = gaining()
+    assert len(cells) == 15
+    for transfer, basis, scheme, strain in {(c[0], c[2]): c for c in cells}.values():
+        alpha = "1" if "FLIP" in transfer else "mechanical"
+        values = {"transfer": transfer, "basis": basis, "order": scheme, "alpha": alpha, "n": "2"}
+        values |= {"strain": str(float(strain) / 100)}
+        words = [word for pair in values.items() for word in ("-var", *pair)]
+        assert main(["check", str(ROOT / "inputs" / "in.energy_disk"), *words]) == 0
+        captured = capsys.readouterr()
+        told = re.search(
+            "affine noise|strain before the forces|points that cross", captured.out + captured.err
+        )
+        assert told, (transfer, basis, scheme, strain)
