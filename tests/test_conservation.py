@@ -265,8 +265,9 @@ def test_averaged_volumes_do_the_work_that_is_stored(run_interpreted, method, sc
     """The forces of F-bar are those of the averaged strain: kinetic and stored energy exchange.
 
     In FLIP 1 what steps lose or gain in a given time falls with the step; with two steps of half
-    the length it can be extrapolated to none, which leaves a thousandth of what was stored. It was
-    15 % when volumes were averaged and stresses were not.
+    the length it can be extrapolated to none, which leaves a thousandth of what was stored. Of usf
+    the stored energy, which grows as t^2, is that of a step before: half a per cent is left, with
+    2 (dt/2)^2 - dt^2 over t^2. It was 15 % when volumes were averaged and stresses were not.
     """
     lost = []
     for halves in (1, 2):
@@ -285,4 +286,5 @@ def test_averaged_volumes_do_the_work_that_is_stored(run_interpreted, method, sc
         ).replace("ulmpm", method)
         log = run_interpreted(script, folder=f"{halves}").log
         lost.append((log.Ek[0] - log.Ek[-1] - log.Es[-1]) / log.Es[-1])
-    assert 2 * lost[1] - lost[0] == pytest.approx(0, abs=0.002)
+    left = -0.005 if scheme == "usf" else 0
+    assert 2 * lost[1] - lost[0] == pytest.approx(left, abs=0.002)

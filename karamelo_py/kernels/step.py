@@ -193,8 +193,13 @@ def step_size(s):
 
 @shared
 def last_step_size(s):
-    """dt of the step before, which the velocity at the start of this one belongs to."""
-    return real(s.control.clock[0].last_dt, s.nodes.sums[0, MASS])
+    """dt of the step before, which the velocity at the start of this one belongs to.
+
+    Before the first step there was none: the state at the start has its strain already. It takes
+    next to nothing, since rates of strain are asked for.
+    """
+    share = NEXT_TO_NOTHING if s.control.values[TIMESTEP] == 0 else 1.0
+    return real(share * s.control.clock[0].last_dt, s.nodes.sums[0, MASS])
 
 
 @shared
@@ -207,6 +212,7 @@ def kick(s):
     return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
 
 
+NEXT_TO_NOTHING = 1e-9  # of a step
 ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
 
 

@@ -25,7 +25,8 @@ from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 class USF(NamedTuple):
     """The stress follows from the nodal velocity at the start of the step, before the forces.
 
-    Gains a little energy where the other schemes lose some.
+    Gains a little energy where the other schemes lose some. Stress, volume and strain that are
+    shown after a step are those of the places that it began with; of usavg, half of that.
 
     Example
     -------
