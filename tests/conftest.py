@@ -119,13 +119,16 @@ def run_interpreted(tmp_path, _interpreter) -> Callable[..., Result]:
 
 @pytest.fixture
 def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndarray]]:
-    """``state_interpreted(script, *columns)``: the exact state at the end, or columns of it."""
+    """``state_interpreted(script, *columns)``: the exact state at the end, or columns of it.
 
-    def run(script: str, *columns: str) -> dict[str, np.ndarray]:
+    With ``boxes=True`` points give to boxes of small tiles, as many points do, not to the nodes.
+    """
+
+    def run(script: str, *columns: str, boxes: bool = False) -> dict[str, np.ndarray]:
         path = _prepared(tmp_path, script)
         file = str(tmp_path / "state.npz")
         request = {"folder": str(tmp_path), "arguments": [str(path)], "state": file}
-        request["columns"] = columns
+        request["columns"], request["boxes"] = columns, boxes
         answer = _ask(_interpreter, request)
         assert answer["status"] == 0, answer["err"]
         with np.load(file) as arrays:

@@ -446,25 +446,26 @@ set_output(1000)
 """
 
 
-def test_tiles_grow_with_domains(tmp_path, monkeypatch):
-    """Domains stretch to six times their length: tiles become larger before they touch.
+def test_boxes_grow_with_domains(tmp_path, monkeypatch):
+    """Domains stretch to six times their length: tiles give to nodes as far away as these reach.
 
     One thread and two, and a run in pieces, give the same bits.
     """
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "in.script"
 
+    monkeypatch.setattr("karamelo_py.run.tiles.DIRECT_UP_TO", 0)
+
     def run(threads, *lines):
         path.write_text("\n".join([TORN.format("Q4"), *lines]), encoding="utf-8")
         hub = final_hub(path, threads)
-        return hub.simulation.tiles, state_of(hub)
+        return state_of(hub)
 
-    tiles, whole = run(1, "run(26)")
-    assert tiles.size == 16  # 8 at first
+    whole = run(1, "run(26)")
     reach = np.abs(whole["x"][:, 2::2] - whole["x"][:, :1]).max() / 0.1
     assert reach > 2.5
-    assert same_bits(whole, run(2, "run(26)")[1])
-    assert same_bits(whole, run(1, "run(13)", "run(13)")[1])
+    assert same_bits(whole, run(2, "run(26)"))
+    assert same_bits(whole, run(1, "run(13)", "run(13)"))
 
 
 def test_torn_apart_in_any_way(state_interpreted):

@@ -13,6 +13,15 @@ from scenes import SCHEMES, TRANSFERS, block
 from states import final_hub, final_state, same_bits
 
 from karamelo_py.kernels.arrays import arrays_of
+from karamelo_py.run import tiles
+
+
+@pytest.fixture(autouse=True)
+def boxes(monkeypatch):
+    """Compiled, too, points give to boxes of several tiles, as many points do."""
+    monkeypatch.setattr(tiles, "DIRECT_UP_TO", 0)
+    monkeypatch.setattr(tiles, "TILES", {1: 8, 2: 6, 3: 4})
+
 
 # --- interpreted: every combination -----------------------------------------------------------
 
@@ -42,8 +51,9 @@ every_combination = pytest.mark.parametrize(
 def test_any_way_through_a_run(state_interpreted, scheme, transfer, law):
     """Runs in pieces, other outputs, stage by stage: all the same bits."""
     options = {"scheme": scheme, "transfer": transfer, "law": law, "size": (0.2, 0.2)}
-    whole = state_interpreted(block(2, *MOVING, "run(12)", **options))
-    pieces = state_interpreted(block(2, *MOVING, "run(5)", "run(0)", "run(7)", **options))
+    whole = state_interpreted(block(2, *MOVING, "run(12)", **options), boxes=True)
+    in_pieces = block(2, *MOVING, "run(5)", "run(0)", "run(7)", **options)
+    pieces = state_interpreted(in_pieces, boxes=True)
     assert same_bits(whole, pieces)
     outputs = state_interpreted(
         block(
@@ -53,10 +63,12 @@ def test_any_way_through_a_run(state_interpreted, scheme, transfer, law):
             "dump(d, all, particle, 3, d.*.txt, x, s11)",
             "run(12)",
             **options,
-        )
+        ),
+        boxes=True,
     )
     assert same_bits(whole, outputs)
-    assert same_bits(whole, state_interpreted(block(2, *MOVING, *STAGES, "run(12)", **options)))
+    staged = block(2, *MOVING, *STAGES, "run(12)", **options)
+    assert same_bits(whole, state_interpreted(staged, boxes=True))
 
 
 # --- compiled: threads ------------------------------------------------------------------------
@@ -123,6 +135,20 @@ def test_one_thread_or_two(state, d, transfer, scheme, laws):
     factor = "dt_factor(0.05)" if scheme == "usl" else "dt_factor(0.4)"
     script = crossing(d, factor, "run(60)", transfer=transfer, scheme=scheme, laws=laws)
     assert same_bits(state(script), state(script, threads=2))
+
+
+@pytest.mark.xdist_group("identical")
+def test_few_points_give_straight_to_the_nodes(state, monkeypatch):
+    """On one thread or two the same; other groups of the same sums, so to round-off as by boxes.
+
+    Round-off of 60 steps: 1e-12 of places of order 1 is 5000 times that of one operation.
+    """
+    script = crossing(2, "run(60)")
+    by_boxes = state(script)
+    monkeypatch.setattr(tiles, "DIRECT_UP_TO", 10**6)
+    straight = state(script)
+    assert same_bits(straight, state(script, threads=2))
+    assert np.abs(straight["x"] - by_boxes["x"]).max() < 1e-12
 
 
 @pytest.mark.xdist_group("identical")

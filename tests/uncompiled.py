@@ -21,13 +21,20 @@ def save_state(request: dict) -> int:
     import numpy as np
     from states import final_columns, final_state
 
+    from karamelo_py.run import tiles
+
     script, columns = request["arguments"][0], request["columns"]
+    usual = tiles.DIRECT_UP_TO, tiles.TILES
+    if request["boxes"]:
+        tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 2, 3: 2}
     try:
         arrays = final_columns(script, columns) if columns else final_state(script)
         np.savez(request["state"], **arrays)
     except Exception:
         traceback.print_exc()
         return 1
+    finally:
+        tiles.DIRECT_UP_TO, tiles.TILES = usual
     return 0
 
 

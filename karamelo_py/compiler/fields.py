@@ -18,6 +18,9 @@ kept
 start
     what it starts from: a number (0 by default), or a function of the kinematics that returns one
     number for each component;
+summed
+    whether points give to this field of the nodes (`False` by default): what they give is summed
+    tile by tile (:mod:`karamelo_py.kernels.sums`);
 columns
     names under which dumps, the log, plots and pictures show its components.
 

@@ -67,14 +67,6 @@ def add_optional(a, factor, b):
 
 
 @shared
-def clear_optional(array, i):
-    """Set row `i` of an array that may be absent (None) to zero."""
-    if array is not None:
-        for k in range(array.shape[1]):
-            array[i, k] = 0
-
-
-@shared
 def clear_first(array, i):
     """Set the first number of row `i` of an array that may be absent (None) to zero."""
     if array is not None:

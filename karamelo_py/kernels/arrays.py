@@ -90,12 +90,37 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 
 
 class Tiling(NamedTuple):
-    """The points of a block by tile, in the order in which a sweep visits the tiles."""
+    """The points of a block by tile."""
 
+    count: np.ndarray  # (2,) int64: number of occupied tiles, and of shares of the points
+    share: np.ndarray  # (S + 1,) int64: tiles of the k-th share are share[k]:share[k + 1]
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
-    colour: np.ndarray  # (c + 1,) int64: occupied tiles of colour c are colour[c]:colour[c + 1]
     grid: np.ndarray  # (T + 1,) int64: the grid that the k-th occupied tile belongs to
+    buffer: np.ndarray  # (T + 1, 5) int64: its records in the buffers begin and end; Grid.first,
+    #                     step_x and step_y of the numbers that its nodes have there
     report: np.ndarray  # (T + 1, 3): largest move, largest rate, offending point + 1 of each tile
+
+
+CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
+
+
+class Buffers(NamedTuple):
+    """What points give to nodes: a dense box of nodes for each tile of points, one after another.
+
+    A tile of nodes sums the boxes that reach it, in one order, and leaves zeros in them. Its parts
+    are ranges of nodes in up to three directions: what each box has in common with it; before them
+    all its nodes to be cleared, where the first box has not all that others reach. Columns of a
+    part: numbers of its first node in the grid and in the box; lengths; steps from a number to that
+    of the neighbour, in the grid and in the box, along the first two directions; what is done.
+
+    In scenes of few points the buffers are the nodes themselves: these are cleared before a visit,
+    and tile after tile adds.
+    """
+
+    nodes: Nodes  # the fields that points give to
+    count: np.ndarray  # (2,) int64: number of tiles of nodes in use; whether boxes are the nodes
+    first: np.ndarray  # (T + 2,) int64: parts of the k-th of them are first[k]:first[k + 1]
+    parts: np.ndarray  # (p, 10) int64
 
 
 class Places(NamedTuple):
@@ -254,6 +279,15 @@ class Setup(NamedTuple):
     heat: NamedTuple  # whether heat flows between points, and the nodes it flows through
     grids: NamedTuple  # points.grid.Grid with an array (g,) for each number
     nodes: Nodes
+    buffers: Buffers
     blocks: tuple  # of Block, one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
     control: Control
+
+
+@shared
+def with_nodes(s, nodes, buffers):
+    """The setup with other nodes and their buffers."""
+    others = {"nodes": nodes, "buffers": buffers}
+    items = zip(s._fields, s, strict=True)
+    return type(s)(*(others.get(name, item) for name, item in items))

@@ -151,6 +151,7 @@ class NodalMean(NamedTuple):
     array: Any
 
     kept = False
+    summed = True
 
     @staticmethod
     def shape(kin):
@@ -173,6 +174,7 @@ class NodalStress(NamedTuple):
     array: Any
 
     kept = False
+    summed = True
     shape = NodalMean.shape
 
 
@@ -474,7 +476,7 @@ def _move(w, stencil, p, dt, total):
     store(w.points.v, p, v)
     store(field(w.points.fields, Moment), p, moment)
     store(w.places.y, p, y)
-    moved = largest_component(w.kin, step) * w.grid.inv_h
+    moved = largest_component(w.kin, subtract(y, x)) * w.grid.inv_h
     if not follows(w.frame):
         return moved
     if carried(w.basis, w.kin) > 0:

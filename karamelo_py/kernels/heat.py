@@ -42,13 +42,16 @@ from karamelo_py.kernels.arrays import (
     POST_HEAT_TO_GRID,
     POST_UPDATE_GRID_HEAT,
     SUPPLY_HEAT,
+    Buffers,
     Hooks,
     Nodes,
     NoHooks,
+    of_force,
+    with_nodes,
 )
 from karamelo_py.kernels.g2p import NodalMean, empty, gathered, settled
 from karamelo_py.kernels.hooks import Warmth, node_hooks, point_hooks
-from karamelo_py.kernels.nodes import ClearMean, ClearSums, SumsToVelocity, TakeMean, Update
+from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
 from karamelo_py.kernels.p2g import load_of, scattered
 from karamelo_py.kernels.step import clear_totals, conduct, read_reports, step_size, visit_here
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
@@ -138,6 +141,7 @@ class Conducting(NamedTuple):
     """
 
     nodes: Nodes
+    buffers: Buffers
 
     point_fields = (Temperature, Capacity, Conductance, Face, Supply, Share, HeatGradient)
 
@@ -145,17 +149,17 @@ class Conducting(NamedTuple):
 class HeatContent(NamedTuple):
     """Scatter heat capacity and heat, as if the points' gradients reached to the nodes."""
 
-    sums: np.ndarray  # (N, 3)
-    mean: np.ndarray  # (N, 2)
-
     says = "heat to grid"
     reads = ("x", "mass", "state", "material", "heat gradient")
+
+    @staticmethod
+    def fills(kin):
+        """See `kernels.sums`."""
+        return ("sums", 0, of_force(Line())), (NodalMean, 0, 2)
 
 
 class TemperatureGradient(NamedTuple):
     """Gather the gradient of the nodal temperature."""
-
-    temperature: np.ndarray  # (N, 1)
 
     says = "gradient of temperature"
     reads = ("x",)
@@ -165,17 +169,17 @@ class TemperatureGradient(NamedTuple):
 class HeatFlow(NamedTuple):
     """Scatter the heat flow and what fixes supply."""
 
-    sums: np.ndarray  # (N, 3)
-
     says = "heat flow"
     reads = ("state", "material", "deformation gradient", "heat gradient", "conductance")
+
+    @staticmethod
+    def fills(kin):
+        """See `kernels.sums`."""
+        return (("sums", of_force(Line()), of_force(Line()) + 1),)
 
 
 class Warming(NamedTuple):
     """Gather the change of the nodal temperature; settle the temperature of the point."""
-
-    update: np.ndarray  # (N, 2)
-    mean: np.ndarray  # (N, 2)
 
     says = "temperature"
     reads = ("x", "state", "material", "temperature", "capacity", "conductance", "share")
@@ -230,11 +234,12 @@ def _(quantity, w, stencil, k, load):
     for axis in range(len(gradient)):
         T = fma(gradient[axis], arm[axis], T)
     part = weight * capacity
-    quantity.sums[i, 0] += part
-    quantity.sums[i, 1] = fma(part, T, quantity.sums[i, 1])
+    sums, mean = w.nodes.sums, field(w.nodes.fields, NodalMean)
+    sums[i, 0] += part
+    sums[i, 1] = fma(part, T, sums[i, 1])
     part = weight * conductance
-    quantity.mean[i, 0] = fma(part, T, quantity.mean[i, 0])
-    quantity.mean[i, 1] += part
+    mean[i, 0] = fma(part, T, mean[i, 0])
+    mean[i, 1] += part
 
 
 @load_of.on(HeatFlow)
@@ -251,10 +256,10 @@ def _(quantity, w, p, like):
 def _(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     flow, supply = load
-    total = fma(at_least_round_off(weight), supply, quantity.sums[i, 2])
+    total = fma(at_least_round_off(weight), supply, w.nodes.sums[i, 2])
     for axis in range(len(flow)):
         total = fma(flow[axis], gradient[axis], total)
-    quantity.sums[i, 2] = total
+    w.nodes.sums[i, 2] = total
 
 
 # --- from nodes to points ---------------------------------------------------------------------
@@ -269,7 +274,7 @@ def _(task, w, x):
 def _(task, w, stencil, k, total):
     i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     # An axisymmetric gradient has the part around the axis behind; a scalar has none there.
-    return add_scaled(total, task.temperature[i, 0], leading(gradient, total))
+    return add_scaled(total, w.nodes.velocity[i, 0], leading(gradient, total))
 
 
 @settled.on(TemperatureGradient)
@@ -287,7 +292,8 @@ def _(task, w, x):
 @gathered.on(Warming)
 def _(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    return add_scaled(total, at_least_round_off(weight), (task.update[i, 1], task.mean[i, 0]))
+    shown = w.nodes.update[i, 1], field(w.nodes.fields, NodalMean)[i, 0]
+    return add_scaled(total, at_least_round_off(weight), shown)
 
 
 @settled.on(Warming)
@@ -369,19 +375,18 @@ def _(hooks, s):
 
 
 @shared
-def content_and_warming(nodes):
-    """One loop for two visits: heat to the nodes, and temperature from them."""
-    mean = field(nodes.fields, NodalMean)
-    return Visit((Warming(nodes.update, mean),), (HeatContent(nodes.sums, mean),), OldWeights())
+def visit_for_heat(heat, s, mode, visit, gathers, scatters):
+    """Visit the points for heat: the nodes are those of heat."""
+    here = with_nodes(s, heat.nodes, heat.buffers)
+    visit_here(here, mode, visit, step_size(s), gathers, scatters)
 
 
 @shared
-def map_heat(nodes, s, mode):
-    """Heat capacity and heat of the nodes, from the points now."""
-    dt = step_size(s)
-    sweep_nodes(mode, ClearSums(), Line(), nodes, s.spans, dt)
-    sweep_nodes(mode, ClearMean(), Line(), nodes, s.spans, dt)
-    visit_here(s, mode, content_and_warming(nodes), dt, False, True)
+def map_heat(heat, s, mode, gathers, scatters):
+    """Heat capacity and heat of the nodes from the points now, or temperature from the nodes."""
+    # One loop for both.
+    visit = Visit((Warming(),), (HeatContent(),), OldWeights())
+    visit_for_heat(heat, s, mode, visit, gathers, scatters)
 
 
 @point_function()
@@ -396,7 +401,7 @@ def _(heat, s, mode):
 
 @show_heat.on(Conducting)
 def _(heat, s, mode):
-    map_heat(heat.nodes, s, mode)
+    map_heat(heat, s, mode, False, True)
     sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.spans, step_size(s))
 
 
@@ -405,16 +410,16 @@ def _(heat, s, mode, hooks):
     dt = step_size(s)
     nodes = heat.nodes
     kin = Line()
-    map_heat(nodes, s, mode)
+    map_heat(heat, s, mode, False, True)
     sweep_nodes(mode, SumsToVelocity(), kin, nodes, s.spans, dt)
     sweep_nodes(mode, TakeMean(), kin, nodes, s.spans, dt)
     at_heat_nodes(hooks, POST_HEAT_TO_GRID, ON_VELOCITY, s)
     at_heated_points(hooks, s)
-    flow = Visit((TemperatureGradient(nodes.velocity),), (HeatFlow(nodes.sums),), OldWeights())
-    visit_here(s, mode, flow, dt, True, True)
+    flow = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
+    visit_for_heat(heat, s, mode, flow, True, True)
     sweep_nodes(mode, Update(), kin, nodes, s.spans, dt)
     at_heat_nodes(hooks, POST_UPDATE_GRID_HEAT, ON_UPDATE, s)
-    visit_here(s, mode, content_and_warming(nodes), dt, True, False)
+    map_heat(heat, s, mode, True, False)
     # What `Warming` reports as a rate is by what factor conduction has become faster.
     read_reports(s)
     clock = s.control.clock[0]

@@ -57,6 +57,7 @@ class Lost(NamedTuple):
     array: Any
 
     kept = False
+    summed = True
 
     @staticmethod
     def shape(kin):

@@ -6,31 +6,13 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.tuples import clear_first, clear_optional
+from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.g2p import NodalMean, NodalStress
 from karamelo_py.kernels.loss import Lost, Rubbed, keep_loss
-from karamelo_py.kernels.p2g import Centre, Led, Normal, SeenMass
+from karamelo_py.kernels.p2g import SeenMass
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
-
-
-class ClearSums(NamedTuple):
-    """Mass, momentum, force and normal of the nodes start from zero."""
-
-    goes_through = ("sums",)
-
-
-class ClearVelocity(NamedTuple):
-    """The velocity array starts from zero, to take momentum."""
-
-    goes_through = ("velocity",)
-
-
-class ClearMean(NamedTuple):
-    """The sums of a weighted mean start from zero."""
-
-    goes_through = ("nodal mean",)
 
 
 class TakeMean(NamedTuple):
@@ -120,18 +102,6 @@ def per_mass(nodes, n, like):
     return real(1, like) / mass if mass > 0 else real(0, like)
 
 
-@at_node.on(ClearSums)
-def _(task, kin, nodes, n, dt):
-    for k in range(nodes.sums.shape[1]):
-        nodes.sums[n, k] = 0
-    clear_optional(field(nodes.fields, Normal), n)
-    clear_optional(field(nodes.fields, SeenMass), n)
-    clear_optional(field(nodes.fields, NodalStress), n)
-    clear_optional(field(nodes.fields, Led), n)
-    clear_optional(field(nodes.fields, Centre), n)
-    clear_first(field(nodes.fields, Lost), n)
-
-
 @at_node.on(KeepLoss)
 def _(task, kin, nodes, n, dt):
     keep_loss(field(nodes.fields, Lost), kin, nodes.sums, n)
@@ -139,13 +109,7 @@ def _(task, kin, nodes, n, dt):
 
 @at_node.on(ClearRubbed)
 def _(task, kin, nodes, n, dt):
-    clear_optional(field(nodes.fields, Rubbed), n)
-
-
-@at_node.on(ClearVelocity)
-def _(task, kin, nodes, n, dt):
-    for k in range(dimension(kin)):
-        nodes.velocity[n, k] = 0
+    clear_first(field(nodes.fields, Rubbed), n)
 
 
 @at_node.on(Update)
@@ -192,13 +156,6 @@ def _(task, kin, nodes, n, dt):
         nodes.velocity[n, k] = nodes.update[n, k] - (one - share) * dv
 
 
-@at_node.on(ClearMean)
-def _(task, kin, nodes, n, dt):
-    mean = field(nodes.fields, NodalMean)
-    mean[n, 0] = 0
-    mean[n, 1] = 0
-
-
 @at_node.on(TakeMean)
 def _(task, kin, nodes, n, dt):
     _take_mean(field(nodes.fields, NodalMean), n)
@@ -223,7 +180,6 @@ def _(task, kin, nodes, n, dt):
     for k in range(d):
         v = nodes.sums[n, of_momentum(kin) + k] * factor
         series[n, k] = v
-        series[n, d + k] = 0
         nodes.update[n, of_change(kin) + k] = nodes.update[n, k] + task.factor * v
 
 
@@ -235,5 +191,4 @@ def _(task, kin, nodes, n, dt):
     for k in range(d):
         v = series[n, d + k] * factor
         series[n, k] = v
-        series[n, d + k] = 0
         nodes.update[n, of_change(kin) + k] += task.factor * v

@@ -12,7 +12,7 @@ from karamelo_py.compiler.tuples import (
     scale,
     subtract,
 )
-from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, of_force
+from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, VELOCITY_WIDTH, of_force
 from karamelo_py.kernels.g2p import (
     AveragedStress,
     FBar,
@@ -26,7 +26,7 @@ from karamelo_py.kernels.loss import Lost, bring_energy
 from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, Updated, add_force, force_stress
-from karamelo_py.points.kinematics import add_pressure, stretching_mean, zero_symmetric
+from karamelo_py.points.kinematics import add_pressure, dimension, stretching_mean, zero_symmetric
 from karamelo_py.points.laws import (
     constrained_velocity,
     jacobian,
@@ -44,6 +44,19 @@ class MassMomentum(NamedTuple):
     says = "p2g mass and momentum"
     reads = ("x moved", "mass", "v", "moment")
 
+    @staticmethod
+    def fills(kin):
+        """See `kernels.sums`."""
+        d = dimension(kin)
+        own = (
+            (Normal, 0, d),
+            (SeenMass, 0, 1),
+            (Centre, 0, d),
+            (Led, 0, of_force(kin)),
+            (Lost, 0, 1),
+        )
+        return ("sums", 0, of_force(kin)), *own
+
 
 class InternalForce(NamedTuple):
     """Scatter the internal force, and that of fixes on points."""
@@ -51,6 +64,11 @@ class InternalForce(NamedTuple):
     in_lanes = True
     says = "internal force"
     reads = ("mass", "state", "material", "deformation gradient", "force")
+
+    @staticmethod
+    def fills(kin):
+        """See `kernels.sums`."""
+        return ("sums", of_force(kin), SUMS_WIDTH[dimension(kin)]), (NodalStress, 0, 2)
 
 
 class MomentumAgain(NamedTuple):
@@ -60,6 +78,11 @@ class MomentumAgain(NamedTuple):
     says = "momentum to grid"
     reads = ("mass", "v", "moment")
 
+    @staticmethod
+    def fills(kin):
+        """See `kernels.sums`."""
+        return (("velocity", 0, VELOCITY_WIDTH[dimension(kin)]),)
+
 
 class Volumes(NamedTuple):
     """Scatter volume, after and before the trial increment (F-bar)."""
@@ -68,6 +91,11 @@ class Volumes(NamedTuple):
     says = "volumes to grid"
     reads = ("mass", "state", "material", "volume ratio")
 
+    @staticmethod
+    def fills(kin):
+        """See `kernels.sums`."""
+        return ((NodalMean, 0, 2),)
+
 
 class AveragedForce(NamedTuple):
     """Scatter the internal force of the averaged mean stress less that of a point's own (F-bar)."""
@@ -75,6 +103,12 @@ class AveragedForce(NamedTuple):
     in_lanes = True
     says = "internal force of the averaged mean stress"
     reads = ("mass", "state", "material", "deformation gradient", "averaged stress")
+    adds = True  # to a force that is there
+
+    @staticmethod
+    def fills(kin):
+        """See `kernels.sums`."""
+        return (("sums", of_force(kin), SUMS_WIDTH[dimension(kin)]),)
 
 
 class SeriesBack(NamedTuple):
@@ -83,6 +117,11 @@ class SeriesBack(NamedTuple):
     in_lanes = True
     says = "term of the series to the grid"
     reads = ("mass", "term of series")
+
+    @staticmethod
+    def fills(kin):
+        """See `kernels.sums`."""
+        return ((Series, dimension(kin), 2 * dimension(kin)),)
 
 
 class Force(NamedTuple):
@@ -102,6 +141,7 @@ class Normal(NamedTuple):
 
     shape = vector
     kept = False
+    summed = True
 
 
 class SeenMass(NamedTuple):
@@ -111,6 +151,7 @@ class SeenMass(NamedTuple):
 
     shape = scalar
     kept = False
+    summed = True
 
     @staticmethod
     def needed(basis: Any) -> bool:
@@ -125,6 +166,7 @@ class Centre(NamedTuple):
 
     shape = vector
     kept = False
+    summed = True
 
 
 class Led(NamedTuple):
@@ -133,6 +175,7 @@ class Led(NamedTuple):
     array: Any
 
     kept = False
+    summed = True
 
     @staticmethod
     def shape(kin):

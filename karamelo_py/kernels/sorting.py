@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from karamelo_py.compiler.compile import kernel
+from karamelo_py.compiler.compile import kernel, real, shared
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent, first_node
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
+
+
+@shared
+def cell_of(grid, direction, at):
+    """The cell of a point that lies so many cells from the corner of the grid.
+
+    Clamped, since a hook may have put a point anywhere: the next sweep finds it.
+    """
+    return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
 @kernel
@@ -25,10 +34,7 @@ def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
         grid = record(grids, g)
         number = 0
         for k in range(dimension(kin)):
-            last = cells_along(grid, k) - 1
-            # Clamped, since a hook may have put a point anywhere: the next sweep finds it.
-            cell = min(max(int(in_cells(grid, k, x[k, p])), 0), last)
-            number = number * tiles[g, k] + cell // size
+            number = number * tiles[g, k] + cell_of(grid, k, in_cells(grid, k, x[k, p])) // size
         number += first[g]
         tile[p] = number
         start[number + 1] += 1
@@ -41,16 +47,17 @@ def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
 
 
 @kernel
-def order_in_tiles(kin, grids, basis, size, points, x, begins, ends, width, bins, cell, order):
+def order_in_tiles(kin, grids, basis, size, points, x, ranges, width, boxes, bins, cell, order):
     """Sort the points of each tile by the first node that they see, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
-    first. The order follows from where the points are, not from where they were. `bins` (2, cells
-    of a tile) and `cell` (2, n) are scratch; `order` (n,) is by tile.
+    first. The order follows from where the points are, not from where they were. `boxes` (2, T, d)
+    takes between what places the points lie, in cells. `bins` (2, cells of a tile)
+    and `cell` (2, n) are scratch; `order` (n,) is by tile.
     """
     d = dimension(kin)
-    for t in range(len(begins)):
-        begin, end = begins[t], ends[t]
+    for t in range(len(ranges)):
+        begin, end = ranges[t, 0], ranges[t, 1]
         bins[0, :] = 0
         bins[1, :] = -1
         for q in range(begin, end):
@@ -58,8 +65,11 @@ def order_in_tiles(kin, grids, basis, size, points, x, begins, ends, width, bins
             grid = record(grids, points.grid[p])
             number = 0
             for k in range(d):
-                a = in_cells(grid, k, x[k, p]) + first_node(basis, grid.h)
-                number = number * size + max(int(a), 0) % size
+                at = in_cells(grid, k, x[k, p])
+                number = number * size + max(int(at + first_node(basis, grid.h)), 0) % size
+                at = at if at > 0 else real(0, at)  # so written, NaN is 0 too
+                boxes[0, t, k] = at if q == begin else min(boxes[0, t, k], at)
+                boxes[1, t, k] = at if q == begin else max(boxes[1, t, k], at)
             cell[0, q] = number
             cell[1, q] = p
             bins[0, number] += 1

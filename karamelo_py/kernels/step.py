@@ -45,10 +45,7 @@ from karamelo_py.kernels.g2p import STRAINS, AverageStress, FBar, Move, SeriesTe
 from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks
 from karamelo_py.kernels.loss import Lost, Rubbed
 from karamelo_py.kernels.nodes import (
-    ClearMean,
     ClearRubbed,
-    ClearSums,
-    ClearVelocity,
     ExtendSeries,
     KeepLoss,
     MomentumToVelocity,
@@ -68,10 +65,11 @@ from karamelo_py.kernels.p2g import (
     SeriesBack,
     Volumes,
 )
+from karamelo_py.kernels.sums import adds
 from karamelo_py.kernels.sweep import (
     OldWeights,
-    PresentWeights,
     Visit,
+    sum_buffers,
     sweep_nodes,
     sweep_points,
 )
@@ -108,7 +106,7 @@ def _read_reports(tiling, control):
     clock = control.clock[0]
     rate = 0.0
     moved = 0.0
-    for t in range(tiling.colour[-1]):
+    for t in range(tiling.count[0]):
         moved = max(moved, tiling.report[t, 0])
         rate = max(rate, tiling.report[t, 1])
         if tiling.report[t, 2] > 0:
@@ -134,9 +132,26 @@ def read_reports(s):
 
 
 @shared
+def _visit(s, mode, visit, then, gathers, scatters, dt):
+    # Where points give to the nodes themselves, these start from zero.
+    direct = s.buffers.count[1]
+    anew = tuple(quantity for quantity in visit.quantities if not adds(quantity))
+    sum_all(mode, anew, s, scatters & (direct == 1))
+    _sweep_blocks(s, mode, visit, then, gathers, scatters, dt)
+    sum_all(mode, visit.quantities, s, scatters & (direct == 0))
+
+
+@shared
+def sum_all(mode, quantities, s, due):
+    """Sum at the nodes what the points gave, if they did."""
+    if len(quantities):
+        sum_buffers(mode, quantities, s, due)
+
+
+@shared
 def visit_here(s, mode, visit, dt, gathers, scatters):
     """Visit all points at their places now, where nothing can go wrong."""
-    _sweep_blocks(s, mode, visit, s.control.clock[0].now, gathers, scatters, dt)
+    _visit(s, mode, visit, s.control.clock[0].now, gathers, scatters, dt)
 
 
 @shared
@@ -144,7 +159,7 @@ def sweep(s, mode, visit, dt, gathers, scatters, moves):
     """Visit all points; whether all went well. With `moves` new places go to the other array."""
     clock = s.control.clock[0]
     then = 1 - clock.now if moves else clock.now
-    _sweep_blocks(s, mode, visit, then, gathers, scatters, dt)
+    _visit(s, mode, visit, then, gathers, scatters, dt)
     read_reports(s)
     # Points move in one sweep of a step, and their domains may grow in another.
     clock.move += clock.new_move
@@ -422,7 +437,6 @@ def _(averaging, s, mode, dt):
 
 @average_volumes.on(FBar)
 def _(averaging, s, mode, dt):
-    sweep_nodes(mode, ClearMean(), s.kin, s.nodes, s.spans, dt)
     visit_here(s, mode, Visit((TrialStrain(),), (Volumes(),), OldWeights()), dt, True, True)
     sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.spans, dt)
 
@@ -516,8 +530,8 @@ SERIES = _call(
     lambda s: "series of XPIC" if isinstance(s.transfer, XPIC) else None,
 )
 
-SUMS = table.Scatter((MassMomentum(), InternalForce()), PresentWeights(), ClearSums())
-MASS_AND_MOMENTUM = table.Scatter((MassMomentum(),), PresentWeights(), ClearSums())
+SUMS = table.Scatter((MassMomentum(), InternalForce()))
+MASS_AND_MOMENTUM = table.Scatter((MassMomentum(),))
 # For schemes that strain first.
 VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.Nodes(SumsToVelocity()))
 FORCE = table.Scatter((InternalForce(),), OldWeights())
@@ -540,7 +554,7 @@ MOVE = (
 )
 # The velocity of the moved points, at the nodes once more.
 MOMENTUM_AGAIN = (
-    table.Scatter((MomentumAgain(),), OldWeights(), ClearVelocity()),
+    table.Scatter((MomentumAgain(),), OldWeights()),
     table.Nodes(MomentumToVelocity()),
     AXIS,
 )
@@ -583,12 +597,6 @@ class _Spelled:
         made = self.name(type(tag), "tag")
         return f"{made}({', '.join(self.tag(part) for part in tag)})"
 
-    def clear(self, task: NamedTuple, indent: str = "") -> None:
-        """The fields that a scatter adds to start from zero."""
-        self.lines.append(
-            f"{indent}sweep_nodes(mode, {self.tag(task)}, s.kin, s.nodes, s.spans, dt)"
-        )
-
     def row(self, row: Any) -> None:
         """One row of the table."""
         add = self.lines.append
@@ -610,10 +618,6 @@ class _Spelled:
     def sweep(self, row: table.Sweep) -> None:
         """A visit of the points, and what comes before it."""
         add = self.lines.append
-        if row.clears is not None:
-            if row.only_if_more:
-                add("if more:")
-            self.clear(row.clears, "    " if row.only_if_more else "")
         whole = "last_step_size(s)" if row.of_last_step else "dt"
         length = whole if row.share == 1 else f"real({row.share}, dt) * {whole}"
         if row.gathers and any(isinstance(tag, STRAINS) for tag in row.visit.tasks):

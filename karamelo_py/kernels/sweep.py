@@ -1,8 +1,8 @@
-"""The two loops: over points (gather, settle, scatter) and over nodes in use.
+"""The loops: over tiles of points (gather, settle, scatter), tiles of nodes and nodes in use.
 
-Points are visited tile by tile and colour by colour. Tiles of one colour never touch the same
-node, so threads need no atomics; the sums of a node are made in the order of colours, tiles and
-points, whatever the number of threads.
+The points of a tile give to a buffer of their own: a dense box of the nodes that they may reach.
+Then each tile of nodes sums the boxes that reach it. Threads share out tiles and need no atomics;
+sums are made in one order, whatever the number of threads.
 """
 
 from __future__ import annotations
@@ -36,12 +36,15 @@ from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
+from karamelo_py.kernels.sums import sum_tile
 from karamelo_py.kernels.visit import Work, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
 from karamelo_py.points.basis.product import sees_same_nodes, with_one_node
 from karamelo_py.points.boundary import reflected
 from karamelo_py.points.frames import Total, Updated, follows
-from karamelo_py.points.grid import inside
+from karamelo_py.points.grid import inside, renumbered
+
+ROUNDING = 1e-3  # cells by which distances in cells may be rounded
 
 
 class Serial(NamedTuple):
@@ -70,7 +73,9 @@ class Context(NamedTuple):
     averaging: NamedTuple
     grids: NamedTuple
     nodes: NamedTuple
+    buffers: NamedTuple  # nodes that are given to
     now: int
+    room: float  # cells that points may still go before their tile's box does not hold them
 
 
 class OldWeights(NamedTuple):
@@ -94,6 +99,24 @@ def _(weights, w, stencil, p):
 @restencil.on(PresentWeights)
 def _(weights, w, stencil, p):
     return present_stencil(w.frame, w, stencil, p)
+
+
+@point_function()
+def fits(weights, room, moved):
+    """Whether points still give to nodes of their tile's box.
+
+    If not, they will be sorted before the next step, and what they would give now is given then.
+    """
+
+
+@fits.on(OldWeights)
+def _(weights, room, moved):
+    return True
+
+
+@fits.on(PresentWeights)
+def _(weights, room, moved):
+    return in_all(moved <= room)
 
 
 @point_function()
@@ -265,6 +288,12 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
             places,
         )
     )
+    box = tiling.buffer
+    numbered = renumbered(grid, box[t, 2], box[t, 3], box[t, 4])
+    out = Work(
+        s.frame, s.kin, s.basis, numbered, s.transfer, s.averaging, s.buffers, points, block.laws,
+        places,
+    )  # fmt: skip
     width = in_lanes(visit, s, block)
     furthest = zero_of(width, dt)
     fastest = furthest
@@ -288,13 +317,21 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
             continue
         furthest = max(furthest, moved)
         fastest = rate
-        if scatters:
+        if scatters and fits(visit.weights, s.room, moved):
             stencil = restencil(visit.weights, w, stencil, p)
             loads = load_all(visit.quantities, w, p, dt)
-            scatter_nodes(width, visit.quantities, w, stencil, loads)
+            scatter_nodes(width, visit.quantities, out, stencil, loads)
     tiling.report[t, 0] = largest(furthest)
     tiling.report[t, 1] = largest(fastest)
     tiling.report[t, 2] = wrong
+
+
+@subkernel
+def visit_share(visit, s, block, then, gathers, scatters, dt, k):
+    """Visit the points of the tiles of the k-th share, one thread's work."""
+    share = block.tiling.share
+    for t in range(share[k], share[k + 1]):
+        visit_tile(visit, s, block, then, gathers, scatters, dt, t)
 
 
 @subkernel
@@ -370,7 +407,8 @@ def in_threads(function: Any, parameters: str) -> Any:
     return loop
 
 
-_visit_tiles = in_threads(visit_tile, "visit, s, block, then, gathers, scatters, dt")
+_visit_shares = in_threads(visit_share, "visit, s, block, then, gathers, scatters, dt")
+_sum_tiles = in_threads(sum_tile, "quantities, kin, nodes, buffers")
 _visit_spans = in_threads(visit_nodes, "task, kin, nodes, spans, dt")
 
 
@@ -381,18 +419,38 @@ def sweep_points(mode, visit, s, block, then, gathers, scatters, dt):
 
 @entered
 def _visit_all(mode, visit, s, block, then, gathers, scatters, dt):
-    colour = block.tiling.colour
-    for c in range(colour.size - 1):
-        _visit_tiles(mode, colour[c], colour[c + 1], visit, s, block, then, gathers, scatters, dt)
+    shares = block.tiling.count[1]
+    _visit_shares(mode, 0, shares, visit, s, block, then, gathers, scatters, dt)
 
 
 @sweep_points.on(Serial)
 @sweep_points.on(Threaded)
 def _(mode, visit, s, block, then, gathers, scatters, dt):
+    clock = s.control.clock[0]
+    # A little more, so that points are sorted next whenever one did not fit (see run.tiles).
+    room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
     context = Context(
-        s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.control.clock[0].now
-    )
+        s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.buffers.nodes,
+        clock.now, real(room, dt),
+    )  # fmt: skip
     _visit_all(mode, visit, context, block, then, gathers, scatters, dt)
+
+
+@point_function()
+def sum_buffers(mode, quantities, s, due):
+    """Sum at the nodes what the points gave of the quantities, if that is due."""
+
+
+@entered
+def _sum_all(mode, quantities, kin, nodes, buffers, due):
+    count = buffers.count[0] if due else 0
+    _sum_tiles(mode, 0, count, quantities, kin, nodes, buffers)
+
+
+@sum_buffers.on(Serial)
+@sum_buffers.on(Threaded)
+def _(mode, quantities, s, due):
+    _sum_all(mode, quantities, s.kin, s.nodes, s.buffers, due)
 
 
 @point_function()

@@ -42,14 +42,13 @@ class Gather(NamedTuple):
 
 
 class Scatter(NamedTuple):
-    """Points to grid: quantities, by old weights or present ones, to fields that start from zero.
+    """Points to grid: quantities, by old weights or present ones.
 
     Present weights are those of the place after the move: of the step to come.
     """
 
     quantities: tuple
     weights: NamedTuple = PresentWeights()
-    clears: NamedTuple | None = None
 
 
 class Nodes(NamedTuple):
@@ -76,7 +75,6 @@ class Sweep(NamedTuple):
     of_last_step: bool = False
     gathers: bool = True
     scatters: bool = True
-    clears: NamedTuple | None = None
     moves: bool = True  # whether new places go to the other of the two arrays
     only_if_more: bool = False  # the scatter belongs to the next step
 
@@ -108,7 +106,7 @@ def fused(rows: Iterable[Any]) -> list[Any]:
         # The new places are read by a scatter of the next step, whoever made them.
         moves = bool(waiting) or more
         scatters = scatter is not None
-        return Sweep(visit, share, of_last_step, bool(waiting), scatters, found.clears, moves, more)
+        return Sweep(visit, share, of_last_step, bool(waiting), scatters, moves, more)
 
     for row in kept:
         if isinstance(row, Gather):
@@ -152,7 +150,7 @@ def staged(rows: Iterable[Any]) -> list[Any]:
             out.append(Sweep(loop_of((row.task,), None), *row[1:], True, False))
         elif isinstance(row, Scatter):
             visit = loop_of((), row)
-            out.append(Sweep(visit, gathers=False, clears=row.clears, moves=False))
+            out.append(Sweep(visit, gathers=False, moves=False))
         else:
             out.append(row)
     return out

@@ -33,6 +33,14 @@ class Grid(NamedTuple):
 
 
 @shared
+def renumbered(grid, first, step_x, step_y):
+    """The grid with other numbers of its nodes."""
+    numbers = {"first": first, "step_x": step_x, "step_y": step_y}
+    items = zip(grid._fields, grid, strict=True)
+    return type(grid)(*(numbers.get(name, item) for name, item in items))
+
+
+@shared
 def pick(direction, a, b, c):
     """The one of three that belongs to a direction; no branch is left where that is a literal."""
     return a if direction == 0 else (b if direction == 1 else c)

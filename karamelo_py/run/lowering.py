@@ -177,7 +177,8 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     lattices = method.lattices(hub)
     transfer = hub.update.transfer_tag(real)
     basis = type(method.basis)(*(real(x) for x in method.basis))
-    tiles = Tiles(lattices, basis)
+    points = sum(len(solid.x0) for solid in hub.solids.values())
+    tiles = Tiles(lattices, basis, points)
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
@@ -195,18 +196,20 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     averaging = method.averaging(hub)
     heat = Insulated()
     if hub.update.thermal:
-        heat = Conducting(lower_nodes((NodalMean,), Line(), count, real))
+        at_nodes = lower_nodes((NodalMean,), Line(), count, real)
+        heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes))
     owners = [method.frame, transfer, averaging, contact, heat, grids]
     owners += [*hub.fixes.values(), hub.update.scheme, basis, method]
-    at_nodes = [
+    kinds = [
         kind
         for kind in fields.declared(owners, "node_fields")
         if getattr(kind, "needed", lambda basis: True)(basis)
     ]
     if returns_loss(hub):
-        at_nodes.append(Lost)
+        kinds.append(Lost)
     if warms_by_friction(hub):
-        at_nodes.append(Rubbed)
+        kinds.append(Rubbed)
+    at_nodes = lower_nodes(kinds, kin, count, real)
     setup = Setup(
         frame=method.frame,
         kin=kin,
@@ -216,11 +219,12 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         contact=contact,
         heat=heat,
         grids=grids,
-        nodes=lower_nodes(at_nodes, kin, count, real),
+        nodes=at_nodes,
+        buffers=tiles.empty_buffers(at_nodes),
         blocks=lower_blocks(
             hub, kin, fields.declared(owners, "point_fields"), tiles, real, previous
         ),
-        spans=tiles.empty_spans(),
+        spans=np.zeros((1, 2), np.int64),
         control=control,
     )
     return setup, tiles

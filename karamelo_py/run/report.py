@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.fields import name_of
-from karamelo_py.kernels.arrays import arrays_of
+from karamelo_py.kernels.arrays import Setup, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import Fused, Staged, rows_of
 from karamelo_py.kernels.table import says
@@ -42,10 +42,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
     more = ", ..." if len(lattices) > 8 else ""
     say(f"nodes          {hub.fields.node_count} ({shapes}{more})")
     tiles = simulation.tiles
-    used = int(np.count_nonzero(tiles.used == 1))
-    near = int(np.count_nonzero(tiles.used))
-    nodes = int(np.sum(s.spans[1 : 1 + s.spans[0, 0], 1] - s.spans[1 : 1 + s.spans[0, 0], 0]))
-    say(f"tiles          {used} of {tiles.count} hold points, {near} in use ({nodes} nodes)")
+    nodes = nodes_in_use(s)
+    say(f"tiles          {tiles.occupied} of {tiles.count} hold points, {nodes} nodes are in use")
     say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
     say(f"               {words_of_share(hub)}")
     say(f"limited by     {ruling_limit(simulation)}")
@@ -68,7 +66,9 @@ def report(hub: Hub, end_time: float = inf) -> None:
         size = array.itemsize * array.shape[1]
         per_node += size
         say(f"  {name:<30}  {array.shape[1]!s:<10} {size:>6}")
-    touched = total + ALONE * simulation.count + per_node * nodes
+    boxes = tiles.box_bytes(s)
+    say(f"boxes of tiles {boxes / 2**20:.3g} MiB")
+    touched = total + ALONE * simulation.count + per_node * nodes + boxes
     say(f"memory         {touched / 2**20:.3g} MiB touched, and in a run")
     say(f"               {total / 2**20:.3g} MiB for a copy of the last good state")
     say("")
@@ -82,6 +82,12 @@ def report(hub: Hub, end_time: float = inf) -> None:
     for saving in found:
         say(f"  {saving.cost}")
         say(f"    instead: {saving.instead}")
+
+
+def nodes_in_use(s: Setup) -> int:
+    """How many nodes points may give to before they are sorted again."""
+    spans = s.spans[1 : 1 + s.spans[0, 0]]
+    return int(np.sum(spans[:, 1] - spans[:, 0]))
 
 
 def bytes_per_point(simulation: Simulation) -> int:

@@ -21,10 +21,10 @@ from karamelo_py.kernels.arrays import (
     NoHooks,
 )
 from karamelo_py.kernels.export import impose_stress
-from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, show_heat
+from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points, show_heat
 from karamelo_py.kernels.hooks import POINT_STAGES, STAGES, CompiledHook
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.kernels.nodes import ClearSums, SumsToVelocity
+from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.step import (
     DONE,
@@ -57,6 +57,7 @@ from karamelo_py.run.lowering import (
 )
 from karamelo_py.run.stable import ruling_limit, shares_of_limits
 from karamelo_py.run.state import changing
+from karamelo_py.run.tiles import used
 from karamelo_py.run.trial import try_parts
 from karamelo_py.run.watch import internal_energy, unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
@@ -441,7 +442,7 @@ class Simulation:
 
     def sort(self) -> None:
         """Sort the points by tile."""
-        self.tiles.sort(self.setup, self.mode)
+        self.tiles.sort(self.setup)
 
     def sort_if_due(self) -> None:
         """Sort the points when one may have left its tile's surroundings, or none is sorted yet."""
@@ -569,7 +570,6 @@ class Simulation:
             s = self.setup
             self.sort_if_due()
             dt = step_size(s)
-            sweep_nodes(self.mode, ClearSums(), s.kin, s.nodes, s.spans, dt)
             visit = Visit((), SUMS.quantities, SUMS.weights)
             sweep(s, self.mode, visit, dt, False, True, False)
             sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
@@ -596,15 +596,11 @@ class Simulation:
         """Return to a snapshot."""
         s = self.setup
         # Nodes that were not in use then have to be empty, as they were.
-        spans = s.spans[1 : 1 + s.spans[0, 0]].copy()
-        for begin, end in spans:
-            s.nodes.sums[begin:end] = 0
-            for one in s.nodes.fields:
-                one.array[begin:end] = 0
-            if isinstance(s.heat, Conducting):
-                s.heat.nodes.sums[begin:end] = 0
+        spans = used(s.spans)[1:].copy()
+        self.tiles.empty_nodes(s)
         for name, array in changing(self, snapshot):
             array[...] = snapshot[name]
+        self.tiles.make_room(s)
         s.control.values[:] = snapshot["values"]
         for marks in self.hub.update.method.remembered(s.contact, spans):
             marks[np.abs(marks) > self.step] = 0
@@ -614,6 +610,6 @@ class Simulation:
         """Block and index of the points that the last sweep found wrong, one a tile at most."""
         for block in self.setup.blocks:
             tiling = block.tiling
-            for t in range(max(int(tiling.colour[-1]), 1)):
+            for t in range(max(int(tiling.count[0]), 1)):
                 if tiling.report[t, 2] > 0:
                     yield block, int(tiling.report[t, 2]) - 1

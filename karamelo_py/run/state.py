@@ -9,6 +9,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
+from karamelo_py.run.tiles import grow, in_use, numbers, used
 from karamelo_py.script.errors import ScriptError
 
 # What else a simulation knows of its state; `measured` comes before what depends on its version.
@@ -23,18 +24,17 @@ def changing(
     With `copies` of them, as far as it was in use when these were made.
     """
     s = simulation.setup
-    used = _used(s.spans) if copies is None else copies["spans"]
+    for name, array, rows in simulation.tiles.in_use(s):
+        if copies is not None:
+            rows = len(copies[name])
+            grow(array, rows)
+        yield name, array[:rows]
     yield "clock", s.control.clock
-    yield "spans", s.spans[: len(used)]
     for k, block in enumerate(s.blocks):
         for name, array in arrays_of(block.points):
             yield f"points/{k}/{name}", array
-        tiling = block.tiling
-        colour = tiling.colour if copies is None else copies[f"tiling/{k}/colour"]
-        yield f"tiling/{k}/colour", tiling.colour
-        yield f"tiling/{k}/range", tiling.range[: colour[-1]]
-        yield f"tiling/{k}/grid", tiling.grid[: colour[-1]]
-    for k, rows in enumerate(_remembered(simulation, used)):
+    spans = used(s.spans) if copies is None else copies["spans"]
+    for k, rows in enumerate(_remembered(simulation, spans)):
         yield f"contact/{k}", rows
 
 
@@ -44,10 +44,9 @@ def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
     found = dict(changing(simulation)) | {
         "clock": s.control.clock.view(np.ndarray),
         "present": simulation.present,
-        "tile size": np.array([simulation.tiles.size]),
         "shown": np.array([getattr(simulation, name) for name in SHOWN]),
     }
-    nodes = _numbers(found["spans"])
+    nodes = numbers(found["spans"])
     return found | {name: array[nodes] for name, array in _of_nodes(s)}
 
 
@@ -60,8 +59,6 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
         If arrays are missing, or of another kind than those of this scene.
     """
     s = simulation.setup
-    if simulation.tiles.size != int(found["tile size"][0]):
-        simulation.tiles.lay(int(found["tile size"][0]))
     blocks = tuple(
         Block(
             _points(block.points, found, f"points/{k}/"),
@@ -70,32 +67,25 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
         )
         for k, block in enumerate(s.blocks)
     )
-    spans = simulation.tiles.empty_spans()
-    _fill(spans, found, "spans")
-    s = simulation.setup = s._replace(blocks=blocks, spans=spans)
+    spans = s.spans
+    for name, array, _ in simulation.tiles.in_use(s)[:4]:
+        grow(array, len(found.get(name, ())))
+        _fill(array, found, name)
+    s = simulation.setup = s._replace(blocks=blocks)
+    simulation.tiles.make_room(s)
     clock, before = s.control.clock, found["clock"]
     if set(clock.dtype.names) != set(before.dtype.names):
         raise _misfit("clock")
     for name in clock.dtype.names:
         clock[name] = before[name]
-    nodes = _numbers(_used(spans))
+    nodes = numbers(spans)
     for name, array in _of_nodes(s):
         array[nodes] = _checked(found, name, array[nodes])
-    for k, rows in enumerate(_remembered(simulation, _used(spans))):
+    for k, rows in enumerate(_remembered(simulation, used(spans))):
         rows[...] = _checked(found, f"contact/{k}", rows)
     simulation.present[:] = _checked(found, "present", simulation.present)
     for name, known in zip(SHOWN, _checked(found, "shown", np.ones(len(SHOWN), bool)), strict=True):
         setattr(simulation, name, bool(known))
-
-
-def _used(spans: np.ndarray) -> np.ndarray:
-    return spans[: 1 + spans[0, 0]]
-
-
-def _numbers(spans: np.ndarray) -> np.ndarray:
-    """The numbers of the nodes in spans, of which the first row is the count."""
-    ranges = [np.arange(begin, end) for begin, end in spans[1:]]
-    return np.concatenate([np.empty(0, np.int64), *ranges])
 
 
 def _of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
@@ -109,7 +99,7 @@ def _of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:
-    for name in ("colour", "range", "grid"):
+    for name, _ in in_use(tiling):
         _fill(getattr(tiling, name), found, stem + name)
     return tiling
 

@@ -1,4 +1,4 @@
-"""The grids cut into tiles: which points lie in which, and which nodes are in use."""
+"""The grids cut into tiles: which points lie in which, which nodes they give to or are in use."""
 
 from __future__ import annotations
 
@@ -8,120 +8,148 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.lanes import lanes_for
-from karamelo_py.kernels.arrays import Block, Setup, Tiling, arrays_of
-from karamelo_py.kernels.nodes import ClearSums
+from karamelo_py.kernels.arrays import (
+    ADD,
+    CLEAR,
+    TAKE,
+    Block,
+    Buffers,
+    Nodes,
+    Setup,
+    Tiling,
+    arrays_of,
+)
+from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.sorting import order_in_tiles, order_points, widest
-from karamelo_py.kernels.step import step_size
-from karamelo_py.kernels.sweep import sweep_nodes
+from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.scene.lattice import Lattice
 
-TILE_SIZES = {1: 32, 2: 8, 3: 4}
-LEAST_DRIFT = 0.5  # cells; sorting more often would cost more than larger tiles do
-
-
-def drift_limit(size: int, cells: float) -> float:
-    """How many cells a point may be from where it was sorted before the points are sorted again.
-
-    Tiles of one colour are one tile apart. A point that has drifted by `m` cells sees `cells` nodes
-    more than those of one corner of its cell, so ``size + cells + 2 m <= 2 size`` keeps the nodes
-    of two such tiles apart; a step may move a point by one cell more.
-    """
-    return min(2.0, (size - cells) / 2 - 1)
-
-
-def tile_size(dimension: int, cells: float) -> int:
-    """Cells of a tile per direction, for points that see `cells` nodes beyond one."""
-    size = TILE_SIZES[dimension]
-    while drift_limit(size, cells) < LEAST_DRIFT:
-        size *= 2
-    return size
+# By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
+# stay in caches, large ones share less of their nodes with others.
+TILES = {1: 64, 2: 24, 3: 8}
+NODES = {1: 64, 2: 8, 3: 8}
+SHARES = 64  # of the points of a block, nearly equal: threads share them out
+SPAN = 256  # nodes of a span at most: threads share out spans
+DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
+DRIFT = 1.0  # cells that points may go before they are sorted again
 
 
 class Tiles:
-    """Sorts the points of a setup by tile; keeps the scratch that takes.
+    """Sorts the points of a setup by tile; says what nodes the points of a tile may reach.
 
     Attributes
     ----------
     size
-        Cells of a tile per direction. It grows when domains of points reach further.
+        Cells of a tile per direction.
     count
         Number of tiles, of all grids.
-    used
-        (count,) 1 where points are, 2 where they may give to nodes, else 0.
+    occupied
+        How many of them hold points.
+    direct
+        Whether points give straight to the nodes, tile after tile: scenes of few points.
+    sorts
+        How often points were sorted.
     """
 
-    def __init__(self, lattices: Sequence[Lattice], basis: Any):
-        self.lattices = list(lattices)
-        self.dimension = lattices[0].dimension
-        self.cells = type(basis).cells
+    def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int):
+        self.direct = points <= DIRECT_UP_TO
+        self.dimension = d = lattices[0].dimension
+        self.size = TILES[d]
         self.per_cell = type(basis).nodes_per_cell
+        self.least_nodes = type(basis).least_nodes
+        self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
         self.sorts = 0
-        self.lay(tile_size(self.dimension, self.cells))
-
-    def lay(self, size: int) -> None:
-        """Cut the grids into tiles of `size` cells."""
-        self.size = size
-        nodes = size * self.per_cell
-        shapes = [[-(-n // nodes) for n in x.shape[: self.dimension]] for x in self.lattices]
-        self.shapes = np.array([shape + [1] * (3 - len(shape)) for shape in shapes], np.int64)
-        counts = np.prod(self.shapes, axis=1)
-        self.first = np.concatenate([[0], np.cumsum(counts)])
+        self.occupied = 0
+        # By grid and direction: nodes, cells, and so on.
+        self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
+        self._cells = np.array([x.cells[:d] for x in lattices], np.int64)
+        self._first_node = np.array([x.first for x in lattices], np.int64)
+        self._steps = _steps(self._nodes)
+        self.shapes = -(-self._cells // self.size)
+        self.first = _numbered(self.shapes)
         self.count = int(self.first[-1])
-        self.used = np.zeros(self.count, np.uint8)
         self._start = np.zeros(self.count + 1, np.int64)
-
-    def empty_spans(self) -> np.ndarray:
-        """Room for the spans of nodes in use, (1 + rows, 2): none is."""
-        rows = 0
-        last = self.dimension - 1
-        for lattice, shape in zip(self.lattices, self.shapes, strict=True):
-            lines = lattice.node_count // lattice.shape[last]
-            rows += lines * ((int(shape[last]) + 1) // 2)
-        return np.zeros((1 + rows, 2), np.int64)
+        tiles = -(-self._nodes // NODES[d])
+        self._tile_steps = _steps(tiles)
+        self._first_of_nodes = _numbered(tiles)
+        # Of all buffers of a scene: count, first and parts.
+        self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
 
     def empty_tiling(self) -> Tiling:
         """Room for the tiles of a block."""
         return Tiling(
+            count=np.array([0, 1]),
+            share=np.zeros(SHARES + 1, np.int64),
             range=np.zeros((self.count + 1, 2), np.int64),
-            colour=np.zeros(2**self.dimension + 1, np.int64),
             grid=np.zeros(self.count + 1, np.int64),
+            buffer=np.zeros((self.count + 1, 5), np.int64),
             report=np.zeros((self.count + 1, 3)),
         )
 
-    def sort(self, s: Setup, mode: Any) -> None:
-        """Sort all points by tile and find the nodes in use; all sums are zero then."""
-        sweep_nodes(mode, ClearSums(), s.kin, s.nodes, s.spans, step_size(s))
-        self._make_room(s)
-        self.used[:] = 0
-        for block in s.blocks:
-            self._sort_block(s, block)
-        begin = end = 0
-        for lattice, shape, first in zip(self.lattices, self.shapes, self.first, strict=False):
-            end = self._find_nodes(lattice, shape, first, s.spans[1 + begin :]) + begin
-            begin = end
-        s.spans[0, 0] = end
+    def empty_buffers(self, nodes: Nodes) -> Buffers:
+        """Buffers for what points give to `nodes`."""
+        given = tuple(one for one in nodes.fields if getattr(type(one), "summed", False))
+        of = nodes._replace(fields=given)
+        if not self.direct:
+            of = Nodes(
+                *(np.zeros((0, array.shape[1]), array.dtype) for array in of[:-1]),
+                tuple(
+                    type(one)(np.zeros((0, one.array.shape[1]), one.array.dtype)) for one in given
+                ),
+            )
+        return Buffers(of, *self._layout)
+
+    def in_use(self, s: Setup) -> list[tuple[str, np.ndarray, int]]:
+        """The arrays that a sort changes beside the points, and how many rows of them are in use.
+
+        Those that may grow, in place, come first.
+        """
+        _, count, first, parts = s.buffers
+        arrays = [("spans", s.spans, 1 + s.spans[0, 0]), ("layout/count", count, len(count))]
+        arrays.append(("layout/first", first, count[0] + 1))
+        arrays.append(("layout/parts", parts, first[count[0]]))
+        for k, block in enumerate(s.blocks):
+            for name, rows in in_use(block.tiling):
+                arrays.append((f"tiling/{k}/{name}", getattr(block.tiling, name), rows))
+        return arrays
+
+    def empty_nodes(self, s: Setup) -> None:
+        """What points gave to the nodes in use becomes zero."""
+        of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
+        arrays = [array for nodes in of for array in _summed(nodes)]
+        nodes = numbers(s.spans)
+        for array in arrays:
+            array[nodes] = 0
+        if not self.direct:
+            for one in _buffers(s):
+                for array in _summed(one.nodes):
+                    array[:] = 0
+
+    def sort(self, s: Setup) -> None:
+        """Sort all points by tile and find the nodes in use; all sums at nodes are zero then."""
+        self.empty_nodes(s)
         s.control.clock[0].drift = 0.0
+        s.control.clock[0].drift_limit = DRIFT if s.frame.moves else np.inf
+        boxes = [self._sort_block(s, block) for block in s.blocks]
+        self.occupied = len(np.unique(np.concatenate([held for held, *_ in boxes])))
+        self._lay_out(
+            s, *(np.concatenate(part) for part in zip(*[rest for _, *rest in boxes], strict=True))
+        )
         self.sorts += 1
 
-    def _make_room(self, s: Setup) -> None:
-        """Larger tiles where domains of points have come to reach far beyond them."""
-        if not s.frame.moves:
-            s.control.clock[0].drift_limit = np.inf  # nothing drifts: sorted once
-            return
-        cells = self.cells
-        if s.blocks[0].points.x.shape[1] > self.dimension:
-            now = s.control.clock[0].now
-            points = (block.points for block in s.blocks)
-            far = max(widest(s.kin, s.basis, s.grids, p.x[now], p.grid) for p in points)
-            # Corners lie in cells of their own, on both sides.
-            cells = max(cells, 2 * far + 2) if 0 < far < np.inf else cells
-        size = max(self.size, tile_size(self.dimension, cells))
-        if size != self.size:
-            self.lay(size)
-        s.control.clock[0].drift_limit = drift_limit(size, cells)
+    def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
+        """How many cells from where points lie now what gives to nodes may lie."""
+        far = 0.0
+        if len(x) > self.dimension:
+            far = widest(s.kin, s.basis, s.grids, x, block.points.grid)
+        cells = float(self._cells.max())
+        rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
+        drift = DRIFT + rounding if s.frame.moves else 0.0
+        return far + drift if far < cells else cells  # also where it is not a number
 
-    def _sort_block(self, s: Setup, block: Block) -> None:
-        points = block.points
+    def _sort_block(self, s: Setup, block: Block) -> tuple[np.ndarray, ...]:
+        """Sort the points of a block; what `_lay_out` takes of its tiles."""
+        points, tiling = block.points, block.tiling
         x = points.x[s.control.clock[0].now] if points.home is None else points.home
         tile, order = np.empty((2, x.shape[1]), np.int64)
         order_points(
@@ -131,69 +159,188 @@ class Tiles:
         ends = self._start[:-1]
         begins = np.concatenate([[0], ends[:-1]])
         occupied = np.flatnonzero(ends > begins)
-        self.used[occupied] = 1
-        width = lanes_for(8 * x.itemsize).width
-        cells = np.empty((2, x.shape[1]), np.int64)
-        bins = np.empty((2, self.size**self.dimension), np.int64)
-        order_in_tiles(
-            s.kin, s.grids, s.basis, self.size, points, x, begins[occupied], ends[occupied], width,
-            bins, cells, order,
-        )  # fmt: skip
-        grid = np.searchsorted(self.first, occupied, side="right") - 1
-        # Tiles of one colour have places of the same parity in every direction.
-        colour = np.zeros(len(occupied), np.int64)
-        place = occupied - self.first[grid]
-        for axis in range(self.dimension - 1, -1, -1):
-            place, along = np.divmod(place, self.shapes[grid, axis])
-            colour |= along % 2 << axis
-        by_colour = np.argsort(colour, kind="stable")
-        tiling = block.tiling
         count = len(occupied)
-        chosen = occupied[by_colour]
-        tiling.range[:count] = np.stack([begins[chosen], ends[chosen]], axis=1)
-        tiling.grid[:count] = grid[by_colour]
-        tiling.colour[:] = np.searchsorted(np.sort(colour), np.arange(len(tiling.colour)))
-        del tile, cells, bins  # their memory is needed again at once
+        shares = 1 if self.direct else SHARES
+        tiling.count[:] = count, shares
+        # Where the sum of the points is nearest to equal parts.
+        middles = (begins + ends)[occupied] / 2
+        parts = np.arange(1, shares) * x.shape[1] / shares
+        tiling.share[1:shares] = np.searchsorted(middles, parts)
+        tiling.share[shares] = count
+        tiling.range[:count] = np.stack([begins[occupied], ends[occupied]], axis=1)
+        grid = np.searchsorted(self.first, occupied, side="right") - 1
+        tiling.grid[:count] = grid
+        width = lanes_for(8 * x.itemsize).width
+        scratch = np.empty((2, x.shape[1]), np.int64)
+        bins = np.empty((2, self.size**self.dimension), np.int64)
+        boxes = np.empty((2, count, self.dimension))
+        order_in_tiles(
+            s.kin, s.grids, s.basis, self.size, points, x, tiling.range[:count], width, boxes, bins,
+            scratch, order,
+        )  # fmt: skip
+        reach = self._reach(s, block, x)
+        del tile, scratch, bins  # their memory is needed again at once
         for _, array in arrays_of(points):
             # Component by component: a copy of a whole field would be the peak of the set-up.
             for k in np.ndindex(array.shape[:-1]):
                 array[k] = array[k][order]
+        top, least = self._nodes[grid] - 1, self.least_nodes - 1
+        # Cells at a wall see as many nodes as others: those further inside.
+        first, last = (np.floor(b) for b in (boxes[0] - reach, boxes[1] + reach))
+        first = np.clip(first, 0, self._cells[grid] - 1).astype(np.int64)
+        last = np.clip(last, 0, self._cells[grid] - 1).astype(np.int64)
+        lo = first * self.per_cell - self.beyond
+        hi = (last + 1) * self.per_cell + self.beyond
+        return occupied, grid, np.clip(lo, 0, top - least), np.clip(hi, least, top)
 
-    def _find_nodes(
-        self, lattice: Lattice, shape: np.ndarray, first: int, spans: np.ndarray
-    ) -> int:
-        """List the spans of a grid's nodes that points may reach before the next sort.
+    def box_bytes(self, s: Setup) -> int:
+        """Bytes of the boxes of all tiles."""
+        if self.direct:
+            return 0
+        return sum(array.nbytes for one in _buffers(s) for array in _summed(one.nodes))
 
-        A tile of nodes is in use when it or a neighbour holds points. Returns the number of spans.
+    def make_room(self, s: Setup) -> None:
+        """Make the buffers as large as the boxes of all tiles need."""
+        rows = max(int(b.tiling.buffer[: b.tiling.count[0], 1].max(initial=0)) for b in s.blocks)
+        for one in _buffers(s):
+            for array in _summed(one.nodes):
+                grow(array, rows)
+
+    def _lay_out(self, s: Setup, grid: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> None:
+        """Lay the boxes of all blocks one after another; find the tiles of nodes that they reach.
+
+        (B,) grids of the boxes, (B, d) first and last nodes in each direction.
         """
-        count = int(np.prod(shape))
-        mine = self.used[first : first + count]
-        used = mine.reshape(shape) > 0
-        for axis in range(self.dimension):
-            ahead = np.moveaxis(used, axis, 0)
-            wider = ahead.copy()
-            wider[1:] |= ahead[:-1]
-            wider[:-1] |= ahead[1:]
-            used = np.moveaxis(wider, 0, axis)
-        mine[(mine == 0) & used.ravel()] = 2
-        # Rows of nodes run along the last direction; each lies in a line of tiles.
-        last = self.dimension - 1
-        size = self.size * self.per_cell
-        lines = used.reshape(*shape[:last], shape[last])
-        edges = np.diff(np.pad(lines, [(0, 0)] * last + [(1, 1)]).astype(np.int8), axis=last)
-        *line, begin = np.nonzero(edges == 1)
-        end = np.nonzero(edges == -1)[-1]
-        begin, end = begin * size, np.minimum(end * size, lattice.shape[last])
-        row = np.zeros(len(begin), np.int64)
-        for axis, place in enumerate(line):
-            # Each line of tiles holds `size` rows in every direction across it.
-            nodes = (place[:, None] * size + np.arange(size)).ravel()
-            inside = nodes < lattice.shape[axis]
-            row, begin, end = (np.repeat(values, size)[inside] for values in (row, begin, end))
-            row = row * lattice.shape[axis] + nodes[inside]
-            for later in range(axis + 1, len(line)):
-                line[later] = np.repeat(line[later], size)[inside]
-        start = lattice.first + row * lattice.shape[last]
-        spans[: len(row), 0] = start + begin
-        spans[: len(row), 1] = start + end
-        return len(row)
+        steps = self._steps[grid] if self.direct else _steps(hi - lo + 1)
+        ends = np.cumsum(np.prod(hi - lo + 1, axis=1))
+        begins = np.concatenate([[0], ends])[:-1]
+        first = begins - (lo * steps).sum(axis=1)
+        if self.direct:
+            begins = ends = np.zeros_like(ends)
+            first = self._first_node[grid]
+        columns = np.zeros((len(grid), 5), np.int64)
+        columns[:, :3] = np.stack([begins, ends, first], axis=1)
+        columns[:, 3 : 2 + self.dimension] = steps[:, :-1]
+        done = 0
+        for block in s.blocks:
+            count = block.tiling.count[0]
+            block.tiling.buffer[:count] = columns[done : done + count]
+            done += count
+        self.make_room(s)
+        # Pairs of a box and a tile of nodes that it reaches, sorted by tile.
+        size = NODES[self.dimension]
+        low = lo // size
+        across = hi // size - low + 1
+        box, left = _ragged(np.prod(across, axis=1))
+        places = low[box] + left[:, None] // _steps(across)[box] % across[box]
+        tile = self._first_of_nodes[grid[box]] + (places * self._tile_steps[grid[box]]).sum(axis=1)
+        begin = np.maximum(places * size, lo[box])
+        end = np.minimum(places * size + size - 1, hi[box])
+        # The largest part first: mostly it has all the nodes that others reach.
+        order = np.lexsort((box, -np.prod(end - begin + 1, axis=1), tile))
+        tile, box, begin, end = tile[order], box[order], begin[order], end[order]
+        starts = np.flatnonzero(np.diff(tile, prepend=-1))
+        own_begin = np.minimum.reduceat(begin, starts)
+        own_end = np.maximum.reduceat(end, starts)
+        more = ((begin[starts] != own_begin) | (end[starts] != own_end)).any(axis=1)
+        parts = self._parts(grid[box], begin, end, first[box], steps[box])
+        parts[:, 9] = ADD
+        parts[starts[~more], 9] = TAKE
+        own = self._parts(grid[box[starts]], own_begin, own_end, 0, 0)
+        spans = _spans(own)
+        parts = np.insert(parts, starts[more], own[more], axis=0)
+        firsts = np.append(starts + np.cumsum(more) - more, len(parts))
+        grow(s.spans, 1 + len(spans))
+        s.spans[0, 0] = len(spans)
+        s.spans[1 : 1 + len(spans)] = spans
+        if self.direct:
+            parts = np.ones((len(spans), 10), np.int64)
+            parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
+            parts[:, 9] = CLEAR
+            firsts = np.arange(len(spans) + 1)
+        _, count, *rooms = s.buffers
+        count[:] = len(firsts) - 1, self.direct
+        for room, found in zip(rooms, (firsts, parts), strict=True):
+            grow(room, len(found))
+            room[: len(found)] = found
+
+    def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
+        """`Buffers.parts` of nodes (k, d) from `begin` to `end` of the grids.
+
+        In boxes they have the numbers `first` + sum of `steps` (k, d) times places.
+        """
+        d = self.dimension
+        parts = np.ones((len(grid), 10), np.int64)
+        parts[:, 9] = CLEAR
+        parts[:, 0] = self._first_node[grid] + (begin * self._steps[grid]).sum(axis=1)
+        parts[:, 1] = first + (begin * steps).sum(axis=1)
+        parts[:, 5 - d : 5] = end - begin + 1
+        parts[:, 8 - d : 7] = self._steps[grid][:, :-1]
+        parts[:, 10 - d : 9] = np.broadcast_to(steps, begin.shape)[:, :-1]
+        return parts
+
+
+def _spans(boxes: np.ndarray) -> np.ndarray:
+    """(k, 2) the rows of boxes of nodes (see `Buffers`), joined where one ends at another."""
+    row, left = _ragged(boxes[:, 2] * boxes[:, 3])
+    own = boxes[row]
+    begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
+    order = np.argsort(begin, kind="stable")
+    begin, end = begin[order], (begin + own[:, 4])[order]
+    apart = begin[1:] != end[:-1]
+    begin, end = begin[np.append(True, apart)], end[np.append(apart, True)]
+    of, left = _ragged(-(-(end - begin) // SPAN))
+    begin = begin[of] + left * SPAN
+    return np.stack([begin, np.minimum(begin + SPAN, end[of])], axis=1)
+
+
+def in_use(tiling: Tiling) -> list[tuple[str, int]]:
+    """Names of the arrays of a tiling that a sort changes, and how many rows are in use."""
+    tiles = tiling.count[0]
+    whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
+    return [*whole, ("range", tiles), ("grid", tiles), ("buffer", tiles)]
+
+
+def used(spans: np.ndarray) -> np.ndarray:
+    """What of an array of spans is in use, the first row with their number."""
+    return spans[: 1 + spans[0, 0]]
+
+
+def numbers(spans: np.ndarray) -> np.ndarray:
+    """The numbers of the nodes in spans, of which the first row is the count."""
+    spans = used(spans)[1:]
+    of, left = _ragged(spans[:, 1] - spans[:, 0])
+    return spans[of, 0] + left
+
+
+def _ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For each of so many items of each of k lists: its list, and its number in that."""
+    of = np.repeat(np.arange(len(counts)), counts)
+    return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
+
+
+def _buffers(s: Setup) -> list[Buffers]:
+    return [s.buffers] + ([s.heat.buffers] if isinstance(s.heat, Conducting) else [])
+
+
+def _summed(nodes: Nodes) -> list[np.ndarray]:
+    """The arrays that points give to."""
+    own = [one.array for one in nodes.fields if getattr(type(one), "summed", False)]
+    return [nodes.sums, nodes.velocity, *own]
+
+
+def _numbered(shapes: np.ndarray) -> np.ndarray:
+    """(k + 1,) where numbers of what is in boxes of these shapes (k, d) begin, and the end."""
+    return np.concatenate([[0], np.cumsum(np.prod(shapes, axis=1))])
+
+
+def _steps(shapes: np.ndarray) -> np.ndarray:
+    """Steps (k, d) from a number to that of the neighbour in boxes of these shapes (k, d)."""
+    after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
+    return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
+
+
+def grow(array: np.ndarray, rows: int) -> None:
+    """See that an array has so many rows; in place, since setups hold it."""
+    if len(array) < rows:
+        array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

@@ -15,10 +15,11 @@ from numba import prange
 from karamelo_py.app.bench.workloads import MOST_STEPS, Workload
 from karamelo_py.compiler.compile import kernel
 from karamelo_py.kernels.step import DONE, Fused, begin, finish, step
-from karamelo_py.kernels.sweep import sweep_nodes, sweep_points
+from karamelo_py.kernels.sums import columns_of
+from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.report import node_fields, point_fields
+from karamelo_py.run.report import node_fields, nodes_in_use, point_fields
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -116,8 +117,7 @@ def _name(*tags: Any) -> str:
 
 @sweep_points.on(Timed)
 def _(mode, visit, s, block, then, gathers, scatters, dt):
-    colours = np.zeros(2, block.tiling.colour.dtype)  # a colour without tiles
-    nothing = block._replace(tiling=block.tiling._replace(colour=colours))
+    nothing = block._replace(tiling=block.tiling._replace(count=np.zeros(2, np.int64)))
     name = _name(*visit.tasks, *visit.quantities)
     with _noted(mode.of_points, name):
         sweep_points(mode.mode, visit, s, block, then, gathers, scatters, dt)
@@ -132,6 +132,13 @@ def _(mode, task, kin, nodes, spans, dt):
         sweep_nodes(mode.mode, task, kin, nodes, spans, dt)
     with _noted(mode.of_nodes, _name(task)):
         sweep_nodes(mode.mode, task, kin, nodes, nothing, dt)
+
+
+@sum_buffers.on(Timed)
+def _(mode, quantities, s, due):
+    for now in (due, False):
+        with _noted(mode.of_nodes, "sums of " + _name(*quantities)):
+            sum_buffers(mode.mode, quantities, s, now)
 
 
 @contextmanager
@@ -239,6 +246,7 @@ class _Recorder(NamedTuple):
 
     points: list
     nodes: list
+    sums: list
     regions: list  # how often threads begin and wait for each other
 
 
@@ -247,7 +255,7 @@ def _(mode, visit, s, block, then, gathers, scatters, dt):
     reads = {name for tag in (*visit.tasks, *visit.quantities) for name in tag.reads}
     writes = {name for tag in visit.tasks for name in tag.writes}
     mode.points.extend((*reads, *writes))
-    mode.regions.append(block.tiling.colour.size - 1)
+    mode.regions.append(1)
 
 
 @sweep_nodes.on(_Recorder)
@@ -256,25 +264,37 @@ def _(mode, task, kin, nodes, spans, dt):
     mode.regions.append(1)
 
 
+@sum_buffers.on(_Recorder)
+def _(mode, quantities, s, due):
+    if due:
+        there = {type(one) for one in s.nodes.fields}
+        columns = columns_of(quantities, s.kin)
+        mode.sums.extend(b - a for array, a, b in columns if type(array) is str or array in there)
+        mode.regions.append(1)
+
+
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
     """Bytes per particle-step that have to move if nothing stays in a cache; what else follows.
 
     The others are the bytes that the scene holds, and how often in a step threads begin.
 
     Fields of the points count once for each sweep that reads and once for each that writes them;
-    of node fields, those that loops over nodes go through.
+    of node fields, those that loops over nodes go through; of the tiles' buffers, what is given to
+    them and summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
-    recorder = _Recorder([], [], [])
+    recorder = _Recorder([], [], [], [])
     control = s.control
     kept = control.values.copy(), control.clock.copy()
     step(scheme, Fused(), recorder, s, simulation.hooks, True)
     control.values[:], control.clock[:] = kept
     of_point = {name: size for name, _, size in point_fields(s.blocks[0])}
     of_node = {name: array.itemsize * array.shape[1] for name, array in node_fields(s)}
-    active = float(np.sum(s.spans[1 : 1 + s.spans[0, 0], 1] - s.spans[1 : 1 + s.spans[0, 0], 0]))
+    active = nodes_in_use(s)
+    given = sum(float(np.ptp(b.tiling.buffer[: b.tiling.count[0], :2])) for b in s.blocks)
     total = simulation.count * sum(of_point.get(name, 0) for name in recorder.points)
     total += active * sum(of_node.get(name, 0) for name in recorder.nodes)
+    total += (active + 2 * given) * sum(recorder.sums) * s.nodes.sums.itemsize
     held = simulation.count * sum(of_point.values()) + active * sum(of_node.values())
     return total / simulation.count, held, sum(recorder.regions)
 

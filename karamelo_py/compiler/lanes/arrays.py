@@ -369,6 +369,44 @@ def _scatter(typing_context, array, nodes, first, values):
     return types.void(array, at, types.int64, values), codegen
 
 
+def move_record(array, i, other, j, first, like, keep):
+    """Add components of the record of a node of another array, as many as `like` has.
+
+    They are zero there then. If not `keep`, they take the place of what was here.
+    """
+    for k in range(first, first + len(like)):
+        array[i, k] = (array[i, k] if keep else 0) + other[j, k]
+        other[j, k] = 0
+
+
+@intrinsic
+def _move_record(typing_context, array, i, other, j, first, like, keep):
+    def codegen(context, builder, sig, arguments):
+        size = array.dtype.bitwidth // 8
+        to, of = (
+            _record(context, builder, kind, arguments[k], arguments[k + 1], arguments[4])(len(like))
+            for k, kind in ((0, array), (2, other))
+        )
+        there = builder.load(to, align=size)
+        zero = ir.Constant(there.type, None)
+        kept = builder.select(arguments[6], there, zero)
+        builder.store(builder.fadd(kept, builder.load(of, align=size)), to, align=size)
+        builder.store(zero, of, align=size)
+        return context.get_dummy_value()
+
+    signature = types.void(array, types.int64, other, types.int64, types.int64, like, types.boolean)
+    return signature, codegen
+
+
+by_type(move_record)(
+    lambda *arguments: (
+        lambda array, i, other, j, first, like, keep: _move_record(
+            array, i, other, j, first, like, keep
+        )
+    )
+)
+
+
 def _records(builder: Any, parts: list) -> list:
     """Four records from the lanes of their components: four, two, or one."""
     if len(parts) == 4:

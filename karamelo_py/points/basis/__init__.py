@@ -164,7 +164,7 @@ def carrier(basis, kin, grid, stencil, corner, j):
 
 @carrier.otherwise
 def _(basis, kin, grid, stencil, corner, j):
-    return stencil[0], grid.h
+    return grid.first, grid.h
 
 
 @point_function()

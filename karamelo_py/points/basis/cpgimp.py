@@ -263,7 +263,8 @@ def _carrier(kin, grid: Number, stencil: Number, corner: Number, j: Number):
     bits = kin.vector(lambda i: Symbol(f"{{}} & {1 << i}", corner))
     nodes = kin.vector(lambda i: Symbol(f"{{}} & {1 << i}", j))
     sides = kin.vector(lambda i: call(_side, stencil.lines[i], bits[i], nodes[i]))
-    number = node_number(stencil.first, [side[0] for side in sides])
+    first = node_number(grid.first, kin.vector(lambda i: stencil.lines[i].first))
+    number = node_number(first, [side[0] for side in sides])
     return call(index, number), prod(side[1] for side in sides)
 
 

@@ -38,9 +38,8 @@ class Along(NamedTuple):
 
 
 class Stencil(NamedTuple):
-    """The nodes that a point sees."""
+    """The nodes that a point sees, however these are numbered."""
 
-    first: int  # number of the first of them
     lines: tuple[Along, ...]  # along each direction
     inv_r: float  # 1 / r of an axisymmetric point
 
@@ -48,13 +47,17 @@ class Stencil(NamedTuple):
 @shared
 def sees_same_nodes(stencil):
     """Whether the points in all lanes see the same nodes."""
-    return is_one(stencil.first)
+    first, *rest = (is_one(line.first) for line in stencil.lines)
+    for same in rest:
+        first = first & same
+    return first
 
 
 @shared
 def with_one_node(stencil):
     """The stencil of points that see the same nodes: their numbers have no lanes."""
-    return Stencil(first_lane(stencil.first), stencil.lines, stencil.inv_r)
+    lines = tuple(Along(first_lane(line.first), *line[1:]) for line in stencil.lines)
+    return Stencil(lines, stencil.inv_r)
 
 
 @point_function()
@@ -102,7 +105,7 @@ def _radius(basis, grid, line):
 
 
 def node_number(first: Any, numbers: Any) -> Symbol:
-    """The number of the node that is so many along each direction from node `first`."""
+    """The number in `grid` of the node that is so many along each direction from node `first`."""
     grid = Symbol("grid")
     steps = (*(grid.step_x, grid.step_y)[: len(numbers) - 1], 1)
     return sum((n * step for n, step in zip(numbers, steps, strict=True)), first)
@@ -121,9 +124,8 @@ def _written(kin: type, width: int) -> dict[Callable, Callable]:
     d, axisymmetric = kin.dimension, kin is Axisymmetric
     basis, grid, stencil = Symbol("basis"), Symbol("grid"), Symbol("stencil")
     lines = [call(along, basis, Symbol("kin"), grid, Symbol("place"), i) for i in range(d)]
-    first = node_number(grid.first, [line.first for line in lines])
     inv_r = call(inverse_radius, call(_radius, basis, grid, lines[0])) if axisymmetric else 0
-    located = call(Stencil, first, lines, inv_r)
+    located = call(Stencil, lines, inv_r)
 
     lines = [stencil.lines[i] for i in range(d)]
     at = digits("k", width, d)
@@ -138,7 +140,8 @@ def _written(kin: type, width: int) -> dict[Callable, Callable]:
     gradient = with_one("gradients")
     if axisymmetric:
         gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
-    node = call(index, node_number(stencil.first, at))
+    first = node_number(grid.first, [line.first for line in lines])
+    node = call(index, node_number(first, at))
     arms = [call(_arm, basis, grid, *pair) for pair in zip(lines, at, strict=True)]
     seen = "basis, kin, grid, stencil, k"
     return {

@@ -24,6 +24,7 @@ class Series(NamedTuple):
     array: Any
 
     kept = False
+    summed = True
 
     @staticmethod
     def shape(kin: Any) -> int:

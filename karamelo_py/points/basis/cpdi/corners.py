@@ -33,7 +33,7 @@ from karamelo_py.points.kinematics.tags import TAGS
 class Corner(NamedTuple):
     """Where a corner lies on the grid."""
 
-    first: int  # first node of its cell
+    cell: tuple[int, ...]  # its cell, along each direction
     fractions: tuple[float, ...]  # how far into the cell, along each direction
     x: tuple[float, ...]  # its position, on the grid
 
@@ -69,9 +69,7 @@ def along_cell(grid, direction, x):
 def _corner(kin, grid: Number, x: Vector):
     """Where a corner at `x` lies on the grid."""
     cells = kin.vector(lambda i: call(along_cell, grid, i, x[i]))
-    first = node_number(grid.first, [cell[0] for cell in cells])
-    fractions, positions = ([cell[n] for cell in cells] for n in (1, 2))
-    return call(Corner, first, fractions, positions)
+    return call(Corner, *([cell[n] for cell in cells] for n in range(3)))
 
 
 @shared
@@ -89,7 +87,8 @@ def _hat(kin, corner: Number, j: Number):
 @formula()
 def _node(kin, grid: Number, corner: Number, j: Number):
     """The number of the j-th node of a corner's cell."""
-    return call(index, node_number(corner.first, digits("j", 2, kin.dimension)))
+    first = node_number(grid.first, kin.vector(lambda i: corner.cell[i]))
+    return call(index, node_number(first, digits("j", 2, kin.dimension)))
 
 
 @shared

@@ -1,0 +1,112 @@
+"""Boxes of tiles: no point gives to a node outside of them, and few nodes are there in vain.
+
+Few points give straight to the nodes, which cannot go wrong: that is what boxes are held against.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+import pytest
+
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.run.report import nodes_in_use
+from karamelo_py.scene.hub import Hub
+
+# Two bodies that pass each other, at 0.7 of a cell a step and more: sorted at every other one.
+PASSING = """
+method({method})
+scheme({scheme})
+{more}
+dimension(2, 0, 2, 0, 1, 0.1)
+region(left, block, 0.2, 0.5, 0.2, 0.4)
+region(right, block, 1.5, 1.8, 0.5, 0.7)
+material(a, {law})
+material(b, {other})
+solid(left, region, left, 2, a, 0.1, {T})
+solid(right, region, right, 2, b, 0.1, 0)
+group(left, particles, region, left, solid, left)
+group(right, particles, region, right, solid, right)
+fix(v1, initial_velocity_particles, left, 70 + 3*sin(30*y0), 20)
+fix(v2, initial_velocity_particles, right, -85 + 3*x0, -20)
+set_dt(0.001)
+set_output(1000)
+run(6)
+"""
+WARM = {"law": "neo-hookean, 2, 100, 0.3, 2, 3", "T": 10}
+KINDS = {
+    "musl": {},
+    "usl": {"scheme": "usl"},
+    "usf": {"scheme": "usf", "method": "ulmpm, APIC, quadratic-spline"},
+    "usavg": {"scheme": "usavg", "method": "ulmpm, FLIP, cubic-spline, 1"},
+    "XPIC": {"method": "ulmpm, XPIC, quadratic-spline, 3"},
+    "MLS": {"method": "ulmpm, MLS, quadratic-spline", "scheme": "usl"},
+    "Bernstein": {"method": "ulmpm, FLIP, Bernstein-quadratic, 1"},
+    "cpgimp": {"method": "ulmpm, FLIP, cpgimp, 1, stretch"},
+    "corners": {"method": "ulcpdi, FLIP, linear, 1, Q4"},
+    "averaged": {"more": "anti_volumetric_locking(true)"},
+    "warm": {"method": "ulmpm, FLIP, linear, 1, thermo-mechanical", **WARM},
+    "contact": {"method": "ulmpm/contacts, FLIP, linear, 1"},
+    "two laws": {"other": "neo-hookean, 3, 80, 0.2"},
+    "total": {"method": "tlmpm, FLIP, linear, 1"},
+    "single": {"more": "precision(single)"},
+}
+
+
+def passing(method="ulmpm, FLIP, linear, 1", scheme="musl", law="linear, 2, 100, 0.3", **words):
+    words = {"more": "", "T": 0, "other": law} | words
+    return PASSING.format(method=method, scheme=scheme, law=law, **words)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_fast_points_give_to_their_boxes(state_interpreted, kind):
+    """What would be given outside a box would be missing, or at a node of another.
+
+    Sums are grouped by boxes: the same to round-off, which grows by the steps.
+    """
+    script = passing(**KINDS[kind])
+    straight, by_boxes = (state_interpreted(script, boxes=boxes) for boxes in (False, True))
+    share = 1e-3 if kind == "single" else 1e-11  # of 1, the size of the domain
+    assert straight["x"][:, 0].min() > 0.5  # the left one began at 0.2
+    assert np.abs(straight["x"] - by_boxes["x"]).max() < share
+    assert np.abs(straight["v"] - by_boxes["v"]).max() < 100 * share
+    assert by_boxes["nodal mass"] == pytest.approx(straight["nodal mass"], rel=share)
+
+
+DISK = """
+method(ulmpm, FLIP, linear, 1)
+dimension(2, -{side}, {side}, -{side}, {side}, 0.1)
+region(disk, cylinder, 0.011, 0.003, 2.82)
+material(rubber, neo-hookean, 2, 100, 0.3)
+solid(disk, region, disk, 2, rubber, 0.1, 0)
+"""
+
+
+def sorted_scene(side):
+    hub = Hub(Console(quiet=True))
+    hub.interpreter = Interpreter(hub)
+    hub.interpreter.run_text(DISK.format(side=side))
+    simulation = hub.simulation
+    simulation.begin(inf)
+    simulation.sort()
+    return simulation
+
+
+@pytest.mark.xdist_group("disks")
+def test_few_nodes_are_visited_in_vain():
+    """Of a disk of 10 000 points at most 1.5 times the nodes that have mass, in any domain.
+
+    Nodes with mass are the corners of cells with points, for hats.
+    """
+    simulation = sorted_scene(side=4)
+    assert simulation.count == pytest.approx(10_000, rel=0.01)
+    cells = np.floor(simulation.x / 0.1).astype(int)
+    corners = [cells + (i, j) for i in (0, 1) for j in (0, 1)]
+    with_mass = len(np.unique(np.concatenate(corners), axis=0))
+    used = nodes_in_use(simulation.setup)
+    assert with_mass < used < 1.5 * with_mass
+    far = sorted_scene(side=40)
+    assert nodes_in_use(far.setup) < 1.05 * used
+    assert far.tiles.occupied <= 1.5 * simulation.tiles.occupied
