@@ -130,7 +130,7 @@ IN_KERNEL = {
     "Insulated", "NoContact", "NoHooks", "FixedFrame",
     # what is done at points and nodes in the two visits of musl, four points at once or one by one
     "OldWeights", "PresentWeights", "Strain", "Move", "MassMomentum", "MomentumAgain",
-    "InternalForce", "Update", "MomentumToVelocity", "ClearSums", "ClearVelocity", "Fours",
+    "InternalForce", "Update", "MomentumToVelocity", "Fours",
     "PointByPoint",
 }  # fmt: skip
 
