@@ -28,7 +28,7 @@ from karamelo_py.kernels.g2p import (
     empty_all,
     settled_all,
 )
-from karamelo_py.kernels.heat import HeatFlow, TemperatureGradient, content_and_warming
+from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all
 from karamelo_py.kernels.step import Insulated
@@ -124,10 +124,8 @@ def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]
         visits.append(Visit((TrialStrain(),), (Volumes(),), OldWeights()))
         visits.append(Visit((AverageStress(),), (AveragedForce(),), OldWeights()))
     if not isinstance(setup.heat, Insulated):
-        nodes = setup.heat.nodes
-        visits.append(content_and_warming(nodes))
-        flow = (TemperatureGradient(nodes.velocity),), (HeatFlow(nodes.sums),)
-        visits.append(Visit(*flow, OldWeights()))
+        visits.append(Visit((Warming(),), (HeatContent(),), OldWeights()))
+        visits.append(Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights()))
     return list({typeof(visit): visit for visit in visits}.values())
 
 
@@ -163,6 +161,10 @@ def compiled_visit(visit: Visit, setup: Setup) -> Compiled:
     """A visit of a point of the scene's first law."""
     s, block = setup, setup.blocks[0]
     real = s.nodes.sums.dtype.type
-    context = Context(s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, 0)
+    of_heat = any(isinstance(one, HeatContent | HeatFlow) for one in visit.quantities)
+    nodes = s.heat.nodes if of_heat else s.nodes
+    context = Context(
+        s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, nodes, nodes, 0, real(0)
+    )
     report = np.zeros((1, 2), real)
     return compiled(visit_point, visit, context, block, 0, real(1), 0, report)
