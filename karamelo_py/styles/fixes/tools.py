@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -19,18 +20,66 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction
 
 
-class Bodies(NamedTuple):
-    """The points of a group as small cubes (in the plane squares), at one moment."""
+class Bodies:
+    """The points of a group as small cubes (in the plane squares), at one moment.
 
-    x: np.ndarray  # (n, d) positions
-    x0: np.ndarray  # (n, d) positions before the first step
-    v: np.ndarray  # (n, d) velocities
-    mass: np.ndarray  # (n,)
-    side: np.ndarray  # (n,) edge of the cube
-    face: np.ndarray  # (n,) area of one face; per radian around an axis
-    stiffness: np.ndarray  # (n,) shear modulus, less what damage has taken of it
-    dt: float
-    kick: float  # how long forces act in the step
+    What a tool does not ask for is not looked for.
+
+    Attributes
+    ----------
+    x, x0, v : (n, d)
+        Positions now and before the first step, velocities.
+    mass, side, face, stiffness : (n,)
+        Masses, edges of the cubes, areas of one face (per radian around an axis), and shear moduli
+        less what damage has taken of them.
+    dt, kick
+        The step, and how long forces act in it.
+    """
+
+    def __init__(self, hub: Hub, group: ParticleGroup, points: PointsView):
+        self._hub, self._group, self._points = hub, group, points
+        self.dt, self.kick = points.dt, points.kick
+        self._d = hub.domain.dimension
+
+    @cached_property
+    def x(self) -> np.ndarray:
+        return self._points.position.astype(float)
+
+    @property
+    def x0(self) -> np.ndarray:
+        return self._points.reference_position
+
+    @cached_property
+    def v(self) -> np.ndarray:
+        return self._points.velocity.astype(float)
+
+    @cached_property
+    def mass(self) -> np.ndarray:
+        return self._points.mass.astype(float)
+
+    @cached_property
+    def _radius(self) -> np.ndarray:
+        return self.x[:, 0] if self._hub.domain.axisymmetric else np.ones(len(self.x))
+
+    @cached_property
+    def side(self) -> np.ndarray:
+        return (self._column("volume") / self._radius) ** (1 / self._d)
+
+    @property
+    def face(self) -> np.ndarray:
+        return self.side ** (self._d - 1) * self._radius
+
+    @cached_property
+    def stiffness(self) -> np.ndarray:
+        solid = self._column("type").astype(int) - 1
+        return _moduli(self._hub, self._group)[solid] * (1 - self._column("damage"))
+
+    def _column(self, name: str) -> np.ndarray:
+        """A column of the dumps for these points."""
+        fields = self._hub.fields
+        column = np.zeros(fields.count)
+        column[fields.particle("id") - 1] = fields.particle(name)
+        return column[self._points.ids]
 
 
 class PointForceFix(Fix):
@@ -64,43 +113,13 @@ class PointForceFix(Fix):
         """Give the points their forces and publish the sum."""
         if not len(points.ids):
             return
-        force = self.push(self._bodies(points))
+        force = self.push(Bodies(self.hub, self.group, points))
         points.force = points.force + force
         self.publish_components(force.sum(axis=0))
 
     def now(self, formulas: Sequence[Expression]) -> np.ndarray:
         """The present numbers (d,) of formulas of time, one for each direction."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
-
-    def _bodies(self, points: PointsView) -> Bodies:
-        d, axisymmetric = self.hub.domain.dimension, self.hub.domain.axisymmetric
-        x = points.position.astype(float)
-        radius = x[:, 0] if axisymmetric else np.ones(len(x))
-        section = self._column("volume", points.ids) / radius
-        side = section ** (1 / d)
-        stiffness = np.zeros(len(x))
-        if self.needs_stiffness:
-            moduli = _moduli(self.hub, self.group)
-            solid = self._column("type", points.ids).astype(int) - 1
-            stiffness = moduli[solid] * (1 - self._column("damage", points.ids))
-        return Bodies(
-            x=x,
-            x0=points.reference_position,
-            v=points.velocity.astype(float),
-            mass=points.mass.astype(float),
-            side=side,
-            face=side ** (d - 1) * radius,
-            stiffness=stiffness,
-            dt=points.dt,
-            kick=points.kick,
-        )
-
-    def _column(self, name: str, ids: np.ndarray) -> np.ndarray:
-        """A column of the dumps for the points `ids`."""
-        fields = self.hub.fields
-        column = np.zeros(fields.count)
-        column[fields.particle("id") - 1] = fields.particle(name)
-        return column[ids]
 
 
 class SolidPoints(ParticleGroup):
