@@ -154,6 +154,15 @@ def test_conditions(run_interpreted):
     assert list(log.Step) == [0, 5, 8]
 
 
+@pytest.mark.parametrize("run", ["run_while(0*w >= 0)", "run_until(w < -1)"])
+def test_a_condition_that_nobody_can_tell(run_interpreted, run):
+    """The root of a number below 0 from step 3 on: neither true nor false."""
+    script = block(1, "set_dt(0.001)", LOG, "w = sqrt(0.0025 - time)", run)
+    result = run_interpreted(script, status=1)
+    assert "step 3: nobody can tell whether the condition holds" in result.err
+    assert result.log.Step[-1] == 3
+
+
 def test_the_step_follows_a_body_that_gets_faster(run_interpreted):
     """A body force g speeds the body up: dt = 0.9 h / (c + v), with c as it was (no strain).
 

@@ -118,7 +118,8 @@ def run_until(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
     Parameters
     ----------
     condition
-        Formula of time, timestep, dt and published values; anything but 0 ends the run.
+        Formula of time, timestep, dt and published values; anything but 0 ends the run. NaN
+        is an error.
     on_trouble
         As in run.
 
@@ -140,7 +141,7 @@ def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
     Parameters
     ----------
     condition
-        Formula of time, timestep, dt and published values; 0 ends the run.
+        Formula of time, timestep, dt and published values; 0 ends the run. NaN is an error.
     on_trouble
         As in run.
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
-from math import inf, isfinite
+from math import inf, isfinite, isnan
 from pathlib import Path
 from typing import Any
 
@@ -275,8 +275,16 @@ class Runner:
         values = self.hub.values
         if self.condition.names - {"time", "timestep", "dt"}:
             self.hub.refresh_values()
-        holds = bool(self.condition.evaluate(values))
-        return holds != self.until
+        holds = self.condition.evaluate(values)
+        if isnan(holds):
+            lost = sorted(name for name in self.condition.names if isnan(values.get(name)))
+            raise ScriptError(
+                f"step {self.hub.update.step}: nobody can tell whether the condition holds: "
+                + (f"{lost[0]} is NaN" if lost else "a part of it is NaN"),
+                place=self.place,
+                expected="values that are numbers at every step",
+            )
+        return bool(holds) != self.until
 
     def _fraction(self, simulation: Simulation, first_step: int, first_time: float) -> float | None:
         if self.steps:
