@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import karamelo_py
 from karamelo_py.app.cli import main
-from karamelo_py.app.studies import atlas
+from karamelo_py.app.studies import atlas, histories
 
 ROOT = Path(__file__).parent.parent
 SCRIPT = """
@@ -66,7 +67,7 @@ def test_an_atlas_runs_its_commands_once_and_writes_a_page(folder, capsys):
     said = (place / "said.txt").read_text(encoding="utf-8")
     assert "law = 1: err 6 at the end" in said and "law = 2: err 36 at the end" in said
     page = (folder / "page.md").read_text(encoding="utf-8")
-    assert "## Laws" in page and "![A law of time.](_static/atlas/laws/power/power.png)" in page
+    assert "## Laws" in page and "![A law of time](_static/atlas/laws/power/power.png)" in page
     assert "$ karamelo-py chart runs.csv -curve err" in page
     assert "1/2" not in page
     assert str(folder) not in page
@@ -176,6 +177,12 @@ def test_curves_of_a_sweep(folder, capsys):
     (folder / "s/law=2/log.mpm").unlink()
     assert main(["chart", "s.csv", "-curve", "err"]) == 1
     assert "no run has left a log.mpm" in capsys.readouterr().err
+
+
+def test_rows_that_a_run_gave_up_are_no_part_of_its_curve():
+    time = np.array([0.0, 1.0, 2.0, 3.0, 1.0, 1.5])
+    assert list(time[histories.forward(time, stopped=True)]) == [0, 1, 2, 3]
+    assert list(time[histories.forward(time, stopped=False)]) == [0, 1, 1.5]
 
 
 @pytest.mark.full

@@ -215,6 +215,8 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
             return "known"
     place.mkdir(parents=True, exist_ok=True)
     record.unlink(missing_ok=True)
+    for path in [*place.glob("*.png"), *place.glob("*.svg")]:
+        path.unlink()  # of other commands, maybe
     more = {"NUMBA_DISABLE_JIT": "1"} if entry.interpreted else {}
     told = []
     for line in lines:
@@ -268,7 +270,7 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
             group = head
         parts.append(f"### {entry.name}\n\n{entry.text}\n")
         for path in pictures:
-            title = entry.text.splitlines()[0] if entry.text else entry.name
+            title = re.split(r"[.:](?:\s|$)", " ".join(entry.text.split()))[0] or entry.name
             parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})\n")
         said = (place / SAID).read_text(encoding="utf-8").replace(str(inputs), "inputs")
         parts.append(f"```text\n{abridged(said)}\n```\n")

@@ -81,10 +81,23 @@ def histories(
                 )
         label = names[k] if k < len(names) else Line({name: row[name] for name in by}).label
         stopped = row.get("status", "done") != "done"
-        found.append(History(columns[over], columns[curve], label, stopped))
+        kept = forward(columns["Time"], stopped) if "Time" in columns else slice(None)
+        found.append(History(columns[over][kept], columns[curve][kept], label, stopped))
     if not found:
         raise ScriptError(f"no run has left a {log}", expected="the folders of the sweep")
     return found
+
+
+def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
+    """Which rows (n,) of a log belong to one way forward.
+
+    A run that was stopped ends with its last good state, which came before; one that went back and
+    on with smaller steps has rows of what it gave up.
+    """
+    if stopped:
+        return np.arange(len(time)) <= np.argmax(time)
+    after = np.append(np.minimum.accumulate(time[::-1])[::-1][1:], np.inf)
+    return time < after
 
 
 def draw(
