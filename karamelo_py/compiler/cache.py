@@ -215,7 +215,8 @@ class KernelCache(_Cache):
 
 
 # What chooses code by type, and what is in every kernel.
-WHOLE_FILES = [inlining.__file__, held.__file__, *WHOLE, Path(__file__).with_name("compile.py")]
+_BESIDE = [Path(__file__).with_name(name) for name in ("compile.py", "trace.py", "fields.py")]
+WHOLE_FILES = [inlining.__file__, held.__file__, *WHOLE, *_BESIDE]
 
 
 def _setting() -> str:

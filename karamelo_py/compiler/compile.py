@@ -27,7 +27,7 @@ from karamelo_py.compiler.fingerprint import (
     tag_class,
 )
 from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.trace import traced
+from karamelo_py.compiler.trace import at_work, forget, run_for_kernel, traced
 
 
 class _NoCollections(event.Listener):
@@ -214,15 +214,19 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
 
         if tags == 1:
 
-            def dispatch(*arguments: Any) -> Any:
+            def plain(*arguments: Any) -> Any:
                 kind = arguments[0].__class__
                 return (memo.get(kind) or select((kind,)))(*arguments)
         else:
 
-            def dispatch(*arguments: Any) -> Any:
+            def plain(*arguments: Any) -> Any:
                 classes = tuple([a.__class__ for a in arguments[:tags]])
                 return (memo.get(classes) or select(classes))(*arguments)
 
+        def watched(*arguments: Any) -> Any:
+            return run_for_kernel(dispatch, arguments) if at_work() else plain(*arguments)
+
+        dispatch = plain if config.DISABLE_JIT else watched
         dispatch.__name__ = stub.__name__
         dispatch.__qualname__ = stub.__qualname__
         dispatch.__module__ = stub.__module__
@@ -240,6 +244,7 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
 
         def added(implementation: Callable) -> Callable:
             memo.clear()
+            forget()
             serves(implementation, dispatch)
             return implementation
 

@@ -9,22 +9,28 @@ Numba; tuples are Python's own, so that what only takes them apart costs nothing
 same. A function that asks what only a run can know (`if x > 0`) is compiled by Numba as a whole.
 
 Functions run here see their globals through :class:`_Globals`: what other code chooses by type is
-lowered for the types at hand, Python's functions are run in the same way.
+lowered for the types at hand, Python's functions are run in the same way. Only what the key of a
+kernel on disk follows may be run (:mod:`karamelo_py.compiler.fingerprint`): functions that come by
+another way than a global name or a closure, as methods do, are Numba's to compile, or to refuse.
 """
 
 from __future__ import annotations
 
 import builtins
+import dis
 import functools
+import inspect
 import operator
 import types as python
-from collections.abc import Callable, Hashable, Iterator
+from collections import namedtuple
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numba.core.imputils import lower_builtin
+from numba.core.errors import TypingError
+from numba.core.imputils import impl_ret_borrowed, lower_builtin
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import (
     AbstractTemplate,
@@ -37,8 +43,8 @@ from karamelo_py.compiler.fingerprint import note, parts_noted, tag_class
 from karamelo_py.compiler.held import _Held, item_of
 
 
-class Untraceable(Exception):
-    """A function asks for what only a run can know."""
+class Untraceable(BaseException):
+    """A function asks for what only a run can know; no function may catch that."""
 
 
 # --- values -------------------------------------------------------------------------------------
@@ -47,11 +53,11 @@ class Untraceable(Exception):
 class Value:
     """A number, lanes or an array of the function that is compiled."""
 
-    __slots__ = ("kind", "value")
+    __slots__ = ("_kind", "_value")
     __array_ufunc__ = None  # NumPy's numbers leave operations to this
 
     def __init__(self, kind: types.Type, value: Any):
-        self.kind, self.value = kind, value
+        self._kind, self._value = kind, value
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -64,13 +70,21 @@ class Value:
     def _unknown(self, *arguments: Any) -> Any:
         raise Untraceable
 
-    __bool__ = __int__ = __index__ = __float__ = __iter__ = __len__ = _unknown
-    __contains__ = __pow__ = __rpow__ = _unknown
-    __hash__ = object.__hash__
+    __bool__ = __int__ = __index__ = __float__ = __iter__ = __len__ = __contains__ = _unknown
+    __pow__ = __rpow__ = __hash__ = __str__ = __repr__ = __format__ = _unknown
 
 
 _BINARY = ("add", "sub", "mul", "truediv", "floordiv", "mod")
 _BITS = ("and_", "or_", "xor", "lshift", "rshift")
+
+
+def _in_place(operation: Callable) -> Callable:
+    def apply(a: Value, b: Any) -> Any:
+        if isinstance(a._kind, types.Array):  # it would change
+            raise Untraceable
+        return emit(operation, a, b)
+
+    return apply
 
 
 def _operators() -> None:
@@ -79,6 +93,7 @@ def _operators() -> None:
         plain = name.rstrip("_")
         setattr(Value, f"__{plain}__", lambda a, b, do=operation: emit(do, a, b))
         setattr(Value, f"__r{plain}__", lambda a, b, do=operation: emit(do, b, a))
+        setattr(Value, f"__i{plain}__", _in_place(operation))
     for name in ("lt", "le", "gt", "ge", "eq", "ne", "getitem"):
         operation = getattr(operator, name)
         setattr(Value, f"__{name}__", lambda a, b, do=operation: emit(do, a, b))
@@ -91,13 +106,13 @@ def _operators() -> None:
 class HeldValue:
     """A held tuple: its items are read when they are asked for."""
 
-    __slots__ = ("kind", "read", "value")
+    __slots__ = ("_kind", "_read", "_value")
 
     def __init__(self, kind: _Held, value: Any):
-        self.kind, self.value, self.read = kind, value, {}
+        self._kind, self._value, self._read = kind, value, {}
 
     def __len__(self) -> int:
-        return len(self.kind)
+        return len(self._kind)
 
     def __getitem__(self, k: int) -> Any:
         if isinstance(k, Value):
@@ -105,44 +120,72 @@ class HeldValue:
         if isinstance(k, slice):
             return tuple(self[i] for i in range(*k.indices(len(self))))
         k = range(len(self))[k]
-        if k not in self.read:
-            self.read[k] = _now().item(self, k)
-        return self.read[k]
+        if k not in self._read:
+            self._read[k] = _now().item(self, k)
+        return self._read[k]
 
     def __iter__(self) -> Iterator:
         return (self[k] for k in range(len(self)))
 
     def __getattr__(self, name: str) -> Any:
-        fields = getattr(self.kind, "fields", ())
+        fields = getattr(self._kind, "fields", ())
         if name in fields:
             return self[fields.index(name)]
-        return getattr(self.kind.instance_class, name)
+        found = getattr(self._kind.instance_class, name)
+        if callable(found) or isinstance(found, property):
+            raise Untraceable
+        return found
+
+    def _unknown(self, *arguments: Any) -> Any:
+        raise Untraceable
+
+    __eq__ = __ne__ = __hash__ = __contains__ = __add__ = __radd__ = _unknown
 
 
 def _class_of(thing: Any) -> type:
-    return getattr(thing.kind, "instance_class", tuple) if type(thing) is HeldValue else type(thing)
+    if isinstance(thing, Value):
+        raise Untraceable
+    kind = getattr(thing, "_kind", None)
+    return type(thing) if kind is None else getattr(kind, "instance_class", tuple)
 
 
-def _is_instance(thing: Any, kind: type) -> bool:
-    return issubclass(_class_of(thing), kind)
+def _is_instance(thing: Any, kind: Any) -> bool:
+    kinds = tuple(getattr(k, "seen", k) for k in (kind if isinstance(kind, tuple) else (kind,)))
+    if not isinstance(thing, Value):
+        return issubclass(_class_of(thing), kinds)
+    if not all(issubclass(k, tuple) for k in kinds):
+        raise Untraceable
+    return False
 
 
 # --- the function that is compiled ----------------------------------------------------------------
 
+MOST_OPERATIONS = 10_000  # of one formula; beyond, a loop is better left to the compiler
+LONGEST = 1000  # range that is gone through
 
-class _Lowering(NamedTuple):
-    """Where code goes to: to a builder, or nowhere while only types are asked for."""
 
-    typing: Any
-    context: Any = None
-    builder: Any = None
+class _Lowering:
+    """Where code goes to: to a builder, or nowhere while only types are asked for.
+
+    Attributes
+    ----------
+    classes
+        Of the tuples that were met.
+    """
+
+    def __init__(self, typing: Any, context: Any = None, builder: Any = None):
+        self.typing, self.context, self.builder = typing, context, builder
+        self.classes: set[type] = set()
+        self.operations = 0
 
     def wrapped(self, kind: types.Type, value: Any) -> Any:
         """What point functions see of a value."""
         if isinstance(kind, types.Literal):
             return kind.literal_value
-        if isinstance(kind, types.NoneType | types.Omitted):
+        if isinstance(kind, types.NoneType):
             return None
+        if isinstance(kind, types.BaseTuple) and hasattr(kind, "instance_class"):
+            self.classes.add(kind.instance_class)
         if isinstance(kind, _Held):
             return HeldValue(kind, value)
         if isinstance(kind, types.BaseTuple):
@@ -152,6 +195,8 @@ class _Lowering(NamedTuple):
             ]
             made = getattr(kind, "instance_class", None)
             return made(*inner) if made else tuple(inner)
+        if isinstance(kind, types.NamedTupleClass):
+            return kind.instance_class
         if isinstance(kind, types.Function | types.Dispatcher):
             function = kind.typing_key if isinstance(kind, types.Function) else kind.dispatcher
             return _seen(function)
@@ -159,26 +204,31 @@ class _Lowering(NamedTuple):
 
     def kind_of(self, thing: Any) -> types.Type:
         """The Numba type of what point functions see; whole numbers keep their value in it."""
-        if type(thing) in (Value, HeldValue):
-            return thing.kind
+        if isinstance(thing, Value | HeldValue):
+            return thing._kind
         if isinstance(thing, int):
             return types.literal(thing)
         if isinstance(thing, tuple):
             kinds = tuple(types.unliteral(self.kind_of(item)) for item in thing)
             made = type(thing) if hasattr(thing, "_fields") else None
+            if made:
+                self.classes.add(made)
             return types.BaseTuple.from_types(kinds, made)
-        thing = getattr(thing, "seen", thing)
+        if isinstance(thing, _Emitted):
+            thing = thing.seen
+        elif not isinstance(thing, float | np.generic | type | None):
+            raise Untraceable  # nothing that `lowered` knows
         return self.typing.resolve_value_type(thing)
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
         """Code that gives what point functions see, in the type `wanted`."""
         kind = self.kind_of(thing)
-        if type(thing) in (Value, HeldValue):
-            return self.context.cast(self.builder, thing.value, kind, wanted)
+        if isinstance(thing, Value | HeldValue):
+            return self.context.cast(self.builder, thing._value, kind, wanted)
         if isinstance(thing, tuple):
             items = [self.lowered(a, k) for a, k in zip(thing, wanted, strict=True)]
             return self.context.make_tuple(self.builder, wanted, items)
-        number = isinstance(thing, bool | int | float | np.generic)
+        number = isinstance(thing, int | float | np.generic)
         if number and not isinstance(wanted, types.Literal):
             kind = types.unliteral(kind)
             made = self.context.get_constant_generic(self.builder, kind, thing)
@@ -186,10 +236,16 @@ class _Lowering(NamedTuple):
         return self.context.get_dummy_value()
 
     def call(self, function: Callable, arguments: tuple) -> Any:
+        """What `function` gives for these arguments."""
+        self.operations += 1
+        if self.operations > MOST_OPERATIONS:
+            raise Untraceable
         kinds = tuple(map(self.kind_of, arguments))
         if hasattr(function, "py_func"):
             kinds = tuple(map(types.unliteral, kinds))
         typed, called = _resolved(self.typing, function, kinds)
+        if any(isinstance(kind, types.Omitted) for kind in called.args):
+            raise Untraceable
         if self.builder is None:
             return self.wrapped(called.return_type, None)
         if called.pysig is not None:  # with *arguments in a tuple
@@ -199,17 +255,20 @@ class _Lowering(NamedTuple):
         return self.wrapped(called.return_type, made(self.builder, values))
 
     def attribute(self, thing: Value, name: str) -> Any:
-        kind = self.typing.resolve_getattr(thing.kind, name)
+        """An attribute of an array or a record."""
+        kind = self.typing.resolve_getattr(thing._kind, name)
         if kind is None:
             raise Untraceable
         if self.builder is None:
             return self.wrapped(kind, None)
-        read = self.context.get_getattr(thing.kind, name)
-        return self.wrapped(kind, read(self.context, self.builder, thing.kind, thing.value, name))
+        read = self.context.get_getattr(thing._kind, name)
+        value = read(self.context, self.builder, thing._kind, thing._value, name)
+        return self.wrapped(kind, value)
 
     def item(self, held: HeldValue, k: int) -> Any:
-        value = self.builder and item_of(self.context, self.builder, held.kind, held.value, k)
-        return self.wrapped(held.kind[k], value)
+        """An item of a held tuple."""
+        value = self.builder and item_of(self.context, self.builder, held._kind, held._value, k)
+        return self.wrapped(held._kind[k], value)
 
 
 def _as_is(index: int, parameter: Any, argument: Any) -> Any:
@@ -232,6 +291,16 @@ def _at_work(lowering: _Lowering) -> Iterator[None]:
         _lowerings.pop()
 
 
+def at_work() -> bool:
+    """Whether functions are run for a kernel now."""
+    return bool(_lowerings)
+
+
+def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
+    """What a point function gives where one that nothing sees through calls it, as methods do."""
+    return _seen(dispatch)(*arguments)
+
+
 def emit(function: Callable, *arguments: Any) -> Any:
     """What `function` gives for these arguments: code of Numba's, or of what was chosen by type."""
     return _now().call(function, arguments)
@@ -242,7 +311,7 @@ _resolutions: dict[tuple, tuple] = {}
 
 def _resolved(typing: Any, function: Callable, kinds: tuple) -> tuple:
     """Numba's type of a function, and its signature for arguments of these types."""
-    key = id(typing), function, kinds
+    key = typing, function, kinds
     if key not in _resolutions:
         typed = typing.resolve_value_type(function)
         called = typing.resolve_function_type(typed, kinds, {})
@@ -258,12 +327,6 @@ _operators()
 # --- functions as they are run here -----------------------------------------------------------
 
 
-def _has_values(thing: Any) -> bool:
-    if type(thing) in (Value, HeldValue):
-        return True
-    return isinstance(thing, tuple) and any(map(_has_values, thing))
-
-
 class _Globals(dict):
     """The globals of a module, as functions that are run here see them."""
 
@@ -272,10 +335,9 @@ class _Globals(dict):
         self.true = true
 
     def __getitem__(self, name: str) -> Any:
-        try:
+        if name in self.true:
             return _seen(self.true[name])
-        except KeyError:
-            return _seen(getattr(builtins, name))
+        return _seen(getattr(builtins, name))
 
 
 _modules: dict[int, _Globals] = {}
@@ -287,10 +349,10 @@ class _Module:
     """A module, whose functions are seen like globals."""
 
     def __init__(self, module: python.ModuleType):
-        self.module = module
+        self._module = module
 
     def __getattr__(self, name: str) -> Any:
-        return _seen(getattr(self.module, name))
+        return _seen(getattr(self._module, name))
 
 
 class _Emitted:
@@ -300,78 +362,137 @@ class _Emitted:
         self.seen = function
 
     def __call__(self, *arguments: Any) -> Any:
-        return emit(self.seen, *arguments) if _has_values(arguments) else self.seen(*arguments)
+        return self.seen(*arguments) if self.counts(arguments) else emit(self.seen, *arguments)
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.seen, name)
+    def counts(self, arguments: tuple) -> bool:
+        """Whether it is about whole numbers that are known, as lengths of loops are."""
+        return self.seen in _OF_WHOLE and all(isinstance(a, int) for a in arguments)
 
 
 class _Dispatched(_Emitted):
     """A point function: what the classes of its tags choose."""
 
     def __call__(self, *arguments: Any) -> Any:
-        if not _has_values(arguments):
+        if self.counts(arguments):
             return self.seen(*arguments)
         found = _formula(self.seen, _now().typing, tuple(map(_now().kind_of, arguments)))
         return found.run(*arguments) if found else emit(self.seen, *arguments)
 
+    def defined(self, *classes: type) -> bool:
+        """Whether a point function has an implementation for these classes."""
+        return self.seen.defined(*classes)
 
-_OF_NUMBERS = {min, max, abs, int, float, bool}
+
+def _range(*bounds: int) -> range:
+    made = range(*bounds)
+    if len(made) > LONGEST:
+        raise Untraceable
+    return made
+
+
+def _attribute(thing: Any, *name: Any) -> Any:
+    if isinstance(thing, _Module):
+        raise Untraceable
+    return getattr(thing, *name)
+
+
+_OF_WHOLE = {min, max, abs, int, bool}
+_OF_NUMBERS = {*_OF_WHOLE, float}
+_INSTEAD = {type: _class_of, isinstance: _is_instance, range: _range, getattr: _attribute}
+_SAFE = {len, zip, enumerate, tuple, list, dict, set, sum, reversed, any, all, map, slice, hasattr}
+_CONSTANT = (type(None), bool, int, float, str, np.number, np.bool_)
 
 
 def _seen(thing: Any) -> Any:
     """What takes the place of a global in functions that are run here."""
-    if thing is type:
-        return _class_of
-    if thing is isinstance:
-        return _is_instance
+    if isinstance(thing, (*_CONSTANT, _Emitted, _Module)):
+        return thing
     if isinstance(thing, python.ModuleType):
         return _Module(thing)
-    if not isinstance(thing, Hashable) or not callable(thing) or isinstance(thing, _Emitted):
-        return thing
-    of_numbers = thing in _OF_NUMBERS or isinstance(thing, types.Number)
-    if isinstance(thing, type):
-        of_numbers |= issubclass(thing, np.generic)
-    native = isinstance(thing, type) or getattr(thing, "__module__", "") == "builtins"
-    if native and not of_numbers:
-        return thing
+    if isinstance(thing, tuple):
+        inner = [_seen(item) for item in thing]
+        return type(thing)(*inner) if hasattr(thing, "_fields") else tuple(inner)
+    if isinstance(thing, list):
+        return list(map(_seen, thing))
+    if not isinstance(thing, Hashable):
+        raise Untraceable
     if thing not in _copies:
-        if thing in _choosers:
-            _copies[thing] = _Dispatched(thing)
-        elif (
-            of_numbers
-            or hasattr(thing, "py_func")
-            or cpu_target.typing_context._lookup_global(thing)
-        ):
-            _copies[thing] = _Emitted(thing)
-        elif isinstance(thing, python.FunctionType):
-            _copies[thing] = _copied(thing)
-        else:
-            return thing
-    return _noted(_copies[thing])
-
-
-def _known_to_numba(thing: Any) -> bool:
-    return hasattr(thing, "py_func") or cpu_target.typing_context._lookup_global(thing) is not None
-
-
-def _noted(made: Any) -> Any:
-    if isinstance(made, python.FunctionType):
+        _copies[thing] = _copy(thing)
+    made = _copies[thing]
+    if isinstance(made, python.FunctionType) and type(made.__globals__) is _Globals:
         note([made.__code__])
+    if isinstance(made, type):
+        _now().classes.add(made)
     return made
 
 
-@functools.cache
+def _copy(thing: Any) -> Any:
+    """The same for what is called."""
+    if thing in _INSTEAD:
+        return _INSTEAD[thing]
+    if thing in _SAFE:
+        return thing
+    if thing in _choosers:
+        return _Dispatched(thing)
+    number = isinstance(thing, type) and issubclass(thing, np.generic)
+    if number or thing in _OF_NUMBERS or isinstance(thing, types.Number):
+        return _Emitted(thing)
+    if isinstance(thing, type) and issubclass(thing, tuple):
+        return thing
+    if hasattr(thing, "py_func") or cpu_target.typing_context._lookup_global(thing):
+        return _Emitted(thing)
+    if isinstance(thing, python.FunctionType):
+        return _copied(thing)
+    raise Untraceable
+
+
 def _copied(function: Callable) -> Callable:
-    """The same function with other globals."""
+    """The same function with other globals.
+
+    Not one that catches what is raised here, or imports what nothing follows.
+    """
+    code = function.__code__
+    catches = code.co_exceptiontable and not code.co_flags & inspect.CO_GENERATOR
+    if catches or any(i.opname == "IMPORT_NAME" for i in dis.get_instructions(code)):
+        raise Untraceable
     true = function.__globals__
     seen = _modules.setdefault(id(true), _Globals(true))
     cells = tuple(python.CellType(_seen(c.cell_contents)) for c in function.__closure__ or ())
-    made = python.FunctionType(
-        function.__code__, seen, function.__name__, function.__defaults__, cells
-    )
-    made.__kwdefaults__ = function.__kwdefaults__
+    defaults = function.__defaults__ and tuple(map(_seen, function.__defaults__))
+    made = python.FunctionType(code, seen, function.__name__, defaults, cells)
+    made.__kwdefaults__ = {k: _seen(v) for k, v in (function.__kwdefaults__ or {}).items()}
     return made
+
+
+_GENERATED = {*vars(namedtuple("_", ())), "__orig_bases__", "__annotations__", "__annotate_func__"}
+
+
+@functools.cache
+def _functions_of(one: type) -> frozenset[str]:
+    """The names of what a class of tuples does with its numbers by functions of its own."""
+    if not getattr(one, "_fields", ()):
+        return frozenset()
+    own = {name: value for base in one.__mro__[:-2] for name, value in vars(base).items()}
+    return frozenset(
+        name
+        for name, value in own.items()
+        if name not in _GENERATED
+        and isinstance(value, python.FunctionType | property | classmethod | staticmethod)
+    )
+
+
+def _names_in(code: python.CodeType) -> set[str]:
+    inner = (c for c in code.co_consts if isinstance(c, python.CodeType))
+    return set(code.co_names).union(*map(_names_in, inner))
+
+
+def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> None:
+    """Methods of tuples would run as they are, and nothing would follow them."""
+    functions = frozenset().union(*map(_functions_of, classes))
+    if any(name.startswith("__") for name in functions):
+        raise Untraceable
+    if functions and not functions.isdisjoint(set().union(*map(_names_in, codes))):
+        raise Untraceable
 
 
 # --- what kernels call ----------------------------------------------------------------------------
@@ -385,29 +506,38 @@ class _Formula(NamedTuple):
     parts: frozenset
 
 
-_formulas: dict[tuple, _Formula | None] = {}
+_formulas: dict[Callable, dict[tuple, _Formula | None]] = {}
 
 
 def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
     """What to run for arguments of these types; None if it is Numba's to compile."""
-    key = id(typing), dispatch, kinds
-    if key not in _formulas:
-        _formulas[key] = None  # of one that calls itself
+    known = _formulas.setdefault(dispatch, {})
+    key = typing, kinds
+    if key not in known:
+        known[key] = None  # of one that calls itself
         lowering = _Lowering(typing)
         try:
             with _at_work(lowering), parts_noted() as parts:
-                run = _noted(_copied(_chosen(dispatch, kinds)))
+                run = _copied(_chosen(dispatch, kinds))
+                note([run.__code__])
                 result = run(*(lowering.wrapped(kind, None) for kind in kinds))
                 result = types.unliteral(lowering.kind_of(result))
+            codes = {part for part in parts if isinstance(part, python.CodeType)}
+            _refuse_methods(codes, lowering.classes)
             if hasattr(dispatch, "tags"):
                 parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
-            _formulas[key] = _Formula(run, result, frozenset(parts))
-        except Exception:  # Numba tells what is wrong, if it is
+            known[key] = _Formula(run, result, frozenset(parts))
+        except (Exception, Untraceable):  # Numba tells what is wrong, if it is
             pass
-    found = _formulas[key]
+    found = known[key]
     if found is not None:
         note(found.parts)
     return found
+
+
+def forget() -> None:
+    """A point function has another implementation than was known."""
+    _formulas.clear()
 
 
 def _chosen(dispatch: Callable, kinds: tuple) -> Callable:
@@ -443,4 +573,8 @@ def traced(dispatch: Callable, chooser: Callable) -> None:
         found = _formula(dispatch, context.typing_context, called.args)
         with _at_work(lowering):
             arguments = [lowering.wrapped(k, v) for k, v in zip(called.args, values, strict=True)]
-            return lowering.lowered(found.run(*arguments), called.return_type)
+            result = found.run(*arguments)
+            if types.unliteral(lowering.kind_of(result)) != called.return_type:
+                raise TypingError(f"{dispatch.__qualname__} has changed while it was compiled")
+            value = lowering.lowered(result, called.return_type)
+            return impl_ret_borrowed(context, builder, called.return_type, value)
