@@ -239,13 +239,17 @@ def test_powers_at_the_ends(real_type):
     """Nothing, one, too much and too little, and the smallest numbers."""
     width, tag = WIDTHS[real_type]
     last = np.log2(np.finfo(real_type).smallest_subnormal) + 4
-    x = np.array([0.0, 0.0, 1.0, 2.0, 2.0, 2.0, -1.0, np.nan], real_type)
-    y = np.array([0.4, 0.0, 1e3, 2e3, -2e3, last, 0.5, 0.5], real_type)
-    out = np.zeros((3, 8), real_type)
-    _powers_in_lanes(tag, width, x, y, out, 8)
+    x = np.array([0.0, 0.0, 1.0, 2.0, 2.0, 2.0, -1.0, np.nan, 0.0, 0.0], real_type)
+    y = np.array([0.4, 0.0, 1e3, 2e3, -2e3, last, 0.5, 0.5, -0.5, -2.0], real_type)
+    out, alone = np.zeros((2, 3, 10), real_type)
+    _powers_in_lanes(tag, width, x, y, out, 10)
+    _powers_alone(x, y, alone, 10)
+    np.testing.assert_array_equal(out, alone)
     np.testing.assert_array_equal(out[0, :5], [0, 1, 1, np.inf, 0])
+    np.testing.assert_array_equal(out[0, 8:], [np.inf, np.inf])
+    assert power(0.0, -0.5) == power(0.0, -2.0) == np.inf  # interpreted
     assert out[0, 5] == pytest.approx(2.0**last, rel=1 / 16)
-    assert np.isnan(out[0, 6:]).all()
+    assert np.isnan(out[0, 6:8]).all()
     np.testing.assert_array_equal(out[1, :3], [-np.inf, -np.inf, 0])
 
 

@@ -629,3 +629,25 @@ def test_signals_of_batch_systems(tmp_path, name):
     last = h5py.File(folder / "r.h5").attrs["step"]
     assert (folder / "log.mpm").read_text().splitlines()[-1].split()[0] == str(last)
     assert (folder / f"d.{last}.gz").exists()
+
+
+def test_what_a_halved_step_takes_back_is_written_once(run_interpreted):
+    """Rows of log and dumps that were written behind the last good state are written again."""
+    lines = ["fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y0))",
+             "dt_factor(1.9)", "set_output(5)", "log_modify(custom, step, dt, time)",
+             "compute(E, energy_balance, all)", "dump(d, all, particle, 5, d.txt, x, vx)",
+             "plot(E, 5, timestep, E)", "run(60, on_trouble=halve)"]  # fmt: skip
+    result = run_interpreted(block(2, *lines, size=(0.3, 0.3)))
+    assert "Back to step" in result.out + result.err
+    assert result.log.Step.tolist() == list(range(0, 61, 5))
+    text = (result.folder / "d.txt").read_text(encoding="utf-8").splitlines()
+    steps = [int(text[k + 1]) for k, line in enumerate(text) if line == "ITEM: TIMESTEP"]
+    assert steps == list(range(0, 61, 5))
+
+
+def test_what_was_foreseen_is_not_told_again(run_interpreted):
+    lines = ["restart(3, r.*.h5)", "run(6)"]
+    script = block(2, *lines, size=(0.2, 0.2), transfer="TPIC")
+    script = script.replace("quadratic-spline", "linear")
+    assert "affine noise" in run_interpreted(script).err
+    assert "affine noise" not in run_interpreted(script, "-restart", "r.3.h5").err

@@ -31,8 +31,8 @@ def exponential(x: float) -> float:
 
 
 def power(x: float, y: float) -> float:
-    """x to the power of y, for x not below 0."""
-    return x**y
+    """x to the power of y, for x not below 0; infinite for 0 to a negative one."""
+    return x**y if x != 0 or y >= 0 else inf
 
 
 def _bits(kind: Any) -> tuple[Any, Any, int, int]:
@@ -154,8 +154,11 @@ def _choose_exponential(x):
 shared(_exponential)
 
 
+@shared
+def _of_zero(x, y):
+    return choose(y == 0, real(1, x), choose(y < 0, real(inf, x), real(0, x)))
+
+
 @by_type(power)
 def _choose_power(x, y):
-    return lambda x, y: choose(
-        x == 0, choose(y == 0, real(1, x), real(0, x)), exponential(y * logarithm(x))
-    )
+    return lambda x, y: choose(x == 0, _of_zero(x, y), exponential(y * logarithm(x)))

@@ -98,6 +98,11 @@ class Log(Rhythmic):
         self._put(cells)
         self.hub.console.log_line(_row(cells, self._widths))
 
+    def resumed(self) -> None:
+        """Rows behind those that are remembered go, where the file is open."""
+        if self._file is not None:
+            self._file.truncate(self._end)
+
     def close(self) -> None:
         """Close the file; a later `begin` would start a new one."""
         if self._file is not None:

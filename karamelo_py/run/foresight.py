@@ -364,7 +364,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float) -> None:
     for rule in RULES:
         for failure in rule(scene):
             if failure.name not in hub.update.foreseen:
-                hub.update.foreseen.add(failure.name)
+                hub.update.foreseen.append(failure.name)
                 hub.warn(
                     f"{failure.name}: {failure.reason}",
                     place=failure.place or hub.update.method.place,

@@ -210,6 +210,29 @@ class Restart:
                     part.resumed()
 
 
+Memories = tuple[list, list[np.ndarray]]
+
+
+def memories(hub: Hub) -> Memories:
+    """What all parts of a scene but its run remember now, for `give_back`."""
+    arrays: list[np.ndarray] = []
+    parts = [
+        [list(key), memory_of(part, arrays)] for key, part in _parts(hub) if part is not hub.running
+    ]
+    return parts, [array.copy() for array in arrays]
+
+
+def give_back(hub: Hub, kept: Memories) -> None:
+    """Let all parts remember what they did then; outputs go on from there in their files."""
+    parts, arrays = kept
+    there = {tuple(key): memory for key, memory in parts}
+    for key, part in _parts(hub):
+        if key in there:
+            remember(part, there[key], arrays)
+            if hasattr(part, "resumed"):
+                part.resumed()
+
+
 OUTPUTS = ("dump", "log", "curve", "restart")
 
 

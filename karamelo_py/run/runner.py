@@ -17,7 +17,7 @@ import numpy as np
 from karamelo_py.compiler import cache
 from karamelo_py.kernels.step import DONE, STOPPED
 from karamelo_py.output.console import duration
-from karamelo_py.run import diagnosis, foresight
+from karamelo_py.run import diagnosis, foresight, restart
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
@@ -73,6 +73,7 @@ class Runner:
         self.until = until
         self.halve = halve
         self.halvings = 0
+        self.memories: restart.Memories = ([], [])
         self.snapshot: dict[str, np.ndarray] = {}  # of the last good state
         self.kept = -1  # its step
         self.place = hub.place
@@ -118,17 +119,19 @@ class Runner:
         self.hub.runs.append(after)
 
     @property
-    def good(self) -> tuple[int, dict[str, np.ndarray]] | None:
+    def good(self) -> tuple[int, dict[str, np.ndarray], restart.Memories] | None:
         """The last good state, for files: a run that goes on from one may go back to it."""
-        return (self.kept, self.snapshot) if self.halve else None
+        return (self.kept, self.snapshot, self.memories) if self.halve else None
 
     @good.setter
-    def good(self, state: tuple[int, dict[str, np.ndarray]] | None) -> None:
+    def good(self, state: tuple[int, dict[str, np.ndarray], restart.Memories] | None) -> None:
         if state is not None and state[1]:
-            self.kept, self.snapshot = state
+            self.kept, self.snapshot, self.memories = state
 
     def _keep(self, simulation: Simulation) -> None:
         self.snapshot, self.kept = simulation.snapshot(self.snapshot), simulation.step
+        if self.halve:
+            self.memories = restart.memories(self.hub)
 
     @property
     def duration(self) -> float:
@@ -263,6 +266,8 @@ class Runner:
         message, _ = diagnosis.trouble(self.hub, simulation, status)
         self.halvings += 1
         simulation.restore(self.snapshot)
+        # Rows of log and dumps that have been written since go with what they show.
+        restart.give_back(self.hub, self.memories)
         simulation.halve_step(self.halvings)
         self.hub.warn(
             f"{message}. Back to step {simulation.step}, time {simulation.time:.6g}, with "

@@ -41,7 +41,7 @@ class Update:
         Names of the failures that the user was warned of.
     """
 
-    remembers = ("warned_of_bounces",)
+    remembers = ("warned_of_bounces", "foreseen")
 
     def __init__(self, values: Values):
         self.values = values
@@ -56,7 +56,7 @@ class Update:
         self.boundary = "error"
         self.boundary_place: Place | None = None
         self.warned_of_bounces = False
-        self.foreseen: set[str] = set()
+        self.foreseen: list[str] = []
 
     @property
     def words(self) -> str:
