@@ -8,7 +8,7 @@ import inspect
 import numba
 import pytest
 from llvmlite.binding import ffi
-from numba import config, njit
+from numba import config, njit, types
 from numba.core import base, caching, ccallback, codegen, compiler, dispatcher, targetconfig
 from numba.core.typing import context, templates
 
@@ -103,6 +103,18 @@ INSIDE = {
     ffi._LLVMLock: "674e02dc78ae",
     context.BaseContext._lookup_global: "08d354cbcacf",
     templates.make_overload_template: "7f6974584cb1",
+    templates.fold_arguments: "a3806ed4b7d1",
+    templates.AbstractTemplate.apply: "8c5f7129b8f3",
+    types.Function.get_call_type: "6559c167bfc0",
+    types.Function.augment: "f0996c594fa7",
+    context.BaseContext.resolve_value_type: "671d7dab7911",
+    context.BaseContext.resolve_getattr: "7efe38e96973",
+    context.BaseContext.resolve_function_type: "81a6c18964e1",
+    base.BaseContext.get_function: "a3602598ea18",
+    base.BaseContext.get_getattr: "81b76d8b2031",
+    base.BaseContext.cast: "b52f6d1e0b0c",
+    base.BaseContext.get_constant_generic: "9863beae38ad",
+    base._wrap_impl: "b9f8452e01aa",
 }
 
 

@@ -1,13 +1,15 @@
 """Point functions that kernels run once and write down, and those that Numba compiles."""
 
 import math
+import sys
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numba import config
+from numba import config, njit
 from numba.core import event
 from numba.core.caching import NullCache
+from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
 from karamelo_py.compiler import fingerprint
 from karamelo_py.compiler.compile import (
@@ -217,3 +219,182 @@ def test_a_mistake_is_told_by_numba():
 
     with pytest.raises(Exception, match="nth"):
         kernel(caller)(1.0)
+
+
+@shared
+def caught(x):
+    """What asks for what only a run can know, and catches what comes of it."""
+    try:
+        return 1.0 if x > 0 else 2.0
+    except Exception:
+        return -1.0
+
+
+@shared
+def kinds_of(x, y):
+    """What Python knows of numbers, and kernels do not."""
+    return 1.0 if isinstance(x, float) or type(x) is type(y) else 2.0
+
+
+@shared
+def looked_up(n):
+    """A number among others."""
+    return 1.0 if n in {1, 2} else 2.0
+
+
+class Weight(NamedTuple):
+    """A tag with a method, and an operator, of its own."""
+
+    factor: float
+
+    def times(self, x):
+        return self.factor * x
+
+
+class Sum(NamedTuple):
+    number: float
+
+    def __add__(self, other):
+        return Sum(self.number + other.number)
+
+
+@shared
+def weighed(weight, x):
+    """By a method, which nothing follows."""
+    return weight.times(x)
+
+
+@shared
+def together(a, b):
+    """By an operator of their own."""
+    return a + b
+
+
+@shared
+def imported(x):
+    """What no key of a kernel knows."""
+    from math import tau
+
+    return tau * x
+
+
+@pytest.mark.parametrize("function", [caught, looked_up])
+def test_what_only_a_run_knows_is_left_to_it(function):
+    def caller(x):
+        return function(x)
+
+    try:
+        made = [kernel(caller)(x) for x in (1, 2, 3, -1)]
+    except NumbaError:  # it knows no sets where nothing is allocated
+        return
+    assert made == [function(x) for x in (1, 2, 3, -1)]
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments"),
+    [(weighed, (Weight(2.0), 1.0)), (together, (Sum(1.0), Sum(2.0))), (imported, (1.0,))],
+    ids=["method", "operator", "import"],
+)
+def test_what_nothing_follows_is_not_run(function, arguments):
+    """Numba refuses methods and imports, and adds tuples as tuples: nothing else is kept."""
+
+    def caller(*arguments):
+        return function(*arguments)
+
+    try:
+        result = kernel(caller)(*arguments)
+    except (NumbaError, UnsupportedBytecodeError):
+        return
+    assert result == (1.0, 2.0)
+
+
+def test_kinds_of_numbers_are_not_guessed():
+    def caller(x, y):
+        return kinds_of(x, y)
+
+    assert kernel(caller)(1.0, 2) == kinds_of(1.0, 2)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_constants_are_what_the_compiler_makes_of_them(dtype):
+    """With a branch beside it Numba compiles the formula, without one it is run: the same bits."""
+
+    @shared
+    def run(x):
+        return real(0.1, x) * 3 * x + x / math.sqrt(real(3, x)) + fma(0.1, 10.0, -1.0)
+
+    @shared
+    def compiled(x):
+        if x < 0:
+            return real(0.1, x) * 3 * x + x / math.sqrt(real(3, x)) + fma(0.1, 10.0, -1.0)
+        return real(0.1, x) * 3 * x + x / math.sqrt(real(3, x)) + fma(0.1, 10.0, -1.0)
+
+    def caller(x):
+        return run(x), compiled(x)
+
+    one, other = kernel(caller)(dtype(1.7))
+    assert one == other
+    assert type(one) is type(other)
+
+
+def test_another_implementation_is_seen():
+    @point_function()
+    def late(tag, x):
+        """What comes later."""
+
+    @late.otherwise
+    def _(tag, x):
+        return x
+
+    late.__module__ = late.__qualname__ = "late"
+    before = lambda tag, x: late(tag, x)  # noqa: E731
+    assert kernel(before)(Square(1.0), 2.0) == 2
+    late.on(Square)(lambda tag, x: 3 * x)
+    after = lambda tag, x: late(tag, x) + 0  # noqa: E731
+    assert kernel(after)(Square(1.0), 2.0) == 6
+
+
+def test_arrays_are_handed_on_where_references_are_counted():
+    """Each call would take one reference too many from its array."""
+
+    @njit
+    def first_of(a, b):
+        return nth((a, b), 0)
+
+    for _ in range(300):
+        array = np.arange(4.0)
+        assert first_of(array, np.zeros(4))[3] == 3
+        assert sys.getrefcount(array) < 5
+
+
+def test_choices_of_tags_without_numbers_are_followed(tmp_path, monkeypatch):
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+
+    def caller(x):
+        return sized(Empty(), x)
+
+    made = kernel(caller)
+    assert made(2.0) == 6
+    (compiled,) = made.overloads.values()
+    choices, _ = fingerprint.contents(compiled.library)
+    assert fingerprint.Choice(f"{__name__}:size_of", (f"{__name__}:Empty",)) in choices
+
+
+class Empty(NamedTuple):
+    """A tag without numbers."""
+
+
+@point_function()
+def size_of(tag):
+    """How many."""
+
+
+@size_of.on(Empty)
+def _(tag):
+    return 3
+
+
+@shared
+def sized(tag, x):
+    """As many x."""
+    return sum([x] * size_of(tag))

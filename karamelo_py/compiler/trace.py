@@ -309,9 +309,14 @@ def emit(function: Callable, *arguments: Any) -> Any:
 _resolutions: dict[tuple, tuple] = {}
 
 
+def _numbers_of(kinds: tuple) -> tuple[int, ...]:
+    """Numba's numbers of types, which are faster to compare."""
+    return tuple([kind._code for kind in kinds])
+
+
 def _resolved(typing: Any, function: Callable, kinds: tuple) -> tuple:
     """Numba's type of a function, and its signature for arguments of these types."""
-    key = typing, function, kinds
+    key = typing, function, _numbers_of(kinds)
     if key not in _resolutions:
         typed = typing.resolve_value_type(function)
         called = typing.resolve_function_type(typed, kinds, {})
@@ -446,14 +451,17 @@ def _copy(thing: Any) -> Any:
     raise Untraceable
 
 
-def _copied(function: Callable) -> Callable:
-    """The same function with other globals.
-
-    Not one that catches what is raised here, or imports what nothing follows.
-    """
-    code = function.__code__
+@functools.cache
+def _is_fit(code: python.CodeType) -> bool:
+    """Not where a function catches what is raised here, or imports what nothing follows."""
     catches = code.co_exceptiontable and not code.co_flags & inspect.CO_GENERATOR
-    if catches or any(i.opname == "IMPORT_NAME" for i in dis.get_instructions(code)):
+    return not catches and all(i.opname != "IMPORT_NAME" for i in dis.get_instructions(code))
+
+
+def _copied(function: Callable) -> Callable:
+    """The same function with other globals."""
+    code = function.__code__
+    if not _is_fit(code):
         raise Untraceable
     true = function.__globals__
     seen = _modules.setdefault(id(true), _Globals(true))
@@ -512,7 +520,7 @@ _formulas: dict[Callable, dict[tuple, _Formula | None]] = {}
 def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
     """What to run for arguments of these types; None if it is Numba's to compile."""
     known = _formulas.setdefault(dispatch, {})
-    key = typing, kinds
+    key = typing, _numbers_of(kinds)
     if key not in known:
         known[key] = None  # of one that calls itself
         lowering = _Lowering(typing)
