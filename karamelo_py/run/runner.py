@@ -163,7 +163,7 @@ class Runner:
             self._tell_of_no_step_left(file, simulation, first_step)
         else:
             simulation.begin(self.end_time)
-        foresight.warn(hub, simulation, self.duration)
+            foresight.warn(hub, simulation, self.duration)
         simulation.compile()
         began = simulation.step
         self._banner(simulation, going_on)
