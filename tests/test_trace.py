@@ -346,12 +346,12 @@ def test_another_implementation_is_seen():
     def _(tag, x):
         return x
 
-    late.__module__ = late.__qualname__ = "late"
-    before = lambda tag, x: late(tag, x)  # noqa: E731
-    assert kernel(before)(Square(1.0), 2.0) == 2
+    def caller(tag, x):
+        return late(tag, x)
+
+    assert compiled_for(caller, Square(1.0), 2.0)[0] == 2
     late.on(Square)(lambda tag, x: 3 * x)
-    after = lambda tag, x: late(tag, x) + 0  # noqa: E731
-    assert kernel(after)(Square(1.0), 2.0) == 6
+    assert compiled_for(caller, Square(1.0), 2.0)[0] == 6
 
 
 def test_arrays_are_handed_on_where_references_are_counted():
