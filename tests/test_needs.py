@@ -254,12 +254,11 @@ def test_scenes_without_waste_hear_nothing(advice):
 
 def test_a_small_step(advice):
     said = advice(plane(more="set_dt(0.001)"), dt=0.001, limit=0.04)
-    assert "set_dt(0.001): 36 times as many steps" in said
-    assert "leave set_dt out, or set_dt(0.036)" in said
+    assert "set_dt(0.001): 16 times as many steps" in said
+    assert "leave set_dt out, or set_dt(0.016)" in said
     said = advice(plane(more="dt_factor(0.1)"), dt=0.1, limit=1)
-    assert (
-        said == "dt_factor(0.1): 9 times as many steps as the stable step asks for / dt_factor(0.9)"
-    )
+    assert said.startswith("dt_factor(0.1): 4 times as many steps")
+    assert said.endswith("dt_factor(0.4)")  # what keeps the energy of a body that drifts
     assert advice(plane(), dt=0.5, limit=1) == ""
 
 

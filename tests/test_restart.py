@@ -396,7 +396,7 @@ def test_variables_of_the_command_line(run_interpreted):
     run_interpreted(text, "-var", "n", "6")
     assert run_interpreted(text, "-restart", "r.2.h5").log.Step[-1] == 6
     result = run_interpreted(text, "-restart", "r.2.h5", "-var", "n", "5", status=1)
-    assert "was written with -var n 6, not 5" in result.err
+    assert "was written with -var n 6; now it is -var n 5" in result.err
 
 
 @pytest.mark.parametrize(

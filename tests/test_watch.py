@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scenes import SCHEMES, block
@@ -111,3 +113,18 @@ def test_the_limit_has_a_name(run_interpreted):
     rows = (result.folder / "log.mpm").read_text(encoding="utf-8").splitlines()
     assert [row.split()[1] for row in rows[1:3]] == ["waves", "waves"]
     assert rows[-1].split()[1] == "set_dt"
+
+
+@pytest.mark.xdist_group("disks")
+def test_a_law_in_rate_form_is_named(run_script):
+    """What a law by rates takes and gives at large strain is not the same (Simo & Pister 1984)."""
+    text = (Path(__file__).parents[1] / "inputs" / "in.two_disks").read_text(encoding="utf-8")
+    for old, new in (
+        ("v   = 0.1", "v   = 0.2"),
+        ("N   = 20", "N   = 10"),
+        ("t(0.001)", "t(0.004)"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    result = run_script(text, status=1)
+    assert "material linear at large strain" in result.err

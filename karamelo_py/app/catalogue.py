@@ -121,7 +121,7 @@ def print_help(given: Sequence[str]) -> int:
         return _explain(homes[0], name)
     if homes:
         raise ScriptError(
-            f"'{name}' is a " + " and a ".join(homes),
+            f"'{name}' is the name of several things: {', '.join(homes)}",
             expected=" or ".join(f"karamelo-py help {family} {name}" for family in homes),
         )
     if _singular(name) in families():

@@ -11,6 +11,7 @@ from typing import Any
 
 from karamelo_py.language import registry
 from karamelo_py.script.errors import Quit, ScriptError, nearest
+from karamelo_py.script.other_programs import instead
 from karamelo_py.script.syntax import Assignment, Call, Statement
 
 MOST = 9
@@ -37,7 +38,7 @@ class Dependents:
         if not isinstance(statement, Call):
             return True
         name = statement.name
-        if not registry.knows("command", name):
+        if not registry.knows("command", name) and instead("command", name) is None:
             name = nearest(name, registry.names("command")) or name
         if name in _BASIS:
             return False

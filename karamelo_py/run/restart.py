@@ -170,9 +170,9 @@ class Restart:
         before = self.content["presets"]
         for name, text in given.items():
             if before.get(name) != text:
-                was = f"-var {name} {before[name]}" if name in before else f"without -var {name}"
+                was = f"-var {name} {before[name]}" if name in before else f"no -var {name}"
                 raise ScriptError(
-                    f"{self.path} was written {'with ' * (name in before)}{was}, not {text}",
+                    f"{self.path} was written with {was}; now it is -var {name} {text}",
                     expected="the same variables; those of the file are taken where none are given",
                 )
         return before

@@ -12,6 +12,7 @@ import numpy as np
 from karamelo_py.points.laws import Absent, can, plastic_strain
 from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
 from karamelo_py.points.laws.thermoelastic import Thermoelastic
+from karamelo_py.run.stable import keeping_share
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.regions.cylinder import Cylinder
 
@@ -54,13 +55,15 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
         dt = share * limit  # not what the end of a short run makes of it
     else:
         return  # the program's own
-    if not 0 < dt < SMALL_STEP * limit < np.inf:
+    keeping = keeping_share(hub)
+    if not 0 < dt < SMALL_STEP * keeping * limit < np.inf:
         return
-    times = f"{0.9 * limit / dt:.3g} times as many steps as the stable step asks for"
+    times = f"{keeping * limit / dt:.3g} times as many steps as the program's own step asks for"
     if hub.update.fixed_dt is not None:
-        yield Saving(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({0.9 * limit:.3g})")
+        best = keeping * limit
+        yield Saving(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
     else:
-        yield Saving(f"dt_factor({hub.update.dt_factor:g}): {times}", "dt_factor(0.9)")
+        yield Saving(f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({keeping:g})")
 
 
 # --- what nobody reads ---------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
+from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run.lowering import warms_by_friction
 from karamelo_py.run.stable import USUAL, keeping_share, sparse
@@ -97,7 +98,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
         return (
             f"points that go from cell to cell: {transfer}, {functions} and {scheme}{points} at "
             f"{share:.2g} of the stable step",
-            f"dt_factor({keeping:g}), scheme(usavg), or {smooth}",
+            f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
     if moves and _torn(hub):
         return (
@@ -106,13 +107,43 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
         )
     if hub.fixes and any(isinstance(fix, PairContact) for fix in hub.fixes.values()):
         return "contact between points", "a smaller step, or method ulmpm/contacts"
-    return "a step that is too large", "dt_factor(0.3) or less, or scheme(usavg)"
+    if _strained_by_rates(hub, simulation):
+        return (
+            "material linear at large strain: it adds up stress by rates, and gives back another "
+            "work than it took",
+            "material neo-hookean, which stores what it is given",
+        )
+    if moves and jumps:
+        return f"points that go from cell to cell: the gradients of {functions} jump", smooth
+    if share > 0.3:
+        return "a step that is too large", f"{_step_of(hub, simulation, 0.3)} or less"
+    return "no cause that is known to do that", "another basis, transfer or scheme to compare with"
+
+
+def _step_of(hub: Hub, simulation: Any, share: float) -> str:
+    """The words that make the step this share of the stable one."""
+    if hub.update.fixed_dt is not None:
+        return f"set_dt({share * simulation.limit:.3g})"
+    return f"dt_factor({share:g})"
+
+
+def _strained_by_rates(hub: Hub, simulation: Any) -> bool:
+    """Whether a law in rate form bears stresses of a quarter of its shear modulus."""
+    rates = LinearElastic | FixedFrame
+    softest = min(
+        (float(np.min(b.laws.G)) for b in simulation.setup.blocks if isinstance(b.laws, rates)),
+        default=np.inf,
+    )
+    return float(np.nanmax(hub.fields.particle("seq"), initial=0.0)) > 0.25 * softest
+
+
+def _volume_ratio(hub: Hub) -> np.ndarray:
+    return hub.fields.particle("volume") / hub.fields.reference_volume[hub.simulation.present]
 
 
 def _torn(hub: Hub) -> bool:
     """Whether points have grown to what a cell cannot hold."""
-    grown = hub.fields.particle("volume") / hub.fields.reference_volume[hub.simulation.present]
-    return bool(np.nanmax(grown, initial=0.0) > 1.5)
+    return bool(np.nanmax(_volume_ratio(hub), initial=0.0) > 1.5)
 
 
 def tell_of_growth(hub: Hub, simulation: Any) -> bool:
