@@ -41,10 +41,11 @@ from karamelo_py.kernels.sweep import (
     places_of,
     restencil,
     scatter_nodes,
+    work_of,
     zero_of,
 )
 from karamelo_py.kernels.table import Sweep, fused, staged
-from karamelo_py.kernels.visit import Work, place_at
+from karamelo_py.kernels.visit import place_at
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import locate
@@ -71,18 +72,7 @@ def visit_point(visit, s, block, then, dt, p, report):
     p = index(p)
     grid = record(s.grids, index(points.grid[p]))
     places = places_of(s.frame, points, s.now, then)
-    w = Work(
-        s.frame,
-        s.kin,
-        s.basis,
-        grid,
-        s.transfer,
-        s.averaging,
-        s.nodes,
-        points,
-        block.laws,
-        places,
-    )
+    w = work_of(s, grid, s.nodes, block, places)
     width = OneByOne()
     stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
     totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))

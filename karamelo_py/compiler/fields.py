@@ -48,6 +48,11 @@ def scalar(kin: Any) -> int:
     return 1
 
 
+def pair(kin: Any) -> int:
+    """Two numbers."""
+    return 2
+
+
 def vector(kin: Any) -> int:
     """The components of a vector."""
     return kin.dimension

@@ -50,6 +50,10 @@ class Untraceable(BaseException):
 # --- values -------------------------------------------------------------------------------------
 
 
+def _unknown(*arguments: Any) -> Any:
+    raise Untraceable
+
+
 class Value:
     """A number, lanes or an array of the function that is compiled."""
 
@@ -66,9 +70,6 @@ class Value:
 
     def __setitem__(self, place: Any, value: Any) -> None:
         emit(operator.setitem, self, place, value)
-
-    def _unknown(self, *arguments: Any) -> Any:
-        raise Untraceable
 
     __bool__ = __int__ = __index__ = __float__ = __iter__ = __len__ = __contains__ = _unknown
     __pow__ = __rpow__ = __hash__ = __str__ = __repr__ = __format__ = _unknown
@@ -135,9 +136,6 @@ class HeldValue:
         if callable(found) or isinstance(found, property):
             raise Untraceable
         return found
-
-    def _unknown(self, *arguments: Any) -> Any:
-        raise Untraceable
 
     __eq__ = __ne__ = __hash__ = __contains__ = __add__ = __radd__ = _unknown
 
@@ -514,15 +512,14 @@ class _Formula(NamedTuple):
     parts: frozenset
 
 
-_formulas: dict[Callable, dict[tuple, _Formula | None]] = {}
+_formulas: dict[tuple, _Formula | None] = {}
 
 
 def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
     """What to run for arguments of these types; None if it is Numba's to compile."""
-    known = _formulas.setdefault(dispatch, {})
-    key = typing, _numbers_of(kinds)
-    if key not in known:
-        known[key] = None  # of one that calls itself
+    key = typing, dispatch, _numbers_of(kinds)
+    if key not in _formulas:
+        _formulas[key] = None  # of one that calls itself
         lowering = _Lowering(typing)
         try:
             with _at_work(lowering), parts_noted() as parts:
@@ -534,10 +531,10 @@ def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
             _refuse_methods(codes, lowering.classes)
             if hasattr(dispatch, "tags"):
                 parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
-            known[key] = _Formula(run, result, frozenset(parts))
+            _formulas[key] = _Formula(run, result, frozenset(parts))
         except (Exception, Untraceable):  # Numba tells what is wrong, if it is
             pass
-    found = known[key]
+    found = _formulas[key]
     if found is not None:
         note(found.parts)
     return found

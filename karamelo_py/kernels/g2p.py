@@ -14,6 +14,7 @@ from karamelo_py.compiler.fields import (
     field,
     increase,
     load_vector,
+    pair,
     scalar,
     store,
     store_from,
@@ -150,13 +151,9 @@ class NodalMean(NamedTuple):
 
     array: Any
 
+    shape = pair
     kept = False
     summed = True
-
-    @staticmethod
-    def shape(kin):
-        """Two numbers."""
-        return 2
 
 
 class AveragedStress(NamedTuple):

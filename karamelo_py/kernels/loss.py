@@ -26,7 +26,7 @@ from karamelo_py.compiler.compile import (
     round_off,
     shared,
 )
-from karamelo_py.compiler.fields import scalar, store
+from karamelo_py.compiler.fields import pair, scalar, store
 from karamelo_py.compiler.tuples import row, subtract
 from karamelo_py.kernels.arrays import MASS, of_change, of_momentum
 from karamelo_py.kernels.visit import law_of, state_of
@@ -56,13 +56,9 @@ class Lost(NamedTuple):
 
     array: Any
 
+    shape = pair
     kept = False
     summed = True
-
-    @staticmethod
-    def shape(kin):
-        """Two numbers."""
-        return 2
 
 
 class Rubbed(NamedTuple):

@@ -25,6 +25,7 @@ from karamelo_py.compiler.compile import (
     looping,
     point_function,
     real,
+    shared,
     subkernel,
 )
 from karamelo_py.compiler.fields import load_vector
@@ -84,6 +85,15 @@ class OldWeights(NamedTuple):
 
 class PresentWeights(NamedTuple):
     """The weights of the place after the move."""
+
+
+@shared
+def work_of(s, grid, nodes, block, places):
+    """What a visit of points of a block works with; `nodes` are those of `grid`."""
+    return Work(
+        s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, nodes, block.points, block.laws,
+        places,
+    )  # fmt: skip
 
 
 @point_function()
@@ -274,26 +284,10 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     points, tiling = block.points, block.tiling
     grid = record(s.grids, tiling.grid[t])
     places = places_of(s.frame, points, s.now, then)
-    w = hold(
-        Work(
-            s.frame,
-            s.kin,
-            s.basis,
-            grid,
-            s.transfer,
-            s.averaging,
-            s.nodes,
-            points,
-            block.laws,
-            places,
-        )
-    )
+    w = hold(work_of(s, grid, s.nodes, block, places))
     box = tiling.buffer
     numbered = renumbered(grid, box[t, 2], box[t, 3], box[t, 4])
-    out = Work(
-        s.frame, s.kin, s.basis, numbered, s.transfer, s.averaging, s.buffers, points, block.laws,
-        places,
-    )  # fmt: skip
+    out = work_of(s, numbered, s.buffers, block, places)
     width = in_lanes(visit, s, block)
     furthest = zero_of(width, dt)
     fastest = furthest
