@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import block
 
-from karamelo_py.kernels.arrays import TIME, TIMESTEP, Control, new_clock
+from karamelo_py.kernels.arrays import TIME, TIMESTEP, new_control
 from karamelo_py.kernels.step import choose_dt, finish
 
 # E 100, nu 0.3, rho 2: lambda + 2 G = E (1 - nu) / ((1 + nu)(1 - 2 nu))
@@ -67,7 +67,7 @@ def test_set_dt(run_interpreted):
 
 def test_as_many_steps_as_fit():
     """17500 additions of 2e-4 are not quite 3.5; there is no step more for that."""
-    control = Control(np.zeros(3), new_clock())
+    control = new_control(np.zeros(3))
     clock = control.clock[0]
     clock.fixed_dt, clock.end_time = 2e-4, 3.5
     choose_dt(control)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import SCHEMES, block
 
-from karamelo_py.kernels.arrays import Control, new_clock
+from karamelo_py.kernels.arrays import new_control
 from karamelo_py.kernels.watch import LOOKS, judge
 
 TRAVEL = "fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y0))"
@@ -16,7 +16,7 @@ TRAVEL = "fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y
 
 def watched(balances, work=None):
     """The clock after looks at these balances; whether the last is within its bound."""
-    control = Control(np.zeros(3), new_clock())
+    control = new_control(np.zeros(3))
     clock = control.clock[0]
     clock.level, clock.energy_floor = 0.5, 1e-12
     within = True

@@ -8,12 +8,13 @@ every scene has are declared by their owners (:mod:`karamelo_py.compiler.fields`
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import name_of
+from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.kinematics import dimension
 
 
@@ -260,11 +261,17 @@ class Control(NamedTuple):
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
     clock: np.ndarray  # (1,) CLOCK
+    totals: np.ndarray  # (values, LIMBS) sums that come to be published: see kernels.totals
+    digits: np.ndarray  # (LIMBS,) scratch
+    answer: np.ndarray  # (8,) rounded totals
+    ranks: NamedTuple  # whether there are other processes
 
 
-def new_clock() -> Any:
-    """A clock with zeros."""
-    return np.zeros(1, CLOCK).view(np.recarray)
+def new_control(values: np.ndarray) -> Control:
+    """A control of these published values, its clock at zero."""
+    clock = np.zeros(1, CLOCK).view(np.recarray)
+    totals = np.zeros((len(values), LIMBS), np.int64)
+    return Control(values, clock, totals, np.zeros(LIMBS, np.int64), np.zeros(8), Alone())
 
 
 class Setup(NamedTuple):

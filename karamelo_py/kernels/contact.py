@@ -31,6 +31,7 @@ from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentu
 from karamelo_py.kernels.loss import Rubbed, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.kernels.step import touch, touch_velocity
+from karamelo_py.kernels.totals import add_to, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension
@@ -54,6 +55,7 @@ class SeparateFields(NamedTuple):
     prescribed: (
         np.ndarray
     )  # (N, d) 1 + slot of the reaction, where a fix prescribes the velocity, else 0
+    reactions: np.ndarray  # number of slots of such reactions, and these
     rigid: np.ndarray  # (F,) bool: whether contact does not move a field
     torque: np.ndarray  # (F,) slot of the published torque on each field
     surface: np.ndarray  # (F, k) distance of the surface by the mean place of the points, in cells
@@ -212,14 +214,15 @@ def _take(contact, control, a, i, n, k, impulse, per_mass, x):
     slot = contact.prescribed[n, k]
     if not _immovable(contact, n, k):
         contact.change[i, k] += impulse * per_mass
+    if not counts(control.ranks, n):
+        return
     force = impulse / control.clock[0].kick
-    values = control.values
-    values[contact.slot[a] + k] += force
+    add_to(control.totals, contact.slot[a] + k, force)
     # A force along k turns about the two other axes.
-    values[contact.torque[a] + (k + 1) % 3] += x[(k + 2) % 3] * force
-    values[contact.torque[a] + (k + 2) % 3] -= x[(k + 1) % 3] * force
+    add_to(control.totals, contact.torque[a] + (k + 1) % 3, x[(k + 2) % 3] * force)
+    add_to(control.totals, contact.torque[a] + (k + 2) % 3, -x[(k + 1) % 3] * force)
     if slot:
-        values[slot - 1 + k] -= force
+        add_to(control.totals, slot - 1 + k, -force)
 
 
 @subkernel
@@ -355,8 +358,7 @@ def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     if friction > 0:
         across = _approach_left(contact, d, nodes, pair, push / size, size)
         rub, sticks = _rub(contact, d, nodes, pair, friction, push, size, across, share)
-    values, kick = control.values, control.clock[0].kick
-    step = int(values[TIMESTEP]) + 1
+    step = int(control.values[TIMESTEP]) + 1
     contact.touched[pair.n, b] = -step if sticks else step
     if rub > 0:
         heat = _work_of_friction(contact, d, nodes, pair, push / size, across, rub)
@@ -369,10 +371,11 @@ def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
             impulse += rub * _slide(contact, nodes, pair, k, push / size, across)
         _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a, where.x)
         _take(contact, control, b, j, pair.m, k, impulse, pair.per_b, where.x)
-        if contact.pair[a, b] >= 0:
-            values[contact.pair[a, b] + k] -= impulse / kick
-        if contact.pair[b, a] >= 0:
-            values[contact.pair[b, a] + k] += impulse / kick
+        force = impulse / control.clock[0].kick
+        if contact.pair[a, b] >= 0 and counts(control.ranks, pair.n):
+            add_to(control.totals, contact.pair[a, b] + k, -force)
+        if contact.pair[b, a] >= 0 and counts(control.ranks, pair.n):
+            add_to(control.totals, contact.pair[b, a] + k, force)
 
 
 @subkernel
@@ -410,15 +413,15 @@ def _keep_rigid(contact, kin, nodes, spans):
 @entered
 def _touch_nodes(contact, kin, grids, nodes, spans, control):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
+    d = dimension(kin)
     fields = contact.slot.size
-    values = control.values
+    values, totals = control.values, control.totals
     for a in range(fields):
-        for k in range(3):
-            values[contact.slot[a] + k] = 0.0
-            values[contact.torque[a] + k] = 0.0
-            for b in range(fields):
-                if contact.pair[a, b] >= 0:
-                    values[contact.pair[a, b] + k] = 0.0
+        totals[contact.slot[a] : contact.slot[a] + 3] = 0
+        totals[contact.torque[a] : contact.torque[a] + 3] = 0
+        for b in range(fields):
+            if contact.pair[a, b] >= 0:
+                totals[contact.pair[a, b] : contact.pair[a, b] + 3] = 0
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
             if not nodes.sums[n, MASS] > 0:
@@ -428,6 +431,14 @@ def _touch_nodes(contact, kin, grids, nodes, spans, control):
                 grid = record(grids, n // contact.stride)
                 where = Where(node_position(grid, n), grid.h, values[DT])
                 _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
+    for a in range(fields):
+        publish(control, contact.slot[a], 3)
+        publish(control, contact.torque[a], 3)
+        for b in range(fields):
+            if contact.pair[a, b] >= 0:
+                publish(control, contact.pair[a, b], 3)
+    for c in range(contact.reactions[0]):
+        publish(control, contact.reactions[1 + c], d)
     for c in range(len(contact.copies)):
         for k in range(3):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]

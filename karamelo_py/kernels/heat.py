@@ -50,10 +50,16 @@ from karamelo_py.kernels.arrays import (
     with_nodes,
 )
 from karamelo_py.kernels.g2p import NodalMean, empty, gathered, settled
-from karamelo_py.kernels.hooks import Warmth, node_hooks, point_hooks
+from karamelo_py.kernels.hooks import (
+    Warmth,
+    clear_totals,
+    node_hooks,
+    point_hooks,
+    publish_totals,
+)
 from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
 from karamelo_py.kernels.p2g import load_of, scattered
-from karamelo_py.kernels.step import clear_totals, conduct, read_reports, step_size, visit_here
+from karamelo_py.kernels.step import conduct, read_reports, step_size, visit_here
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry, reach
@@ -372,6 +378,7 @@ def _(hooks, s):
 def _(hooks, s):
     clear_totals(SUPPLY_HEAT, hooks, s.control)
     _supply_blocks(s, hooks)
+    publish_totals(SUPPLY_HEAT, hooks, s.control)
 
 
 @shared

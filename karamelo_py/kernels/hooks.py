@@ -51,6 +51,7 @@ from karamelo_py.kernels.arrays import (
     of_force,
     of_momentum,
 )
+from karamelo_py.kernels.totals import WORK, add_to, counts, number_of_all, publish
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension
@@ -175,20 +176,20 @@ def _locate_nodes(kin, grids, hooks, count):
 
 @subkernel
 def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, count, share):
-    """Act on the chosen nodes; add to the published totals; return the work that is done."""
+    """Act on the chosen nodes; add to the totals, and to the work that is done."""
     step_back = min(control.clock[0].last_dt, control.values[TIME])  # nothing was before time 0
     _locate_nodes(kin, grids, hooks, count)
     d = dimension(kin)
-    work = 0.0
+    slot = hooks.table[h].slot
     for c in range(d):
         if hooks.programs[h, c].begin < 0:
             continue
         _evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
         if hooks.table[h].uses_before:
             _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -step_back)
-        total = 0.0
         for q in range(count):
             n = hooks.chosen[q]
+            work = 0.0
             mass = nodes.sums[n, MASS]
             if target == ON_SUMS:
                 v = nodes.sums[n, of_momentum(kin) + c] / mass
@@ -201,7 +202,7 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
                 star = v
             old, old_star = v, star
             old_force = nodes.sums[n, of_force(kin) + c]
-            v, star, force, part = _call_node_function(
+            v, star, force, total = _call_node_function(
                 hooks.table[h].address,
                 mass,
                 v,
@@ -212,28 +213,27 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
                 dt,
                 share,
             )
-            total += part
             if target == ON_UPDATE:
                 # Points that keep their velocity take the change v* - v: another v is an impulse.
                 total += kept * mass * (old - v) / dt
             # Impulse times the mean of the velocities before and after it.
             if target == ON_SUMS:
-                work += dt * (force - old_force) * (v + 0.5 * dt * (force + old_force) / mass)
+                work = dt * (force - old_force) * (v + 0.5 * dt * (force + old_force) / mass)
                 nodes.sums[n, of_force(kin) + c] = force
             elif target == ON_UPDATE:
-                work += 0.5 * mass * (star - old_star + kept * (old - v)) * (v + star)
+                work = 0.5 * mass * (star - old_star + kept * (old - v)) * (v + star)
                 clock = control.clock[0]
                 clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
                 nodes.update[n, c] = star
                 nodes.update[n, of_change(kin) + c] = star - v
             else:
                 nodes.velocity[n, c] = v
-        slot = hooks.table[h].slot
-        if slot >= 0:
-            control.values[slot + c] += total
+            if counts(control.ranks, n):
+                add_to(control.totals, WORK, work)
+                if slot >= 0:
+                    add_to(control.totals, slot + c, total)
     if hooks.programs[h, FRICTION].begin >= 0:
         _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count)
-    return work
 
 
 @subkernel
@@ -249,7 +249,7 @@ def _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count):
     slot = hooks.table[h].slot
     for q in range(count):
         n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
-        rub(kin, nodes, programs, n, mu, dt, kept, control.values[slot : slot + 3])
+        rub(kin, nodes, programs, n, mu, dt, kept, control, slot)
 
 
 @subkernel
@@ -259,17 +259,28 @@ def clear_total(hooks, h, control):
     rubs = hooks.programs[h, FRICTION].begin >= 0
     for c in range(3):
         if slot >= 0 and (rubs or hooks.programs[h, c].begin >= 0):
-            control.values[slot + c] = 0.0
+            control.totals[slot + c] = 0
+
+
+@subkernel
+def publish_total(hooks, h, control):
+    """Publish the totals of a hook."""
+    slot = hooks.table[h].slot
+    if slot < 0:
+        return
+    rubs = hooks.programs[h, FRICTION].begin >= 0
+    for c in range(3):
+        if rubs or hooks.programs[h, c].begin >= 0:
+            publish(control, slot + c, 1)
 
 
 @entered
 def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept):
-    """Call the node functions of `stage` on the members that have mass; return their work.
+    """Call the node functions of `stage` on the members that have mass.
 
     `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
     """
     dt = float(dt)
-    work = 0.0
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
@@ -291,23 +302,23 @@ def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept
                     n = m if everything else hooks.members[m]
                     if not nodes.sums[n, MASS] > 0:
                         continue
-                    heavy += 1
                     if counting:
+                        heavy += counts(control.ranks, n)
                         continue
                     hooks.chosen[count] = n
                     count += 1
                     if count == BLOCK:
-                        work += _apply_at_nodes(
+                        _apply_at_nodes(
                             target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
                         )
                         count = np.int64(0)
             if counting:
-                share = 1.0 / max(heavy, 1)
+                share = 1.0 / max(number_of_all(control.ranks, control, heavy), 1)
             elif count > 0:
-                work += _apply_at_nodes(
+                _apply_at_nodes(
                     target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
                 )
-    return work
+        publish_total(hooks, h, control)
 
 
 class Motion(NamedTuple):
@@ -351,10 +362,10 @@ def _(what, kin, hooks, control, dt, h, count):
         _evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
         if hooks.table[h].uses_before:
             _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -step_back)
-        total = 0.0
+        slot = hooks.table[h].slot
         for q in range(count):
             p = hooks.chosen[q]
-            velocity, place, part = _call_point_function(
+            velocity, place, total = _call_point_function(
                 hooks.table[h].address,
                 what.mass[p],
                 v[c, p],
@@ -367,16 +378,14 @@ def _(what, kin, hooks, control, dt, h, count):
             )
             speed = float(v[c, p])
             work = 0.5 * float(what.mass[p]) * (velocity * velocity - speed * speed)
-            control.clock[0].work += work
+            add_to(control.totals, WORK, work)
             v[c, p] = velocity
             # As far as a point moves, its corners do.
             for corner in range(what.corners):
                 y[d + d * corner + c, p] += place - y[c, p]
             y[c, p] = place
-            total += part
-        slot = hooks.table[h].slot
-        if slot >= 0:
-            control.values[slot + c] += total
+            if slot >= 0:
+                add_to(control.totals, slot + c, total)
 
 
 @act_on_points.on(Warmth)
@@ -384,7 +393,7 @@ def _(what, kin, hooks, control, dt, h, count):
     _evaluate(hooks, h, 0, count, control, np.int64(VALUE), 0.0)
     if hooks.programs[h, 1].begin >= 0:
         _evaluate(hooks, h, 1, count, control, np.int64(BEFORE), 0.0)
-    total = 0.0
+    slot = hooks.table[h].slot
     clock = control.clock[0]
     rise = fall = 0.0
     for q in range(count):
@@ -403,7 +412,8 @@ def _(what, kin, hooks, control, dt, h, count):
         what.share[0, p] = min(what.share[0, p], share)
         what.supply[0, p] = supply
         what.temperature[0, p] = T
-        total += supply - before
+        if slot >= 0:
+            add_to(control.totals, slot, supply - before)
         rate = (supply - before) / what.capacity[0, p] if what.capacity[0, p] > 0 else 0.0
         rise, fall = max(rise, rate), min(fall, rate)
         if share == 0:
@@ -411,9 +421,6 @@ def _(what, kin, hooks, control, dt, h, count):
     # What the fastest point takes, another may have got before.
     clock.hottest += dt * rise
     clock.coldest += dt * fall
-    slot = hooks.table[h].slot
-    if slot >= 0:
-        control.values[slot] += total
 
 
 @subkernel
@@ -434,6 +441,14 @@ def clear_totals(stage, hooks, control):
     for h in range(len(hooks.table)):
         if hooks.table[h].stage == stage:
             clear_total(hooks, h, control)
+
+
+@entered
+def publish_totals(stage, hooks, control):
+    """Publish the totals of point functions."""
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage == stage:
+            publish_total(hooks, h, control)
 
 
 @entered

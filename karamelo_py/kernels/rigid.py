@@ -17,6 +17,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.p2g import Led
 from karamelo_py.kernels.step import kick, touch, touch_velocity
+from karamelo_py.kernels.totals import add_to, publish
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import node_position
@@ -79,7 +80,7 @@ def _(laws, contact, s, points, led):
 
 
 @entered
-def _sum_forces(basis, kin, grids, places, points, led, force, torque, values):
+def _sum_forces(basis, kin, grids, places, points, led, force, torque, totals):
     d = dimension(kin)
     for p in range(points.mass.size):
         grid = record(grids, points.grid[p])
@@ -94,19 +95,21 @@ def _sum_forces(basis, kin, grids, places, points, led, force, torque, values):
             fx = share * led[n, of_force(kin)]
             fy = share * led[n, of_force(kin) + 1] if d > 1 else 0.0
             fz = share * led[n, of_force(kin) + 2] if d > 2 else 0.0
-            values[first] += fx
-            values[first + 1] += fy
-            values[first + 2] += fz
-            values[turning] += x[1] * fz - x[2] * fy
-            values[turning + 1] += x[2] * fx - x[0] * fz
-            values[turning + 2] += x[0] * fy - x[1] * fx
+            add_to(totals, first, fx)
+            add_to(totals, first + 1, fy)
+            add_to(totals, first + 2, fz)
+            add_to(totals, turning, x[1] * fz - x[2] * fy)
+            add_to(totals, turning + 1, x[2] * fx - x[0] * fz)
+            add_to(totals, turning + 2, x[0] * fy - x[1] * fx)
 
 
 @sum_forces.on(Rigid)
 def _(laws, contact, s, points, led):
     places = points.x[s.control.clock[0].now]
-    values = s.control.values
-    _sum_forces(s.basis, s.kin, s.grids, places, points, led, contact.force, contact.torque, values)
+    _sum_forces(
+        s.basis, s.kin, s.grids, places, points, led, contact.force, contact.torque,
+        s.control.totals,
+    )  # fmt: skip
 
 
 def _of_block(block, s, led):
@@ -117,17 +120,24 @@ _sum_forces_of_blocks = over_blocks(_of_block)
 
 
 @entered
-def _clear(slots, values):
+def _clear(slots, totals):
     for slot in slots:
-        values[slot : slot + 3] = 0.0
+        totals[slot : slot + 3] = 0
+
+
+@entered
+def _publish(slots, control):
+    for slot in slots:
+        publish(control, slot, 3)
 
 
 @touch.on(RigidBodies)
 def _(contact, s):
     led = field(s.nodes.fields, Led)
     _lead(s.kin, s.nodes, led, s.spans, kick(s), s.control.clock[0].kept)
-    _clear(contact.slots, s.control.values)
+    _clear(contact.slots, s.control.totals)
     _sum_forces_of_blocks(s, led)
+    _publish(contact.slots, s.control)
 
 
 @touch_velocity.on(RigidBodies)

@@ -42,7 +42,7 @@ from karamelo_py.kernels.arrays import (
     of_momentum,
 )
 from karamelo_py.kernels.g2p import STRAINS, AverageStress, FBar, Move, SeriesTerm, TrialStrain
-from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks
+from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks, publish_totals
 from karamelo_py.kernels.loss import Lost, Rubbed
 from karamelo_py.kernels.nodes import (
     ClearRubbed,
@@ -73,6 +73,7 @@ from karamelo_py.kernels.sweep import (
     sweep_nodes,
     sweep_points,
 )
+from karamelo_py.kernels.totals import agree_on_reports
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.basis import placed
@@ -129,6 +130,7 @@ def read_reports(s):
     clock.new_rate = 0.0
     clock.new_move = 0.0
     _survey_blocks(s)
+    agree_on_reports(s.control.ranks, s.control)
 
 
 @shared
@@ -194,6 +196,7 @@ _check_moves_of_blocks = over_blocks(_check_moves)
 def check_moves(s):
     """Look at the new positions again, after hooks that may have changed them."""
     _check_moves_of_blocks(s)
+    agree_on_reports(s.control.ranks, s.control)
     return s.control.clock[0].wrong == 0
 
 
@@ -291,9 +294,7 @@ def _(hooks, stage, target, s):
 @at_nodes.on(Hooks)
 def _(hooks, stage, target, s):
     kept = s.control.clock[0].kept
-    s.control.clock[0].work += node_hooks(
-        stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), kept
-    )
+    node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), kept)
 
 
 @shared
@@ -326,6 +327,7 @@ def _(hooks, stage, then, s):
     clear_totals(stage, hooks, s.control)
     now = s.control.clock[0].now
     hook_points(s, hooks, stage, now, 1 - now if then else now)
+    publish_totals(stage, hooks, s.control)
 
 
 # --- what only some scenes have ---------------------------------------------------------------

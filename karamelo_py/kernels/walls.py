@@ -13,14 +13,15 @@ from karamelo_py.compiler.compile import subkernel
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.loss import Rubbed, warm_node
+from karamelo_py.kernels.totals import add_to, counts
 from karamelo_py.points.kinematics import dimension
 
 FRICTION = 3  # the program of the coefficient, behind those of the components
 
 
 @subkernel
-def rub(kin, nodes, programs, n, mu, dt, kept, reaction):
-    """Give node `n` the friction of its wall; add the force to `reaction` (d,).
+def rub(kin, nodes, programs, n, mu, dt, kept, control, slot):
+    """Give node `n` the friction of its wall; add the force to the totals from `slot` on.
 
     `programs` are those of the hook that has held the node: what it changed v and v* by, of which
     points that keep the share `kept` of their velocity take both, is the impulse across the wall.
@@ -50,7 +51,8 @@ def rub(kin, nodes, programs, n, mu, dt, kept, reaction):
             taken = nodes.update[n, c] * (stop / speed)
             nodes.update[n, c] -= taken
             nodes.update[n, of_change(kin) + c] -= taken
-            reaction[c] -= mass * taken / dt
+            if counts(control.ranks, n):
+                add_to(control.totals, slot + c, -mass * taken / dt)
 
 
 @subkernel

@@ -14,6 +14,7 @@ from karamelo_py.compiler.compile import entered, over_blocks, shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import TIMESTEP
+from karamelo_py.kernels.totals import KINETIC, STORED, WORK, add_to, agree_on_heat, collect
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.laws import (
     dissipated_energy,
@@ -35,39 +36,53 @@ OVERSHOOT = 1.0  # of the range of temperatures that sources allow: more stops t
 
 
 @entered
-def _sum_energies(kin, points, laws, control):
-    clock = control.clock[0]
-    kinetic = 0.0
-    stored = 0.0
-    for p in range(points.mass.size):
-        law = record(laws, points.material[p])
-        mass = points.mass[p]
-        state = load(points.state, p, initial_state(law, kin, mass))
-        v = load_vector(kin, points.v, p)
-        squared = 0.0
-        for k in range(dimension(kin)):
-            squared += float(v[k]) * float(v[k])
-        kinetic += 0.5 * float(mass) * squared
-        energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
-        stored += float(mass) * float(specific_volume(law)) * float(energy)
-    clock.kinetic += kinetic
-    clock.stored += stored
+def _sum_energies(kin, points, laws, tiling, control):
+    for t in range(tiling.count[0]):
+        kinetic = 0.0
+        stored = 0.0
+        for p in range(tiling.range[t, 0], tiling.range[t, 1]):
+            law = record(laws, points.material[p])
+            mass = points.mass[p]
+            state = load(points.state, p, initial_state(law, kin, mass))
+            v = load_vector(kin, points.v, p)
+            squared = 0.0
+            for k in range(dimension(kin)):
+                squared += float(v[k]) * float(v[k])
+            kinetic += 0.5 * float(mass) * squared
+            energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
+            stored += float(mass) * float(specific_volume(law)) * float(energy)
+        add_to(control.totals, KINETIC, kinetic)
+        add_to(control.totals, STORED, stored)
 
 
 def _sum(block, s):
-    _sum_energies(s.kin, block.points, block.laws, s.control)
+    _sum_energies(s.kin, block.points, block.laws, block.tiling, s.control)
 
 
 _sum_blocks = over_blocks(_sum)
 
 
+@entered
+def _clear(control):
+    control.totals[KINETIC] = 0
+    control.totals[STORED] = 0
+
+
+@entered
+def _take(control):
+    clock, answer = control.clock[0], control.answer
+    clock.kinetic = answer[KINETIC]
+    clock.stored = answer[STORED] + clock.born_with
+    clock.work = answer[WORK]
+
+
 @shared
 def sum_energies(s):
-    """Kinetic, and stored plus dissipated energy of all points, into the clock."""
-    clock = s.control.clock[0]
-    clock.kinetic = 0.0
-    clock.stored = clock.born_with
+    """Energies of all points, kinetic and stored plus dissipated, and the work into the clock."""
+    _clear(s.control)
     _sum_blocks(s)
+    collect(s.control.ranks, s.control, KINETIC, 3)
+    _take(s.control)
 
 
 @entered
@@ -141,6 +156,7 @@ def look_at_heat(s):
     if clock.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
         return True
     measure_heat(s)
+    agree_on_heat(s.control.ranks, s.control)
     largest = max(abs(clock.coldest), abs(clock.hottest))
     room = OVERSHOOT * (clock.hottest - clock.coldest + clock.own_heat) + HEAT_NOISE * largest
     above = clock.hottest + clock.own_heat + room

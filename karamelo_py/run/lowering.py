@@ -18,11 +18,10 @@ from karamelo_py.kernels.arrays import (
     UPDATE_WIDTH,
     VELOCITY_WIDTH,
     Block,
-    Control,
     Nodes,
     Points,
     Setup,
-    new_clock,
+    new_control,
     own_arrays_of,
 )
 from karamelo_py.kernels.g2p import NodalMean
@@ -182,7 +181,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
-    control = Control(hub.values.array, new_clock())
+    control = new_control(hub.values.array)
     clock = control.clock[0]
     clock.last_dt = previous.last_dt if previous else 0.0
     clock.spacing = min(lattice.h for lattice in lattices)
@@ -349,4 +348,5 @@ def chosen(block: Block, keep: np.ndarray) -> Block:
     kept = {name: np.compress(keep, a, axis=-1) for name, a in own_arrays_of(points)}
     declared = tuple(type(one)(np.compress(keep, one.array, axis=-1)) for one in points.fields)
     rest = {name: kept.get(name) for name in points._fields if name != "fields"}
+    block.tiling.count[0] = 0
     return block._replace(points=Points(**rest, fields=declared))

@@ -25,7 +25,7 @@ from karamelo_py.run.state import arrays_by_name, take_arrays
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-FORMAT, VERSION = "karamelo-py restart", 2
+FORMAT, VERSION = "karamelo-py restart", 3
 FLAT = {"track_times": False}
 
 

@@ -406,11 +406,18 @@ class Simulation:
             clock.born_with = internal_energy(s.blocks)
             # Velocities belong to half a step before, stresses to the share strained before.
             level = 0.5 + getattr(self.hub.update.scheme, "strained_before", 0.0)
+            self._see_tiles()
             begin_to_look(s, level, anew)
         clock.watch_heat = int(self.hub.update.thermal and not unknown_heat(self.hub))
         if clock.watch_heat and anew:
             measure_heat(s)
             clock.coldest, clock.hottest = clock.T_low, clock.T_high
+
+    def _see_tiles(self) -> None:
+        """Energies are summed by tile: sort the points where they are in none yet."""
+        if any(block.tiling.count[0] == 0 < block.points.mass.size for block in self.setup.blocks):
+            self.sort()
+            self.mapped = False
 
     def go_on(self, end_time: float, halvings: int) -> None:
         """In place of `begin`: go on with a run whose state was put into the arrays.

@@ -9,6 +9,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
+from karamelo_py.kernels.totals import WORK
 from karamelo_py.run.tiles import grow, in_use, numbers, used
 from karamelo_py.script.errors import ScriptError
 
@@ -30,6 +31,7 @@ def changing(
             grow(array, rows)
         yield name, array[:rows]
     yield "clock", s.control.clock
+    yield "work", s.control.totals[WORK]
     for k, block in enumerate(s.blocks):
         for name, array in arrays_of(block.points):
             yield f"points/{k}/{name}", array
@@ -78,6 +80,7 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
         raise _misfit("clock")
     for name in clock.dtype.names:
         clock[name] = before[name]
+    s.control.totals[WORK] = _checked(found, "work", s.control.totals[WORK])
     nodes = numbers(spans)
     for name, array in _of_nodes(s):
         array[nodes] = _checked(found, name, array[nodes])

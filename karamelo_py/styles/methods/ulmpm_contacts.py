@@ -48,6 +48,11 @@ def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
     return np.where(total > 0, takes[:, None] / np.where(total > 0, total, 1), 0.5)
 
 
+def prescribing(hub: Hub) -> list[Fix]:
+    """Fixes that prescribe the velocity of nodes."""
+    return [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
+
+
 class ULMPMContacts(Method):
     """Updated Lagrangian MPM with contact: each solid has a velocity field of its own on the grid.
 
@@ -140,6 +145,7 @@ class ULMPMContacts(Method):
             # Pages that nothing is written to cost no memory.
             touched=np.zeros((nodes, count), np.int32),
             prescribed=np.zeros((nodes, d), np.int32),
+            reactions=np.zeros(1 + len(hub.values.array), np.int64),
             meeting=np.zeros(count, np.int64),
             partners=np.zeros(count, np.int64),
             change=np.zeros((count, d)),
@@ -160,6 +166,8 @@ class ULMPMContacts(Method):
             contact.friction[a, b] = contact.friction[b, a] = fix.friction
             contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
         self._prescribe(hub, contact.prescribed)
+        slots = [hub.values.slot(f"{fix.id}_x") for fix in prescribing(hub)]
+        contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
         """Which nodes touched last: usf and usavg ask for it at the start of a step."""
@@ -203,7 +211,7 @@ class ULMPMContacts(Method):
 
     def _prescribe(self, hub: Hub, prescribed: np.ndarray) -> None:
         """Note the nodes whose velocity fixes prescribe, and where each reaction is published."""
-        fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
+        fixes = prescribing(hub)
         # Pages that nothing is written to cost no memory.
         if self._prescribed is prescribed:
             prescribed[:] = 0

@@ -1,0 +1,153 @@
+"""Sums that do not depend on the order of their terms: reactions, work, energies.
+
+A total is a fixed-point number as wide as the range of double precision, in limbs of 32 bits with
+room for carries: every term is added without rounding, so that points and nodes may be shared out
+in any way. A published total is rounded once (Kulisch 1971; Neal 2015, "Fast exact summation using
+small and large superaccumulators").
+"""
+
+from __future__ import annotations
+
+from math import ldexp
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.compile import entered, point_function, shared, subkernel
+
+LIMBS = 68
+LOST = LIMBS - 1  # counts terms that are no numbers
+DIGIT = (1 << 32) - 1
+MANTISSA = (1 << 52) - 1
+# Rows of the totals: those of the published values have their slots, of which time, timestep and dt
+# are no sums.
+KINETIC, STORED, WORK = 0, 1, 2
+
+
+class Alone(NamedTuple):
+    """One process has the whole scene."""
+
+
+@subkernel
+def add_to(totals, row, x):
+    """Add `x` to a total, without rounding."""
+    if x == 0.0:
+        return
+    bits = np.float64(x).view(np.int64)
+    exponent = (bits >> 52) & 0x7FF
+    if exponent == 0x7FF:
+        totals[row, LOST] += 1
+        return
+    mantissa = bits & MANTISSA
+    if exponent > 0:
+        mantissa |= 1 << 52
+        exponent -= 1
+    limb = exponent >> 5
+    shift = exponent & 31
+    low = (mantissa & DIGIT) << shift
+    high = (mantissa >> 32) << shift
+    sign = 1 if bits >= 0 else -1
+    totals[row, limb] += sign * (low & DIGIT)
+    totals[row, limb + 1] += sign * ((low >> 32) + (high & DIGIT))
+    totals[row, limb + 2] += sign * (high >> 32)
+
+
+@subkernel
+def _carry(total):
+    """Digits from 0 to 2^32 - 1, the last one signed."""
+    for k in range(LOST - 1):
+        carry = total[k] >> 32
+        total[k] -= carry << 32
+        total[k + 1] += carry
+
+
+@entered
+def rounded(total):
+    """The value of a total (LIMBS,), which is left in digits."""
+    if total[LOST] > 0:
+        return np.nan
+    _carry(total)
+    sign = 1.0
+    if total[LOST - 1] < 0:
+        # So that the digits have one sign, and adding them up loses nothing.
+        sign = -1.0
+        for k in range(LOST):
+            total[k] = -total[k]
+        _carry(total)
+    value = 0.0
+    for k in range(LOST):
+        if total[k] != 0:
+            value += ldexp(float(total[k]), 32 * k - 1074)
+    return sign * value
+
+
+@entered
+def _round(totals, digits, answer, first, count):
+    for k in range(count):
+        for limb in range(LIMBS):
+            digits[limb] = totals[first + k, limb]
+        answer[k] = rounded(digits)
+
+
+@point_function()
+def collect(ranks, control, first, count):
+    """Put the values of `count` totals, from row `first` on, into `control.answer`."""
+
+
+@collect.on(Alone)
+def _(ranks, control, first, count):
+    _round(control.totals, control.digits, control.answer, first, count)
+
+
+@point_function()
+def counts(ranks, n):
+    """Whether this process adds what node `n` gives to totals."""
+
+
+@counts.on(Alone)
+def _(ranks, n):
+    return True
+
+
+@point_function()
+def number_of_all(ranks, control, number):
+    """The sum of a number over all processes."""
+
+
+@number_of_all.on(Alone)
+def _(ranks, control, number):
+    return number
+
+
+@point_function()
+def agree_on_reports(ranks, control):
+    """Largest move and rate of all processes, and whether a point of any went wrong."""
+
+
+@agree_on_reports.on(Alone)
+def _(ranks, control):
+    return None
+
+
+@point_function()
+def agree_on_heat(ranks, control):
+    """Lowest and highest temperatures of all processes."""
+
+
+@agree_on_heat.on(Alone)
+def _(ranks, control):
+    return None
+
+
+@shared
+def publish(control, slot, count):
+    """The published values from `slot` on become those of their totals."""
+    collect(control.ranks, control, slot, count)
+    take_answer(control.values, control.answer, slot, count)
+
+
+@entered
+def take_answer(values, answer, slot, count):
+    """The values from `slot` on become the answers."""
+    for k in range(count):
+        values[slot + k] = answer[k]

@@ -1,0 +1,57 @@
+"""Totals: sums without rounding, whatever the order of their terms."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import fsum
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+
+from karamelo_py.compiler.compile import kernel
+from karamelo_py.kernels.totals import LIMBS, add_to, rounded
+
+numbers = some.lists(some.floats(-1e300, 1e300), max_size=30)
+
+
+@kernel
+def add_all(totals, terms):
+    for k in range(terms.size):
+        add_to(totals, k % len(totals), terms[k])
+
+
+def total_of(terms, parts=1):
+    totals = np.zeros((parts, LIMBS), np.int64)
+    add_all(totals, np.array(terms, float))
+    return rounded(totals.sum(axis=0))
+
+
+@given(numbers)
+def test_a_total_is_the_exact_sum(terms):
+    """Within the rounding of a last digit; the exact sum is that of fractions."""
+    exact = sum(map(Fraction, terms), Fraction(0))
+    value = total_of(terms)
+    assert abs(Fraction(value) - exact) <= Fraction(float(np.spacing(abs(value))))
+
+
+@given(numbers, some.randoms())
+def test_the_order_of_terms_does_not_matter(terms, random):
+    """Nor how they are shared out among several totals that are added up."""
+    value = total_of(terms)
+    random.shuffle(terms)
+    assert total_of(terms) == value
+    assert total_of(terms, parts=2) == value
+
+
+def test_what_cancels_leaves_what_is_small():
+    """A plain sum of these is 0; fsum is Shewchuk's exact one."""
+    terms = [1e300, 1.0, -1e300, 5e-324]
+    assert total_of(terms) == fsum(terms) == 1.0
+    assert total_of([5e-324, 1e-310]) == 5e-324 + 1e-310
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
+def test_a_term_that_is_no_number_is_seen(wrong):
+    assert np.isnan(total_of([1.0, wrong]))
