@@ -126,8 +126,8 @@ def test_only_what_averages_has_a_nodal_mean(lowered):
 IN_KERNEL = {
     # what the scene has: kinematics, method, law, scheme
     "PlaneStrain", "Grid", "Linear", "FLIP", "Updated", "Serial",
-    # that it has no more: heat, contact, fixes at every step, a frame that moves
-    "Insulated", "NoContact", "NoHooks", "FixedFrame",
+    # that it has no more: heat, contact, fixes at every step, other processes
+    "Insulated", "NoContact", "NoHooks", "FixedFrame", "Alone",
     # what is done at points and nodes in the two visits of musl, four points at once or one by one
     "OldWeights", "PresentWeights", "Strain", "Move", "MassMomentum", "MomentumAgain",
     "InternalForce", "Update", "MomentumToVelocity", "Fours",
