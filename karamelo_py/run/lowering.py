@@ -348,5 +348,4 @@ def chosen(block: Block, keep: np.ndarray) -> Block:
     kept = {name: np.compress(keep, a, axis=-1) for name, a in own_arrays_of(points)}
     declared = tuple(type(one)(np.compress(keep, one.array, axis=-1)) for one in points.fields)
     rest = {name: kept.get(name) for name in points._fields if name != "fields"}
-    block.tiling.count[0] = 0
     return block._replace(points=Points(**rest, fields=declared))

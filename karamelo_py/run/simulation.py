@@ -56,8 +56,8 @@ from karamelo_py.run.lowering import (
     warms_by_friction,
 )
 from karamelo_py.run.stable import ruling_limit, shares_of_limits
-from karamelo_py.run.state import changing
-from karamelo_py.run.tiles import used
+from karamelo_py.run.state import changing, take_tiling
+from karamelo_py.run.tiles import in_tiles, used
 from karamelo_py.run.trial import try_parts
 from karamelo_py.run.watch import internal_energy, unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
@@ -414,8 +414,8 @@ class Simulation:
             clock.coldest, clock.hottest = clock.T_low, clock.T_high
 
     def _see_tiles(self) -> None:
-        """Energies are summed by tile: sort the points where they are in none yet."""
-        if any(block.tiling.count[0] == 0 < block.points.mass.size for block in self.setup.blocks):
+        """Energies are summed by tile: sort the points where they are not in tiles."""
+        if any(in_tiles(block.tiling) != block.points.mass.size for block in self.setup.blocks):
             self.sort()
             self.mapped = False
 
@@ -605,9 +605,11 @@ class Simulation:
         # Nodes that were not in use then have to be empty, as they were.
         spans = used(s.spans)[1:].copy()
         self.tiles.empty_nodes(s)
-        for name, array in changing(self, snapshot):
+        for k, block in enumerate(s.blocks):
+            take_tiling(block.tiling, snapshot, f"tiling/{k}/")
+        self.tiles.lay_out(s)
+        for name, array in changing(self):
             array[...] = snapshot[name]
-        self.tiles.make_room(s)
         s.control.values[:] = snapshot["values"]
         for marks in self.hub.update.method.remembered(s.contact, spans):
             marks[np.abs(marks) > self.step] = 0

@@ -10,33 +10,24 @@ import numpy as np
 from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK
-from karamelo_py.run.tiles import grow, in_use, numbers, used
+from karamelo_py.run.tiles import in_use, numbers, used
 from karamelo_py.script.errors import ScriptError
 
 # What else a simulation knows of its state; `measured` comes before what depends on its version.
 SHOWN = ("measured", "mapped", "followed", "told_of_growth")
 
 
-def changing(
-    simulation: Any, copies: Mapping[str, np.ndarray] | None = None
-) -> Iterator[tuple[str, np.ndarray]]:
-    """Every array that a step changes and the next one needs, as far as it is in use.
-
-    With `copies` of them, as far as it was in use when these were made.
-    """
+def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
+    """Every array that a step changes and the next one needs, as far as it is in use."""
     s = simulation.setup
     for name, array, rows in simulation.tiles.in_use(s):
-        if copies is not None:
-            rows = len(copies[name])
-            grow(array, rows)
         yield name, array[:rows]
     yield "clock", s.control.clock
     yield "work", s.control.totals[WORK]
     for k, block in enumerate(s.blocks):
         for name, array in arrays_of(block.points):
             yield f"points/{k}/{name}", array
-    spans = used(s.spans) if copies is None else copies["spans"]
-    for k, rows in enumerate(_remembered(simulation, spans)):
+    for k, rows in enumerate(_remembered(simulation, used(s.spans))):
         yield f"contact/{k}", rows
 
 
@@ -48,7 +39,7 @@ def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
         "present": simulation.present,
         "shown": np.array([getattr(simulation, name) for name in SHOWN]),
     }
-    nodes = numbers(found["spans"])
+    nodes = numbers(s.spans)
     return found | {name: array[nodes] for name, array in _of_nodes(s)}
 
 
@@ -65,26 +56,22 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
         Block(
             _points(block.points, found, f"points/{k}/"),
             block.laws,
-            _tiling(simulation.tiles.empty_tiling(), found, f"tiling/{k}/"),
+            take_tiling(simulation.tiles.empty_tiling(), found, f"tiling/{k}/"),
         )
         for k, block in enumerate(s.blocks)
     )
-    spans = s.spans
-    for name, array, _ in simulation.tiles.in_use(s)[:4]:
-        grow(array, len(found.get(name, ())))
-        _fill(array, found, name)
     s = simulation.setup = s._replace(blocks=blocks)
-    simulation.tiles.make_room(s)
+    simulation.tiles.lay_out(s)
     clock, before = s.control.clock, found["clock"]
     if set(clock.dtype.names) != set(before.dtype.names):
         raise _misfit("clock")
     for name in clock.dtype.names:
         clock[name] = before[name]
     s.control.totals[WORK] = _checked(found, "work", s.control.totals[WORK])
-    nodes = numbers(spans)
+    nodes = numbers(s.spans)
     for name, array in _of_nodes(s):
         array[nodes] = _checked(found, name, array[nodes])
-    for k, rows in enumerate(_remembered(simulation, used(spans))):
+    for k, rows in enumerate(_remembered(simulation, used(s.spans))):
         rows[...] = _checked(found, f"contact/{k}", rows)
     simulation.present[:] = _checked(found, "present", simulation.present)
     for name, known in zip(SHOWN, _checked(found, "shown", np.ones(len(SHOWN), bool)), strict=True):
@@ -101,7 +88,8 @@ def _of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
             yield f"{kind}/{name_of(type(one))}", one.array
 
 
-def _tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:
+def take_tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:
+    """Put what `in_use` has given into a tiling."""
     for name, _ in in_use(tiling):
         _fill(getattr(tiling, name), found, stem + name)
     return tiling

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,15 @@ SHARES = 64  # of the points of a block, nearly equal: threads share them out
 SPAN = 256  # nodes of a span at most: threads share out spans
 DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
 DRIFT = 1.0  # cells that points may go before they are sorted again
+
+
+class Boxes(NamedTuple):
+    """Boxes of nodes, of b tiles of points."""
+
+    order: np.ndarray  # (b,) in which they are summed
+    grid: np.ndarray  # (b,)
+    lo: np.ndarray  # (b, d) first nodes
+    hi: np.ndarray  # (b, d) last nodes
 
 
 class Tiles:
@@ -82,6 +91,7 @@ class Tiles:
             share=np.zeros(SHARES + 1, np.int64),
             range=np.zeros((self.count + 1, 2), np.int64),
             grid=np.zeros(self.count + 1, np.int64),
+            box=np.zeros((self.count + 1, 2 * self.dimension), np.int64),
             buffer=np.zeros((self.count + 1, 5), np.int64),
             report=np.zeros((self.count + 1, 3)),
         )
@@ -102,16 +112,13 @@ class Tiles:
     def in_use(self, s: Setup) -> list[tuple[str, np.ndarray, int]]:
         """The arrays that a sort changes beside the points, and how many rows of them are in use.
 
-        Those that may grow, in place, come first.
+        All others follow from them (`lay_out`).
         """
-        _, count, first, parts = s.buffers
-        arrays = [("spans", s.spans, 1 + s.spans[0, 0]), ("layout/count", count, len(count))]
-        arrays.append(("layout/first", first, count[0] + 1))
-        arrays.append(("layout/parts", parts, first[count[0]]))
-        for k, block in enumerate(s.blocks):
-            for name, rows in in_use(block.tiling):
-                arrays.append((f"tiling/{k}/{name}", getattr(block.tiling, name), rows))
-        return arrays
+        return [
+            (f"tiling/{k}/{name}", getattr(block.tiling, name), rows)
+            for k, block in enumerate(s.blocks)
+            for name, rows in in_use(block.tiling)
+        ]
 
     def empty_nodes(self, s: Setup) -> None:
         """What points gave to the nodes in use becomes zero."""
@@ -130,11 +137,9 @@ class Tiles:
         self.empty_nodes(s)
         s.control.clock[0].drift = 0.0
         s.control.clock[0].drift_limit = DRIFT if s.frame.moves else np.inf
-        boxes = [self._sort_block(s, block) for block in s.blocks]
-        self.occupied = len(np.unique(np.concatenate([held for held, *_ in boxes])))
-        self._lay_out(
-            s, *(np.concatenate(part) for part in zip(*[rest for _, *rest in boxes], strict=True))
-        )
+        occupied = [self._sort_block(s, block) for block in s.blocks]
+        self.occupied = len(np.unique(np.concatenate(occupied)))
+        self.lay_out(s)
         self.sorts += 1
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
@@ -147,8 +152,8 @@ class Tiles:
         drift = DRIFT + rounding if s.frame.moves else 0.0
         return far + drift if far < cells else cells  # also where it is not a number
 
-    def _sort_block(self, s: Setup, block: Block) -> tuple[np.ndarray, ...]:
-        """Sort the points of a block; what `_lay_out` takes of its tiles."""
+    def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
+        """Sort the points of a block; the numbers of the tiles that they are in."""
         points, tiling = block.points, block.tiling
         x = points.x[s.control.clock[0].now] if points.home is None else points.home
         tile, order = np.empty((2, x.shape[1]), np.int64)
@@ -191,7 +196,9 @@ class Tiles:
         last = np.clip(last, 0, self._cells[grid] - 1).astype(np.int64)
         lo = first * self.per_cell - self.beyond
         hi = (last + 1) * self.per_cell + self.beyond
-        return occupied, grid, np.clip(lo, 0, top - least), np.clip(hi, least, top)
+        tiling.box[:count, : self.dimension] = np.clip(lo, 0, top - least)
+        tiling.box[:count, self.dimension :] = np.clip(hi, least, top)
+        return occupied
 
     def box_bytes(self, s: Setup) -> int:
         """Bytes of the boxes of all tiles."""
@@ -199,54 +206,25 @@ class Tiles:
             return 0
         return sum(array.nbytes for one in _buffers(s) for array in _summed(one.nodes))
 
-    def make_room(self, s: Setup) -> None:
-        """Make the buffers as large as the boxes of all tiles need."""
-        rows = max(int(b.tiling.buffer[: b.tiling.count[0], 1].max(initial=0)) for b in s.blocks)
-        for one in _buffers(s):
-            for array in _summed(one.nodes):
-                grow(array, rows)
-
-    def _lay_out(self, s: Setup, grid: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> None:
+    def lay_out(self, s: Setup) -> None:
         """Lay the boxes of all blocks one after another; find the tiles of nodes that they reach.
 
-        (B,) grids of the boxes, (B, d) first and last nodes in each direction.
+        Everything follows from the boxes of the tiles.
         """
-        steps = self._steps[grid] if self.direct else _steps(hi - lo + 1)
-        ends = np.cumsum(np.prod(hi - lo + 1, axis=1))
-        begins = np.concatenate([[0], ends])[:-1]
-        first = begins - (lo * steps).sum(axis=1)
-        if self.direct:
-            begins = ends = np.zeros_like(ends)
-            first = self._first_node[grid]
-        columns = np.zeros((len(grid), 5), np.int64)
-        columns[:, :3] = np.stack([begins, ends, first], axis=1)
-        columns[:, 3 : 2 + self.dimension] = steps[:, :-1]
-        done = 0
-        for block in s.blocks:
-            count = block.tiling.count[0]
-            block.tiling.buffer[:count] = columns[done : done + count]
-            done += count
-        self.make_room(s)
-        # Pairs of a box and a tile of nodes that it reaches, sorted by tile.
-        size = NODES[self.dimension]
-        low = lo // size
-        across = hi // size - low + 1
-        box, left = _ragged(np.prod(across, axis=1))
-        places = low[box] + left[:, None] // _steps(across)[box] % across[box]
-        tile = self._first_of_nodes[grid[box]] + (places * self._tile_steps[grid[box]]).sum(axis=1)
-        begin = np.maximum(places * size, lo[box])
-        end = np.minimum(places * size + size - 1, hi[box])
+        boxes = self._boxes(s)
+        box, tile, begin, end = self._reached(boxes)
+        first, steps = self._number(s, boxes, box, begin, end)
         # The largest part first: mostly it has all the nodes that others reach.
-        order = np.lexsort((box, -np.prod(end - begin + 1, axis=1), tile))
+        order = np.lexsort((boxes.order[box], -np.prod(end - begin + 1, axis=1), tile))
         tile, box, begin, end = tile[order], box[order], begin[order], end[order]
         starts = np.flatnonzero(np.diff(tile, prepend=-1))
-        own_begin = np.minimum.reduceat(begin, starts)
-        own_end = np.maximum.reduceat(end, starts)
+        grid = boxes.grid[box]
+        own_begin, own_end = _extents(starts, begin, end)
         more = ((begin[starts] != own_begin) | (end[starts] != own_end)).any(axis=1)
-        parts = self._parts(grid[box], begin, end, first[box], steps[box])
+        parts = self._parts(grid, begin, end, first[box], steps[box])
         parts[:, 9] = ADD
         parts[starts[~more], 9] = TAKE
-        own = self._parts(grid[box[starts]], own_begin, own_end, 0, 0)
+        own = self._parts(grid[starts], own_begin, own_end, 0, 0)
         spans = _spans(own)
         parts = np.insert(parts, starts[more], own[more], axis=0)
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
@@ -263,6 +241,55 @@ class Tiles:
         for room, found in zip(rooms, (firsts, parts), strict=True):
             grow(room, len(found))
             room[: len(found)] = found
+        self._own_nodes(tile[starts], own)
+
+    def _boxes(self, s: Setup) -> Boxes:
+        """The boxes of the tiles of all blocks."""
+        d, tilings = self.dimension, [block.tiling for block in s.blocks]
+        grid = np.concatenate([one.grid[: one.count[0]] for one in tilings])
+        box = np.concatenate([one.box[: one.count[0]] for one in tilings])
+        return Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:])
+
+    def _reached(self, boxes: Boxes) -> tuple[np.ndarray, ...]:
+        """Pairs of a box and a tile of nodes that it reaches; the first and last such nodes."""
+        size = NODES[self.dimension]
+        low = boxes.lo // size
+        across = boxes.hi // size - low + 1
+        box, left = _ragged(np.prod(across, axis=1))
+        places = low[box] + left[:, None] // _steps(across)[box] % across[box]
+        grid = boxes.grid[box]
+        tile = self._first_of_nodes[grid] + (places * self._tile_steps[grid]).sum(axis=1)
+        begin = np.maximum(places * size, boxes.lo[box])
+        return box, tile, begin, np.minimum(places * size + size - 1, boxes.hi[box])
+
+    def _number(self, s: Setup, boxes: Boxes, *reached: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Give each box its rows of the buffers: its number of node 0, and steps (k, d)."""
+        steps = self._steps[boxes.grid] if self.direct else _steps(boxes.hi - boxes.lo + 1)
+        ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
+        begins = np.concatenate([[0], ends])[:-1]
+        first = begins - (boxes.lo * steps).sum(axis=1)
+        if self.direct:
+            begins = ends = np.zeros_like(ends)
+            first = self._first_node[boxes.grid]
+        columns = np.zeros((len(first), 5), np.int64)
+        columns[:, :3] = np.stack([begins, ends, first], axis=1)
+        columns[:, 3 : 2 + self.dimension] = steps[:, :-1]
+        done = 0
+        for block in s.blocks:
+            count = block.tiling.count[0]
+            block.tiling.buffer[:count] = columns[done : done + count]
+            done += count
+        self._make_room(s, int(ends[-1]) if len(ends) else 0)
+        return first, steps
+
+    def _make_room(self, s: Setup, rows: int) -> None:
+        """Make the buffers as large as the boxes of all tiles need."""
+        for one in _buffers(s):
+            for array in _summed(one.nodes):
+                grow(array, rows)
+
+    def _own_nodes(self, tiles: np.ndarray, own: np.ndarray) -> None:
+        """Take note of the tiles of nodes in use: their numbers, and rows of all their nodes."""
 
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
         """`Buffers.parts` of nodes (k, d) from `begin` to `end` of the grids.
@@ -280,6 +307,13 @@ class Tiles:
         return parts
 
 
+def _extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The least and largest of the rows from each start to the next."""
+    if not len(starts):
+        return begin, end
+    return np.minimum.reduceat(begin, starts), np.maximum.reduceat(end, starts)
+
+
 def _spans(boxes: np.ndarray) -> np.ndarray:
     """(k, 2) the rows of boxes of nodes (see `Buffers`), joined where one ends at another."""
     row, left = _ragged(boxes[:, 2] * boxes[:, 3])
@@ -288,7 +322,7 @@ def _spans(boxes: np.ndarray) -> np.ndarray:
     order = np.argsort(begin, kind="stable")
     begin, end = begin[order], (begin + own[:, 4])[order]
     apart = begin[1:] != end[:-1]
-    begin, end = begin[np.append(True, apart)], end[np.append(apart, True)]
+    begin, end = np.append(begin[:1], begin[1:][apart]), np.append(end[:-1][apart], end[-1:])
     of, left = _ragged(-(-(end - begin) // SPAN))
     begin = begin[of] + left * SPAN
     return np.stack([begin, np.minimum(begin + SPAN, end[of])], axis=1)
@@ -298,7 +332,12 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
     """Names of the arrays of a tiling that a sort changes, and how many rows are in use."""
     tiles = tiling.count[0]
     whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
-    return [*whole, ("range", tiles), ("grid", tiles), ("buffer", tiles)]
+    return [*whole, ("range", tiles), ("grid", tiles), ("box", tiles)]
+
+
+def in_tiles(tiling: Tiling) -> int:
+    """Number of the points in the tiles."""
+    return int(tiling.range[: tiling.count[0], 1].max(initial=0))
 
 
 def used(spans: np.ndarray) -> np.ndarray:
