@@ -123,6 +123,7 @@ class Buffers(NamedTuple):
     count: np.ndarray  # (2,) int64: number of tiles of nodes in use; whether boxes are the nodes
     first: np.ndarray  # (T + 2,) int64: parts of the k-th of them are first[k]:first[k + 1]
     parts: np.ndarray  # (p, 10) int64
+    number: int  # of these among the buffers of a scene
 
 
 class Places(NamedTuple):

@@ -65,7 +65,7 @@ from karamelo_py.kernels.p2g import (
     SeriesBack,
     Volumes,
 )
-from karamelo_py.kernels.sums import adds
+from karamelo_py.kernels.sums import adds, given
 from karamelo_py.kernels.sweep import (
     OldWeights,
     Visit,
@@ -73,7 +73,7 @@ from karamelo_py.kernels.sweep import (
     sweep_nodes,
     sweep_points,
 )
-from karamelo_py.kernels.totals import agree_on_reports
+from karamelo_py.kernels.totals import agree_on_reports, exchange
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.basis import placed
@@ -147,6 +147,8 @@ def _visit(s, mode, visit, then, gathers, scatters, dt):
 def sum_all(mode, quantities, s, due):
     """Sum at the nodes what the points gave, if they did."""
     if len(quantities):
+        boxes = due & (s.buffers.count[1] == 0)
+        exchange(s.control.ranks, s.buffers, boxes, given(quantities, s.kin))
         sum_buffers(mode, quantities, s, due)
 
 

@@ -32,6 +32,14 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
     return [(array, first, end) for (array, end), first in found.items()]
 
 
+@shared
+def given(quantities, kin):
+    """Which arrays of the nodes the quantities give to: 1 the sums, 2 velocities, 4 fields."""
+    names = {name for name, _, _ in columns_of(quantities, kin)}
+    fields = any(not isinstance(name, str) for name in names)
+    return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields
+
+
 def _array(nodes: Nodes, name: Any) -> Any:
     return getattr(nodes, name) if isinstance(name, str) else field(nodes.fields, name)
 

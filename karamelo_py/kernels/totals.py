@@ -139,6 +139,16 @@ def _(ranks, control):
     return None
 
 
+@point_function()
+def exchange(ranks, buffers, due, what):
+    """Get what the tiles of other processes give to nodes in use here; `what` as of `given`."""
+
+
+@exchange.on(Alone)
+def _(ranks, buffers, due, what):
+    return None
+
+
 @shared
 def publish(control, slot, count):
     """The published values from `slot` on become those of their totals."""

@@ -67,7 +67,7 @@ class Tiles:
         self.per_cell = type(basis).nodes_per_cell
         self.least_nodes = type(basis).least_nodes
         self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
-        self.sorts = 0
+        self.sorts = self.sets = 0
         self.occupied = 0
         # By grid and direction: nodes, cells, and so on.
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
@@ -107,7 +107,8 @@ class Tiles:
                     type(one)(np.zeros((0, one.array.shape[1]), one.array.dtype)) for one in given
                 ),
             )
-        return Buffers(of, *self._layout)
+        self.sets += 1
+        return Buffers(of, *self._layout, self.sets - 1)
 
     def in_use(self, s: Setup) -> list[tuple[str, np.ndarray, int]]:
         """The arrays that a sort changes beside the points, and how many rows of them are in use.
@@ -236,7 +237,7 @@ class Tiles:
             parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
             parts[:, 9] = CLEAR
             firsts = np.arange(len(spans) + 1)
-        _, count, *rooms = s.buffers
+        count, *rooms = s.buffers[1:4]
         count[:] = len(firsts) - 1, self.direct
         for room, found in zip(rooms, (firsts, parts), strict=True):
             grow(room, len(found))
