@@ -53,24 +53,80 @@ def test_external_force_of_nodes_and_rate_of_momentum(run_interpreted):
 
 
 def test_reaction_and_internal_force_of_a_support(run_interpreted):
-    """All nodes held against gravity: the reaction is the weight, shared or conflicting or not.
-
-    A third fix on nodes that are held already takes over and the sum stays.
-    """
+    """All nodes held against gravity: the reaction is the weight, shared or conflicting or not."""
     log = run_interpreted(
         block(
-            2, "region(every, block, -INF, INF, -INF, INF)",
-            "region(low, block, INF, INF, INF, 0.41)",
-            "group(nodes, nodes, region, every, all)", "group(foot, nodes, region, low, all)",
-            "fix(hold, velocity_nodes, nodes, 0, 0)", "fix(more, velocity_nodes, foot, 0, 0)",
+            2, *NODES,
+            "fix(hold, velocity_nodes, nodes, 0, 0)", "fix(more, velocity_nodes, low, 0, 0)",
             "fix(g, body_force, all, NULL, -9)", "compute(R, reaction, nodes)",
             "compute(Rall, reaction, all)",
-            "log_modify(custom, step, R_y, Rall_y, external_force(nodes, y), hold_y)",
+            "log_modify(custom, step, R_y, Rall_y, external_force(nodes, y), hold_y, more_y)",
             "set_dt(0.001)", "run(4)",
         )
     ).log  # fmt: skip
     assert log.R_y[1:] == pytest.approx(np.full(4, 9 * MASS), rel=1e-9)
     assert (log.Rall_y == log.R_y).all()
+    # Of the three rows of nodes those at the faces have half the mass of that between them.
+    assert log.more_y[1:] == pytest.approx(np.full(4, 0.75 * 9 * MASS), rel=1e-9)
+    assert log.hold_y[1:] == pytest.approx(np.full(4, 0.25 * 9 * MASS), rel=1e-9)
+
+
+NODES = [
+    line
+    for name, box in {
+        "nodes": "INF, INF, INF, INF", "low": "INF, INF, INF, 0.41", "up": "INF, INF, 0.41, INF",
+        "left": "INF, 0.41, INF, INF", "right": "0.41, INF, INF, INF",
+        "rest": "0.41, INF, INF, 0.41",
+    }.items()
+    for line in (f"region({name}, block, {box})", f"group({name}, nodes, region, {name}, all)")
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("together", "apart"),
+    [
+        (["nodes, 0, 0", "low, 0.2*time, NULL"],
+         ["1: up, 0, NULL", "1: nodes, NULL, 0", "2: low, 0.2*time, NULL"]),
+        (["low, 0.2*time, NULL", "nodes, 0, 0"], ["2: nodes, 0, 0"]),
+        (["nodes, 0, 0", "low, 0.2*time, NULL", "left, NULL, 0.1"],
+         ["1: up, 0, NULL", "1: right, NULL, 0", "2: low, 0.2*time, NULL", "3: left, NULL, 0.1"]),
+        (["nodes, 0, 0", "low, 5, 0", "left, 1, NULL", "nodes, 0.3, NULL"],
+         ["4: nodes, 0.3, NULL", "1: up, NULL, 0", "2: low, NULL, 0"]),
+        (["nodes, NULL, 0", "low, NULL, geq0.05", "left, NULL, leq1"],
+         ["1: up, NULL, 0", "2: low, NULL, geq0.05"]),
+        (["low, NULL, 0, mu=0.1", "left, NULL, geq0.02, mu=0.2"],
+         ["1: rest, NULL, 0, mu=0.1", "2: left, NULL, geq0.02, mu=0.2"]),
+        (["low, NULL, 0, mu=0.1", "left, 0.1, NULL"],
+         ["1: rest, NULL, 0, mu=0.1", "1: lowleft, NULL, 0", "2: left, 0.1, NULL"]),
+    ],
+)  # fmt: skip
+def test_the_fix_that_decides_has_the_reaction(run_interpreted, together, apart):
+    """As if each fix had the nodes and directions alone in which it is the last to hold."""
+    nodes = [*NODES, "region(lowleft, block, INF, 0.41, INF, 0.41)"]
+    nodes.append("group(lowleft, nodes, region, lowleft, all)")
+
+    def reactions(fixes):
+        names = [f"f{k}_{axis}" for k in range(len(fixes)) for axis in "xy"]
+        lines = [f"fix(f{k}, velocity_nodes, {fix})" for k, fix in enumerate(fixes)]
+        log = run_interpreted(
+            block(
+                2, *nodes, "fix(g, body_force, all, 4, -9)", *lines, "compute(R, reaction, all)",
+                f"log_modify(custom, step, R_x, R_y, {', '.join(names)})",
+                "set_dt(0.001)", "run(3)",
+                transfer="PIC",
+            )
+        ).log  # fmt: skip
+        columns = np.array([log[name][1:] for name in ["R_x", "R_y", *names]])
+        return columns.reshape(1 + len(fixes), 2, 3)
+
+    owners, alone = zip(*(line.split(": ") for line in apart), strict=True)
+    total, *each = reactions(together)
+    expected, *parts = reactions(alone)
+    size = np.abs(expected).max()
+    assert total == pytest.approx(expected, abs=1e-9 * size)
+    for k, reaction in enumerate(each, 1):
+        own = sum((p for p, owner in zip(parts, owners, strict=True) if owner == str(k)), 0 * total)
+        assert reaction == pytest.approx(own, abs=1e-9 * size)
 
 
 def test_reaction_of_a_part_of_a_fix_is_refused(run_interpreted):

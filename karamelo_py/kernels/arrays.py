@@ -156,6 +156,7 @@ HOOK = np.dtype(
         ("slot", np.int64),  # of the published total; -1: none
         ("uses_before", np.int64),  # the value one step earlier
         ("uses_share", np.int64),  # one over the number of members with mass
+        ("holds", np.int64),  # sets the velocity, or bounds it
     ]
 )
 PROGRAM = np.dtype(
@@ -166,6 +167,8 @@ PROGRAM = np.dtype(
         ("last", np.int64),
     ]
 )
+# Who holds a node in one direction, and with what force.
+HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the total, 0: nobody
 
 
 class Hooks(NamedTuple):
@@ -180,6 +183,7 @@ class Hooks(NamedTuple):
     x0: np.ndarray  # (n, d) reference positions of the points, by id
     chosen: np.ndarray  # (BLOCK,) int64 scratch
     scratch: np.ndarray  # (8 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack
+    held: np.ndarray  # (N, d) HELD, where hooks hold nodes in common; else (0, d)
 
 
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch

@@ -7,7 +7,8 @@ functions are called by address, so a new list of fixes compiles nothing but the
 Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star, force, total)``
     `value` and `before` are the formula at the time of the step and one step earlier, `share` is
     one over the number of members with mass; the totals are summed and published, with what
-    a change of v before the update adds to the momentum of points over dt.
+    a change of v before the update adds to the momentum of points over dt. Of the hooks that hold
+    a node, the last to bring v_star to its value decides: it gets what the others had of that node.
     `dt` is the time that forces act for in the step, half of the last step and half of this one.
 Point function ``(mass, v, x_old, x, value, before, dt, kick) -> (v, x, total)``
     `dt` is the time that the point moves for, `kick` the time that forces act for.
@@ -86,6 +87,8 @@ HEAT_STAGES = {
 }
 STAGES = NODE_STAGES | POINT_STAGES | HEAT_STAGES
 
+COUNT, ACT, RUB = 0, 1, 2  # what is done with the members of a hook
+
 
 class CompiledHook(NamedTuple):
     """A scalar function that the compiled loop applies to each component of each member."""
@@ -95,6 +98,7 @@ class CompiledHook(NamedTuple):
     publishes: bool  # its totals become ID_x, ID_y, ID_z
     uses_before: bool  # needs the formulas one step earlier as well
     uses_share: bool  # needs one over the number of members with mass
+    holds: bool  # sets v_star, or bounds it: one of several decides
 
     @property
     def on_nodes(self) -> bool:
@@ -116,22 +120,27 @@ ACTS_ON = {
 
 
 def node_hook(
-    function: Callable, *, publishes: bool = True, uses_before: bool = False, shares: bool = False
+    function: Callable,
+    *,
+    publishes: bool = True,
+    uses_before: bool = False,
+    shares: bool = False,
+    holds: bool = False,
 ) -> CompiledHook:
     """A compiled hook on nodes: `function` as described at the head of this file."""
-    return CompiledHook(function, "nodes", publishes, uses_before, shares)
+    return CompiledHook(function, "nodes", publishes, uses_before, shares, holds)
 
 
 def point_hook(
     function: Callable, *, publishes: bool = False, uses_before: bool = False
 ) -> CompiledHook:
     """A compiled hook on points: `function` as described at the head of this file."""
-    return CompiledHook(function, "points", publishes, uses_before, False)
+    return CompiledHook(function, "points", publishes, uses_before, False, False)
 
 
 def heat_hook(function: Callable, *, publishes: bool = False) -> CompiledHook:
     """A compiled hook for ``supply_heat``: `function` as described at the head of this file."""
-    return CompiledHook(function, "heated points", publishes, False, False)
+    return CompiledHook(function, "heated points", publishes, False, False, False)
 
 
 @subkernel
@@ -175,10 +184,34 @@ def _locate_nodes(kin, grids, hooks, count):
 
 
 @subkernel
-def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, count, share):
+def _clear_held(kin, spans, held):
+    """Nobody holds a node yet."""
+    if held.size > 0:
+        for s in range(1, 1 + spans[0, 0]):
+            for n in range(spans[s, 0], spans[s, 1]):
+                for c in range(dimension(kin)):
+                    held[n, c].slot = 0
+
+
+@subkernel
+def _taken_over(hooks, control, h, n, c, force):
+    """Hook `h` holds node `n` by `force`: what those had of it that held it before."""
+    before = 0.0
+    if hooks.held.size > 0 and hooks.table[h].holds:
+        held = hooks.held[n, c]
+        if held.slot > 0:
+            before = held.force
+            if counts(control.ranks, n):
+                add_to(control.totals, held.slot - 1, -before)
+        held.slot = 1 + hooks.table[h].slot + c
+        held.force = before + force
+    return before
+
+
+@subkernel
+def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, share):
     """Act on the chosen nodes; add to the totals, and to the work that is done."""
     step_back = min(control.clock[0].last_dt, control.values[TIME])  # nothing was before time 0
-    _locate_nodes(kin, grids, hooks, count)
     d = dimension(kin)
     slot = hooks.table[h].slot
     for c in range(d):
@@ -189,7 +222,7 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
             _evaluate(hooks, h, c, count, control, np.int64(BEFORE), -step_back)
         for q in range(count):
             n = hooks.chosen[q]
-            work = 0.0
+            work = before = 0.0
             mass = nodes.sums[n, MASS]
             if target == ON_SUMS:
                 v = nodes.sums[n, of_momentum(kin) + c] / mass
@@ -216,6 +249,8 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
             if target == ON_UPDATE:
                 # Points that keep their velocity take the change v* - v: another v is an impulse.
                 total += kept * mass * (old - v) / dt
+                if star == hooks.scratch[VALUE, q]:
+                    before = _taken_over(hooks, control, h, n, c, total)
             # Impulse times the mean of the velocities before and after it.
             if target == ON_SUMS:
                 work = dt * (force - old_force) * (v + 0.5 * dt * (force + old_force) / mass)
@@ -232,8 +267,7 @@ def _apply_at_nodes(target, kin, grids, nodes, hooks, control, dt, kept, h, coun
                 add_to(control.totals, WORK, work)
                 if slot >= 0:
                     add_to(control.totals, slot + c, total)
-    if hooks.programs[h, FRICTION].begin >= 0:
-        _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count)
+                    add_to(control.totals, slot + c, before)
 
 
 @subkernel
@@ -249,7 +283,7 @@ def _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count):
     slot = hooks.table[h].slot
     for q in range(count):
         n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
-        rub(kin, nodes, programs, n, mu, dt, kept, control, slot)
+        rub(kin, nodes, programs, hooks.held, n, mu, dt, kept, control, slot)
 
 
 @subkernel
@@ -274,6 +308,45 @@ def publish_total(hooks, h, control):
             publish(control, slot + c, 1)
 
 
+@subkernel
+def _go_through(task, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share):
+    """Do `task` with the members that have mass, block by block; return their number here."""
+    heavy = 0
+    count = np.int64(0)  # a bare 0 would be a type of its own
+    begin = hooks.table[h].begin
+    everything = begin < 0
+    ranges = spans[0, 0] if everything else 1
+    for s in range(ranges):
+        low = spans[1 + s, 0] if everything else begin
+        high = spans[1 + s, 1] if everything else hooks.table[h].end
+        for m in range(low, high):
+            n = m if everything else hooks.members[m]
+            if not nodes.sums[n, MASS] > 0:
+                continue
+            if task == COUNT:
+                heavy += counts(control.ranks, n)
+                continue
+            hooks.chosen[count] = n
+            count += 1
+            if count == BLOCK:
+                _do_at_nodes(
+                    task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
+                )
+                count = np.int64(0)
+    if count > 0:
+        _do_at_nodes(task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share)
+    return heavy
+
+
+@subkernel
+def _do_at_nodes(task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share):
+    _locate_nodes(kin, grids, hooks, count)
+    if task == RUB:
+        _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count)
+    else:
+        _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, share)
+
+
 @entered
 def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
@@ -281,44 +354,29 @@ def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept
     `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
     """
     dt = float(dt)
+    if target == ON_UPDATE:
+        _clear_held(kin, spans, hooks.held)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
         clear_total(hooks, h, control)
         share = 1.0
-        # The first pass only counts the members with mass, for those that share a total.
-        for counting in (True, False):
-            if counting and not hooks.table[h].uses_share:
-                continue
-            heavy = 0
-            count = np.int64(0)  # a bare 0 would be a type of its own
-            begin = hooks.table[h].begin
-            everything = begin < 0
-            ranges = spans[0, 0] if everything else 1
-            for s in range(ranges):
-                low = spans[1 + s, 0] if everything else begin
-                high = spans[1 + s, 1] if everything else hooks.table[h].end
-                for m in range(low, high):
-                    n = m if everything else hooks.members[m]
-                    if not nodes.sums[n, MASS] > 0:
-                        continue
-                    if counting:
-                        heavy += counts(control.ranks, n)
-                        continue
-                    hooks.chosen[count] = n
-                    count += 1
-                    if count == BLOCK:
-                        _apply_at_nodes(
-                            target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
-                        )
-                        count = np.int64(0)
-            if counting:
-                share = 1.0 / max(number_of_all(control.ranks, control, heavy), 1)
-            elif count > 0:
-                _apply_at_nodes(
-                    target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
-                )
+        if hooks.table[h].uses_share:
+            heavy = _go_through(
+                COUNT, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share
+            )
+            share = 1.0 / max(number_of_all(control.ranks, control, heavy), 1)
+        _go_through(ACT, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share)
         publish_total(hooks, h, control)
+    # Walls rub when it is known which of them hold a node.
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage != stage:
+            continue
+        rubs = hooks.programs[h, FRICTION].begin >= 0
+        if rubs:
+            _go_through(RUB, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, 1.0)
+        if rubs or (hooks.table[h].holds and hooks.held.size > 0):
+            publish_total(hooks, h, control)
 
 
 class Motion(NamedTuple):

@@ -20,11 +20,18 @@ FRICTION = 3  # the program of the coefficient, behind those of the components
 
 
 @subkernel
-def rub(kin, nodes, programs, n, mu, dt, kept, control, slot):
+def _is_free(held, programs, n, c):
+    """Whether no fix holds node `n` in direction `c`, as far as the fix of `programs` knows."""
+    return programs[c].begin < 0 and (held.size == 0 or held[n, c].slot == 0)
+
+
+@subkernel
+def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
     """Give node `n` the friction of its wall; add the force to the totals from `slot` on.
 
     `programs` are those of the hook that has held the node: what it changed v and v* by, of which
     points that keep the share `kept` of their velocity take both, is the impulse across the wall.
+    Where several fixes hold the node (`held`), each rubs for the directions in which it decides.
     """
     d = dimension(kin)
     mass = nodes.sums[n, MASS]
@@ -32,8 +39,9 @@ def rub(kin, nodes, programs, n, mu, dt, kept, control, slot):
     along = 0.0
     for c in range(d):
         star = nodes.update[n, c]
-        if programs[c].begin < 0:
+        if _is_free(held, programs, n, c):
             along += star * star
+        if programs[c].begin < 0 or (held.size > 0 and held[n, c].slot != 1 + slot + c):
             continue
         v = nodes.sums[n, of_momentum(kin) + c] / mass
         free = v + dt * nodes.sums[n, of_force(kin) + c] / mass
@@ -47,7 +55,7 @@ def rub(kin, nodes, programs, n, mu, dt, kept, control, slot):
     # The work of friction, with the mean of the speeds before and after; a wall takes no heat.
     warm_node(field(nodes.fields, Rubbed), n, stop * (speed - 0.5 * stop))
     for c in range(d):
-        if programs[c].begin < 0:
+        if _is_free(held, programs, n, c):
             taken = nodes.update[n, c] * (stop / speed)
             nodes.update[n, c] -= taken
             nodes.update[n, of_change(kin) + c] -= taken

@@ -8,7 +8,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import address_of
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
-from karamelo_py.kernels.arrays import HOOK, PROGRAM, Hooks, NoHooks
+from karamelo_py.kernels.arrays import HELD, HOOK, PROGRAM, Hooks, NoHooks
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import told
@@ -39,6 +39,7 @@ def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
         x0=np.empty((0, dimension)) if x0 is None else x0,
         chosen=np.zeros(BLOCK, np.int64),
         scratch=np.zeros((STACK + ROWS, BLOCK)),
+        held=np.zeros((builder.shared_nodes(), dimension), HELD).view(np.recarray),
     )
 
 
@@ -54,6 +55,7 @@ class _Builder:
         self.members: list[np.ndarray] = []
         self.code: list[np.ndarray] = []
         self.constants: list[np.ndarray] = []
+        self.holding: list[Any] = []
 
     def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
         """Add one compiled hook of a fix, which acts at `moment` of a step."""
@@ -65,12 +67,25 @@ class _Builder:
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         with told(f"fix {fix.style}", moment, hook.function, fix.place):
             address = address_of(hook.function, hook.signature)
-        uses = int(hook.uses_before), int(hook.uses_share)
+        uses = int(hook.uses_before), int(hook.uses_share), int(hook.holds and slot >= 0)
         self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
         programs = [self._program(formula) for formula in fix.formulas]
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
         self.programs.append([*programs, self._program(fix.wall_friction)])
         self.on_points |= not hook.on_nodes
+        if hook.holds:
+            self.holding.append(fix.group)
+
+    def shared_nodes(self) -> int:
+        """The number of nodes, where hooks hold some of them in common; else 0."""
+        groups = self.holding
+        if len(groups) < 2:
+            return 0
+        if not any(group.all for group in groups):
+            nodes = np.concatenate([group.nodes for group in groups])
+            if len(np.unique(nodes)) == len(nodes):
+                return 0
+        return groups[0].total()
 
     def _members(self, group: Any, hook: CompiledHook) -> tuple[int, int]:
         if group.all:

@@ -36,7 +36,8 @@ class TemperatureNodes(HeatFix):
 
     Notes
     -----
-    Publishes the heat per time that the nodes need for it as ID_s.
+    Publishes the heat per time that the nodes need for it as ID_s. Where several such fixes hold a
+    node, the last of them decides and has the heat of that node.
 
     See Also
     --------
@@ -44,7 +45,7 @@ class TemperatureNodes(HeatFix):
     """
 
     post_heat_to_grid = node_hook(prescribe_mapped, publishes=False)
-    post_update_grid_heat = node_hook(prescribe)
+    post_update_grid_heat = node_hook(prescribe, holds=True)
 
     def __init__(self, hub: Hub, group: NodeGroup, T: Expression):
         super().__init__(hub, group, T)

@@ -101,8 +101,8 @@ class VelocityNodes(Fix):
     -----
     Publishes the reaction, the force that holds the nodes, as ID_x, ID_y, ID_z, friction among it.
     The work of friction heats the points, where they have a temperature; the wall takes none of it.
-    Where two such fixes hold a node in one direction, the later one decides, and has the rest of
-    the reaction.
+    Where several such fixes hold a node in one direction, the last of them decides: the whole
+    reaction of that node is its, and it alone rubs. A bound that a node keeps within holds nothing.
 
     See Also
     --------
@@ -113,7 +113,7 @@ class VelocityNodes(Fix):
     published = ("x", "y", "z")
     prescribes_velocity = True
 
-    post_update_grid_state = node_hook(prescribe, uses_before=True)
+    post_update_grid_state = node_hook(prescribe, uses_before=True, holds=True)
     post_velocities_to_grid = node_hook(prescribe_mapped, publishes=False)
 
     def __init__(
@@ -144,7 +144,7 @@ class VelocityNodes(Fix):
             # Contact may move these nodes: they are held only as far as they come.
             self.prescribes_velocity = False
             self.post_update_grid_state = node_hook(
-                prescribe_at_most if most else prescribe_at_least
+                prescribe_at_most if most else prescribe_at_least, holds=True
             )
             self.post_velocities_to_grid = node_hook(
                 prescribe_mapped_at_most if most else prescribe_mapped_at_least, publishes=False
