@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 from karamelo_py import __version__
 from karamelo_py.app.outputs import add_output_options, direct
 from karamelo_py.app.start import INTERRUPTED, leaving_at_once
+from karamelo_py.run.crew import launched
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, nearest, render_message
 
@@ -149,6 +150,10 @@ def _parser(command: str) -> CommandLine:
             help="threads to use (default: all cores where the scene is large enough)",
         )  # fmt: skip
         script.add_argument(
+            "--ranks", type=ranks_option, metavar="N", default=None,
+            help="processes that share the scene (MPI); threads are those of each",
+        )  # fmt: skip
+        script.add_argument(
             "--trust-geometries", action="store_true",
             help="let .geo files run programs and write files",
         )  # fmt: skip
@@ -188,10 +193,24 @@ def threads_option(text: str) -> int | None:
     return int(text)
 
 
+def ranks_option(text: str) -> int:
+    """The value of --ranks."""
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of processes (1, 2, ...)")
+    return int(text)
+
+
 def _run(options: argparse.Namespace) -> int:
     script = options.input or options.script
     if script is None:
         raise ScriptError("no script is named", expected="karamelo-py SCRIPT")
+    crew = None
+    if (options.ranks or launched()[0]) > 1:
+        from karamelo_py.app.launch import join, launch
+
+        if launched()[0] == 1:
+            return launch(options.ranks)
+        crew = join(options.ranks)
     with leaving_at_once():
         from karamelo_py.language.interpreter import Interpreter
         from karamelo_py.output.console import Console
@@ -200,6 +219,10 @@ def _run(options: argparse.Namespace) -> int:
 
     hub = Hub(Console(quiet=options.quiet))
     hub.settings.threads = options.threads
+    if crew is not None:
+        from karamelo_py.app.launch import share
+
+        share(hub, crew)
     hub.settings.debug = options.debug
     hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking

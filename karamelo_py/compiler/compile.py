@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import gc
 import inspect
@@ -460,6 +461,19 @@ def address_of(function: Callable, signature: numba.types.Type) -> int:
             _keep_alive.append(compiled)
             _addresses[function] = compiled.address
     return _addresses[function]
+
+
+def address_of_python(function: Callable, signature: numba.types.Type) -> int:
+    """The address by which kernels call a function of Python, of whole numbers.
+
+    Nothing may be raised in it.
+    """
+    if config.DISABLE_JIT:
+        _uncompiled.append(function)
+        return len(_uncompiled) - 1
+    made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(signature.args))(function)
+    _keep_alive.append(made)
+    return ctypes.cast(made, ctypes.c_void_p).value
 
 
 def caller_of(signature: numba.types.Type) -> Callable:

@@ -97,6 +97,7 @@ class Tiling(NamedTuple):
     share: np.ndarray  # (S + 1,) int64: tiles of the k-th share are share[k]:share[k + 1]
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
     grid: np.ndarray  # (T + 1,) int64: the grid that the k-th occupied tile belongs to
+    number: np.ndarray  # (T + 1,) int64: of the k-th occupied tile among all
     box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes that its points may reach
     buffer: np.ndarray  # (T + 1, 5) int64: its records in the buffers begin and end; Grid.first,
     #                     step_x and step_y of the numbers that its nodes have there

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.compile import caller_of, subkernel
+from karamelo_py.compiler.compile import caller_of, entered
 from karamelo_py.kernels.totals import (
     agree_on_heat,
     agree_on_reports,
@@ -34,7 +34,7 @@ class Linked(NamedTuple):
     foreign: np.ndarray  # (N,) uint8: 1 where another process adds up what a node gives
 
 
-@subkernel
+@entered
 def _ask(address, what, a, b):
     return _call(address, what, a, b)
 
@@ -64,7 +64,7 @@ def _(ranks, control):
     _ask(ranks.address, HEAT, 0, 0)
 
 
-@subkernel
+@entered
 def _ask_if(due, address, what, a, b):
     if due:
         _call(address, what, a, b)

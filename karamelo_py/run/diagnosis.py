@@ -35,7 +35,7 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> tuple[str, str]:
         return _heated(hub, simulation)
     message, hint = _wrong_point(hub, simulation)
     message = f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}"
-    clock = simulation.setup.control.clock[0]
+    clock = simulation.control.clock[0]
     if clock.watch_energy and clock.grown > IN_ALL:
         cause, cure = cause_of_gain(hub, simulation)
         message += f", after energy had come from nowhere. Known to do that here: {cause}"
@@ -73,7 +73,7 @@ def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 
 
 def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    clock = simulation.setup.control.clock[0]
+    clock = simulation.control.clock[0]
     given = abs(clock.first_balance) + clock.supplied
     cause, cure = cause_of_gain(hub, simulation)
     times = (clock.balance - clock.first_balance) / given if given > 0 else np.inf
@@ -86,7 +86,7 @@ def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 
 
 def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    clock = simulation.setup.control.clock[0]
+    clock = simulation.control.clock[0]
     message = (
         f"step {simulation.step}, time {simulation.time:.6g}: temperatures have come to be between "
         f"{clock.T_low:.4g} and {clock.T_high:.4g}, where initial state, fixes and sources allow "

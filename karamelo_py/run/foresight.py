@@ -117,7 +117,7 @@ class Foreseen:
     @cached_property
     def waves(self) -> float:
         """The speed of waves."""
-        return float(self.simulation.setup.control.clock[0].rate - np.abs(self.motion[1]).max())
+        return float(self.simulation.control.clock[0].rate - np.abs(self.motion[1]).max())
 
     @cached_property
     def speed(self) -> float:

@@ -70,6 +70,8 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
     import h5py
 
     path = path_of(hub, file)
+    if hub.settings.crew is not None and not hub.settings.crew.leads:
+        return path
     arrays: list[np.ndarray] = []
     interpreter = hub.interpreter
     content = {

@@ -101,8 +101,11 @@ class Runner:
             return
         hub.running = self
         try:
-            with self._telling_of_compilation(), blamed(hub):
-                self._run(hub.simulation)
+            if hub.simulation.follows:
+                hub.simulation.follow()
+            else:
+                with self._telling_of_compilation(), blamed(hub), hub.simulation.leading():
+                    self._run(hub.simulation)
         finally:
             hub.running = None
         hub.runs.append(self._values())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from karamelo_py.kernels.arrays import (
     TIMESTEP,
     Hooks,
     NoHooks,
+    Setup,
 )
 from karamelo_py.kernels.export import impose_stress
 from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points, show_heat
@@ -157,6 +159,7 @@ class Simulation:
         self.key = scene_key(hub)
         state = previous.state() if previous else None
         self.setup, self.tiles = lower(hub, state)
+        self.control = self.setup.control
         try_parts(hub, self.setup)
         self.count = sum(len(s.x0) for s in hub.solids.values())
         self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
@@ -181,6 +184,18 @@ class Simulation:
         self.told_of_growth = False  # since it is followed
         self.mapped = False  # whether the nodes show a state of this simulation
 
+    follows = False  # another process says what this one does in a run
+
+    @contextmanager
+    def leading(self) -> Iterator[None]:
+        """While a run goes on: other processes, if there are any, follow this one."""
+        yield
+
+    @property
+    def stepped(self) -> Setup:
+        """The arrays that steps work on."""
+        return self.setup
+
     def fits(self, hub: Hub) -> bool:
         """Whether the arrays are still those of the scene."""
         return self.key == scene_key(hub)
@@ -190,7 +205,7 @@ class Simulation:
     @property
     def now(self) -> int:
         """Which of the two position arrays is the present one."""
-        return int(self.setup.control.clock[0].now)
+        return int(self.control.clock[0].now)
 
     def by_id(self, field: Callable) -> np.ndarray:
         """A field of all points in the order of their ids; `field` takes it from `Points`.
@@ -264,7 +279,7 @@ class Simulation:
             laws,
             {kind: self.declared(kind).T for kind in kept},
             self.setup.contact,
-            float(self.setup.control.clock[0].last_dt),
+            float(self.control.clock[0].last_dt),
         )
 
     def set_stress(self, ids: np.ndarray, given: dict[str, np.ndarray]) -> None:
@@ -291,7 +306,7 @@ class Simulation:
         self.present[ids] = False
         blocks = tuple(chosen(block, self.present[block.points.id]) for block in self.setup.blocks)
         self.setup = self.setup._replace(blocks=blocks)
-        self.setup.control.clock[0].drift = np.inf
+        self.control.clock[0].drift = np.inf
         self.version += 1
         # The rate of the last step stays: the same whether or not a run begins here.
         self._measured = self.version
@@ -332,7 +347,7 @@ class Simulation:
 
     def clear_forces(self) -> None:
         """Points bear no force of fixes, until these say so anew."""
-        for block in self.setup.blocks:
+        for block in self.stepped.blocks:
             force = field(block.points.fields, Force)
             if force is not None:
                 force[:] = 0
@@ -346,7 +361,7 @@ class Simulation:
         if self.threads > 1:
             numba.set_num_threads(self.threads)
         update = self.hub.update
-        clock = self.setup.control.clock[0]
+        clock = self.control.clock[0]
         clock.courant = stable_courant(self.hub)
         self._ask_for_steps(0)
         clock.end_time = end_time
@@ -371,12 +386,12 @@ class Simulation:
     def halve_step(self, times: int) -> None:
         """From here on in this run the step is that of its start, halved so many `times`."""
         self._ask_for_steps(times)
-        choose_dt(self.setup.control)
+        choose_dt(self.control)
         self._watch_limit()
 
     def _ask_for_steps(self, halvings: int) -> bool:
         """Tell the clock which steps are asked for; whether these are others than before."""
-        clock = self.setup.control.clock[0]
+        clock = self.control.clock[0]
         before = clock.fixed_dt, clock.dt_factor, clock.heat_factor
         asked = self.hub.update.fixed_dt or 0.0, *shares_of_limits(self.hub)
         now = tuple(number / 2**halvings for number in asked)
@@ -385,7 +400,7 @@ class Simulation:
 
     def _watch_limit(self) -> None:
         """A step that is above its limit from the start is what the user wants."""
-        clock = self.setup.control.clock[0]
+        clock = self.control.clock[0]
         clock.watch_limit = int(not self.above_limit())
         clock.over_limit = 0
 
@@ -428,16 +443,16 @@ class Simulation:
 
         if self.threads > 1:
             numba.set_num_threads(self.threads)
-        update, clock = self.hub.update, self.setup.control.clock[0]
+        update, clock = self.hub.update, self.control.clock[0]
         self._prepare_hooks()
         update.method.begin(self.hub, self.setup.contact)
         other_end, clock.end_time = clock.end_time != end_time, end_time
         over_limit = clock.over_limit
         if self._ask_for_steps(halvings):
-            choose_dt(self.setup.control)
+            choose_dt(self.control)
             self._watch_limit()
         elif other_end:
-            choose_dt(self.setup.control)
+            choose_dt(self.control)
             clock.over_limit = over_limit
 
     def _choose_dt(self) -> None:
@@ -445,22 +460,22 @@ class Simulation:
             # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
             measure(self.setup)
             self._measured = self.version
-        choose_dt(self.setup.control)
+        choose_dt(self.control)
 
     def sort(self) -> None:
         """Sort the points by tile."""
-        self.tiles.sort(self.setup)
+        self.tiles.sort(self.stepped)
 
     def sort_if_due(self) -> None:
         """Sort the points when one may have left its tile's surroundings, or none is sorted yet."""
-        clock = self.setup.control.clock[0]
+        clock = self.control.clock[0]
         if clock.drift > clock.drift_limit:
             self.sort()
 
     @property
     def limit(self) -> float:
         """The stable step of the present state."""
-        return float(self.setup.control.clock[0].limit)
+        return float(self.control.clock[0].limit)
 
     @property
     def ruling_limit(self) -> str:
@@ -469,22 +484,22 @@ class Simulation:
 
     def above_limit(self) -> bool:
         """Whether the chosen step is above the stable limit already."""
-        return self.setup.control.values[DT] > self.limit * (1 + 1e-12)
+        return self.control.values[DT] > self.limit * (1 + 1e-12)
 
     @property
     def dt(self) -> float:
         """The next step."""
-        return float(self.setup.control.values[DT])
+        return float(self.control.values[DT])
 
     @property
     def time(self) -> float:
         """Present time."""
-        return float(self.setup.control.values[TIME])
+        return float(self.control.values[TIME])
 
     @property
     def step(self) -> int:
         """Number of steps taken in the whole script."""
-        return int(self.setup.control.values[TIMESTEP])
+        return int(self.control.values[TIMESTEP])
 
     def advance(self, count: int) -> int:
         """Take up to `count` steps (to the end time at most); DONE, or why it stopped.
@@ -493,7 +508,7 @@ class Simulation:
         showing the last one.
         """
         target = self.step + count
-        control = self.setup.control
+        control = self.control
         while True:
             self.sort_if_due()
             status = self._advance(target - self.step)
@@ -511,13 +526,13 @@ class Simulation:
         if numba.config.DISABLE_JIT or self._python.by_stage:
             return
         visits = Staged() if self.staged else Fused()
-        arguments = (self.hub.update.scheme, visits, self.mode, self.setup, self.hooks, 1)
+        arguments = (self.hub.update.scheme, visits, self.mode, self.stepped, self.hooks, 1)
         advance.compile(tuple(numba.typeof(argument) for argument in arguments))
 
     def _advance(self, count: int) -> int:
         scheme = self.hub.update.scheme
         if self._first is not None:
-            status = run_steps(scheme, Staged(), self.mode, self.setup, self._first, 1)
+            status = run_steps(scheme, Staged(), self.mode, self.stepped, self._first, 1)
             if status in (DONE, SORT):
                 self._begun |= set(self._first_fixes)
                 self._first = None
@@ -525,9 +540,9 @@ class Simulation:
                 return SORT  # there is more to do, unless that was all
             return status
         if self._python.by_stage:
-            return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
+            return run_steps(scheme, Staged(), self.mode, self.stepped, self._python, count)
         visits = Staged() if self.staged else Fused()
-        return advance(scheme, visits, self.mode, self.setup, self.hooks, count)
+        return advance(scheme, visits, self.mode, self.stepped, self.hooks, count)
 
     def _prepare_hooks(self) -> None:
         """Sort the fixes by how they act: once before the first step, in it, in every step."""
@@ -545,7 +560,7 @@ class Simulation:
             for view in self._views(fix):
                 fix.hooks()["initial_integrate"](view)
                 if view.moved:
-                    self.setup.control.clock[0].drift = np.inf
+                    self.control.clock[0].drift = np.inf
             self.version += 1
         self._begun |= set(at_once)
         self._first_fixes = [fix for fix in new if fix not in at_once]
@@ -591,7 +606,7 @@ class Simulation:
         The copies of the snapshot `before`, which is lost, are used again where they fit.
         """
         found = {}
-        for name, array in (*changing(self), ("values", self.setup.control.values)):
+        for name, array in (*changing(self), ("values", self.control.values)):
             copy = (before or {}).get(name)
             if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
                 copy = np.empty_like(array)

@@ -27,7 +27,7 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
     for k, block in enumerate(s.blocks):
         for name, array in arrays_of(block.points):
             yield f"points/{k}/{name}", array
-    for k, rows in enumerate(_remembered(simulation, used(s.spans))):
+    for k, rows in enumerate(remembered_at(simulation, used(s.spans)[1:])):
         yield f"contact/{k}", rows
 
 
@@ -40,7 +40,7 @@ def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
         "shown": np.array([getattr(simulation, name) for name in SHOWN]),
     }
     nodes = numbers(s.spans)
-    return found | {name: array[nodes] for name, array in _of_nodes(s)}
+    return found | {name: array[nodes] for name, array in of_nodes(s)}
 
 
 def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
@@ -54,7 +54,7 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
     s = simulation.setup
     blocks = tuple(
         Block(
-            _points(block.points, found, f"points/{k}/"),
+            take_points(block.points, found, f"points/{k}/"),
             block.laws,
             take_tiling(simulation.tiles.empty_tiling(), found, f"tiling/{k}/"),
         )
@@ -69,16 +69,17 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
         clock[name] = before[name]
     s.control.totals[WORK] = _checked(found, "work", s.control.totals[WORK])
     nodes = numbers(s.spans)
-    for name, array in _of_nodes(s):
+    for name, array in of_nodes(s):
         array[nodes] = _checked(found, name, array[nodes])
-    for k, rows in enumerate(_remembered(simulation, used(s.spans))):
+    for k, rows in enumerate(remembered_at(simulation, used(s.spans)[1:])):
         rows[...] = _checked(found, f"contact/{k}", rows)
     simulation.present[:] = _checked(found, "present", simulation.present)
     for name, known in zip(SHOWN, _checked(found, "shown", np.ones(len(SHOWN), bool)), strict=True):
         setattr(simulation, name, bool(known))
 
 
-def _of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
+def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
+    """Every array of nodes, with its name."""
     for kind, nodes in (("nodes", s.nodes), ("heat", getattr(s.heat, "nodes", None))):
         if nodes is None:
             continue
@@ -102,7 +103,7 @@ def _fill(array: np.ndarray, found: Mapping[str, np.ndarray], name: str) -> None
     array[: len(found[name])] = found[name]
 
 
-def _points(points: Points, found: Mapping[str, np.ndarray], stem: str) -> Points:
+def take_points(points: Points, found: Mapping[str, np.ndarray], stem: str) -> Points:
     """Points in the order and number of the file, with arrays of their own."""
     count = found.get(stem + "id", np.empty(0)).size
 
@@ -127,9 +128,10 @@ def _points(points: Points, found: Mapping[str, np.ndarray], stem: str) -> Point
     return Points(**own, fields=tuple(declared))
 
 
-def _remembered(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:
+def remembered_at(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:
+    """What contact remembers at the nodes of these spans (k, 2)."""
     method = simulation.hub.update.method
-    return method.remembered(simulation.setup.contact, spans[1:])
+    return method.remembered(simulation.setup.contact, spans)
 
 
 def _checked(found: Mapping[str, np.ndarray], name: str, like: np.ndarray) -> np.ndarray:

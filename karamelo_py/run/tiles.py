@@ -91,6 +91,7 @@ class Tiles:
             share=np.zeros(SHARES + 1, np.int64),
             range=np.zeros((self.count + 1, 2), np.int64),
             grid=np.zeros(self.count + 1, np.int64),
+            number=np.zeros(self.count + 1, np.int64),
             box=np.zeros((self.count + 1, 2 * self.dimension), np.int64),
             buffer=np.zeros((self.count + 1, 5), np.int64),
             report=np.zeros((self.count + 1, 3)),
@@ -168,12 +169,9 @@ class Tiles:
         count = len(occupied)
         shares = 1 if self.direct else SHARES
         tiling.count[:] = count, shares
-        # Where the sum of the points is nearest to equal parts.
-        middles = (begins + ends)[occupied] / 2
-        parts = np.arange(1, shares) * x.shape[1] / shares
-        tiling.share[1:shares] = np.searchsorted(middles, parts)
-        tiling.share[shares] = count
+        tiling.number[:count] = occupied
         tiling.range[:count] = np.stack([begins[occupied], ends[occupied]], axis=1)
+        tiling.share[:] = shares_of(tiling.range[:count], shares, len(tiling.share))
         grid = np.searchsorted(self.first, occupied, side="right") - 1
         tiling.grid[:count] = grid
         width = lanes_for(8 * x.itemsize).width
@@ -333,7 +331,17 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
     """Names of the arrays of a tiling that a sort changes, and how many rows are in use."""
     tiles = tiling.count[0]
     whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
-    return [*whole, ("range", tiles), ("grid", tiles), ("box", tiles)]
+    return [*whole, *((name, tiles) for name in ("range", "grid", "number", "box"))]
+
+
+def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
+    """(size,) where shares of tiles with these points (T, 2) begin, nearly equal, and the end."""
+    out = np.zeros(size, np.int64)
+    # Where the sum of the points is nearest to equal parts.
+    parts = np.arange(1, shares) * ranges[:, 1].max(initial=0) / shares
+    out[1:shares] = np.searchsorted(ranges.sum(axis=1) / 2, parts)
+    out[shares] = len(ranges)
+    return out
 
 
 def in_tiles(tiling: Tiling) -> int:

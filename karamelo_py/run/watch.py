@@ -148,7 +148,7 @@ def _torn(hub: Hub) -> bool:
 
 def tell_of_growth(hub: Hub, simulation: Any) -> bool:
     """Warn where energy comes from nowhere; whether it did."""
-    clock = simulation.setup.control.clock[0]
+    clock = simulation.control.clock[0]
     fast = clock.windows >= TOLD
     if not clock.watch_energy or not (fast or clock.grown > IN_ALL):
         return False
@@ -168,5 +168,5 @@ def tell_of_growth(hub: Hub, simulation: Any) -> bool:
 
 def grown_little(simulation: Any) -> bool:
     """Whether the present state is a good one, as far as its energy tells."""
-    clock = simulation.setup.control.clock[0]
+    clock = simulation.control.clock[0]
     return not clock.watch_energy or (clock.windows < TOLD and clock.grown < IN_ALL)

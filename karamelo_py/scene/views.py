@@ -219,7 +219,7 @@ class PointsView(_View):
         super().__init__()
         self._simulation = simulation
         self._then = then
-        self._take_times(simulation.setup.control)
+        self._take_times(simulation.control)
         self.ids = simulation.members(group)
         self.moved = False
         self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
@@ -396,7 +396,7 @@ class PieceView(PointsView):
         self._simulation = simulation
         self._then = False
         self._block, self._rows = block, rows
-        self._take_times(simulation.setup.control)
+        self._take_times(simulation.control)
         self.ids = block.points.id[rows]
         self.moved = False
         self._declared = {}

@@ -1,0 +1,443 @@
+"""A scene stepped by several processes, with the bits of one.
+
+All processes carry out the script, up to a run. There the first leads: it does what a single
+process does, and has the others step with it. Each has the points of its tiles. What is to be seen
+between two steps (by logs, dumps, computes, files to go on from) the first gathers into the arrays
+of a whole scene, and hands out anew where something has changed them.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from karamelo_py.compiler.compile import address_of_python
+from karamelo_py.kernels.arrays import Block, Nodes, Setup, Tiling, arrays_of
+from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.ranks import BOXES, CALL, HEAT, NUMBER, REPORTS, TOTALS, Linked
+from karamelo_py.kernels.totals import WORK, rounded
+from karamelo_py.run.crew import Crew
+from karamelo_py.run.shares import SharedTiles, joined
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.state import changing, of_nodes, remembered_at, take_points, take_tiling
+from karamelo_py.run.tiles import in_tiles, in_use, numbers, shares_of, used
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import Quit, ScriptError
+
+OVER = "over"
+ROWS = ("number", "range", "grid", "box")  # of a tiling
+
+
+class Ranks(Simulation):
+    """The arrays of a scene that several processes share."""
+
+    def __init__(self, hub: Hub, previous: Ranks | None = None):
+        self.crew: Crew = hub.settings.crew
+        self._whole: Setup | None = None
+        self._part: Setup | None = None
+        self._shown = True  # the whole has the present state
+        self._handed_out = -1  # the version of the whole that the parts have
+        self._leading = False
+        self._stepping = False
+        self._kept: dict[str, np.ndarray] = {}
+        self._prepared = False
+        super().__init__(hub, previous)
+        self._call = address_of_python(self._answer, CALL)
+        self._parted = self._empty_part()
+
+    # --- the whole --------------------------------------------------------------------------------
+
+    @property
+    def setup(self) -> Setup:
+        """The whole scene. It is gathered first where steps were taken since."""
+        if not self._shown:
+            if self._leading:
+                self._tell("gather")
+            self.gather(everywhere=not self._leading)
+        return self._whole
+
+    @setup.setter
+    def setup(self, s: Setup) -> None:
+        self._whole = s
+        self._handed_out = -1
+
+    @property
+    def stepped(self) -> Setup:
+        """The arrays that steps work on."""
+        return self._part if self._stepping else self.setup
+
+    def sort(self) -> None:
+        """Sort the points by tile."""
+        if self._stepping:
+            self._part = self._parted.tiles.migrate(self._part)
+            self._parted.setup = self._part
+            self._parted.tiles.sort(self._part)
+        else:
+            super().sort()
+            self._handed_out = -1
+
+    def _empty_part(self) -> SimpleNamespace:
+        """The part of this process without points, with nodes and buffers of its own."""
+        s, hub = self._whole, self.hub
+        method = hub.update.method
+        one_place = method.fields_per_solid
+        tiles = SharedTiles(
+            self.crew, method.lattices(hub), s.basis, self.count, one_place=one_place
+        )
+        nodes, heat = _like(s.nodes), s.heat
+        buffers = tiles.empty_buffers(nodes)
+        if isinstance(heat, Conducting):
+            at_nodes = _like(heat.nodes)
+            heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes))
+        control = s.control._replace(ranks=Linked(self._call, tiles.foreign))
+        self._part = s._replace(
+            blocks=tuple(block._replace(tiling=tiles.empty_tiling()) for block in s.blocks),
+            nodes=nodes, heat=heat, buffers=buffers, spans=np.zeros((1, 2), np.int64),
+            control=control,
+        )  # fmt: skip
+        # As much of a simulation as its state asks for.
+        return SimpleNamespace(setup=self._part, tiles=tiles, hub=hub)
+
+    # --- leading and following --------------------------------------------------------------------
+
+    @property
+    def follows(self) -> bool:
+        """Another process says what this one does in a run."""
+        return not self.crew.leads
+
+    @contextmanager
+    def leading(self) -> Iterator[None]:
+        """While a run goes on: the others follow."""
+        self._leading, self._prepared = True, False
+        well = False
+        try:
+            yield
+            well = True
+        finally:
+            self._leading = False
+            more = well and self.hub.interpreter.has_more
+            self.crew.told((OVER, well, self._prepared, more, self.hub.values.array))
+            if self._prepared and more:
+                self._shown = False
+                self.gather(everywhere=True)
+
+    def follow(self) -> None:
+        """Do what the first process says, until its run is over."""
+        for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+            signal.signal(number, signal.SIG_IGN)
+        hub = self.hub
+        hub.restart = hub.interpreter.replay = None
+        while True:
+            what, *arguments = self.crew.told()
+            if what == OVER:
+                well, stepped, more, values = arguments
+                hub.values.array[:] = values
+                if not well:
+                    raise Quit
+                if stepped and more:
+                    self.gather(everywhere=True)
+                return
+            getattr(self, what)(*arguments)
+
+    def _tell(self, what: str, *arguments: Any) -> None:
+        self.crew.told((what, *arguments))
+
+    def prepare(self, begun: list[str]) -> None:
+        """Make ready for the steps of a run: the hooks of the fixes that are left to act."""
+        import numba
+
+        if self.threads > 1:
+            numba.set_num_threads(self.threads)
+        self.begun = begun
+        self._prepare_hooks()
+        self.hub.update.method.begin(self.hub, self._whole.contact)
+
+    # --- handing out and gathering ----------------------------------------------------------------
+
+    def _see_parts(self) -> None:
+        """Hand out the whole where the parts do not have its present state."""
+        if not self._prepared:
+            for fixes in (self._python, self._first):
+                _refuse_python(fixes)
+            self._tell("prepare", self.begun)
+            self._prepared = True
+        if self._handed_out == self.version:
+            return
+        whole = self.setup
+        clock = whole.control.clock[0]
+        covered = all(in_tiles(b.tiling) == b.points.mass.size for b in whole.blocks)
+        if clock.drift > clock.drift_limit or not covered:
+            super().sort()
+        tiles = self._parted.tiles
+        per_tile = np.zeros(tiles.count, np.int64)
+        for block in whole.blocks:
+            count = block.tiling.count[0]
+            sizes = np.diff(block.tiling.range[:count], axis=1)[:, 0]
+            np.add.at(per_tile, block.tiling.number[:count], sizes)
+        tiles.share_out(per_tile)
+        nodes = numbers(whole.spans)
+        memory = [one[nodes] for one in self._memory()]
+        shares = [
+            [_share(k, block, *tiles.cuts[rank : rank + 2]) for k, block in enumerate(whole.blocks)]
+            for rank in range(self.crew.size)
+        ]
+        self._tell("take", tiles.cuts, nodes, memory)
+        self.take(tiles.cuts, nodes, memory, shares)
+        self._handed_out = self.version
+
+    def take(
+        self, cuts: np.ndarray, nodes: np.ndarray, memory: list, shares: list | None = None
+    ) -> None:
+        """Take the own tiles from what the first hands out."""
+        found = self.crew.handed_out(shares)
+        self._parted.tiles.cuts[:] = cuts
+        self._parted.tiles.empty_nodes(self._part)
+        for one, rows in zip(self._memory(), memory, strict=True):
+            one[nodes] = rows
+        if not self.crew.leads:
+            self.control.totals[WORK] = 0
+        self._put({name: array for block in found for name, array in block.items()})
+
+    def _put(self, found: dict[str, np.ndarray]) -> None:
+        """Let the part have these points and tiles."""
+        s, tiles = self._part, self._parted.tiles
+        blocks = tuple(
+            Block(
+                take_points(block.points, found, f"points/{k}/"),
+                block.laws,
+                take_tiling(block.tiling, found, f"tiling/{k}/"),
+            )
+            for k, block in enumerate(s.blocks)
+        )
+        self._part = self._parted.setup = s._replace(blocks=blocks)
+        tiles.lay_out(self._part)
+
+    def _memory(self) -> list[np.ndarray]:
+        """What contact remembers of every node."""
+        nodes = len(self._parted.tiles.foreign)
+        return remembered_at(self._parted, np.array([[0, nodes]]))
+
+    def gather(self, *, everywhere: bool = False) -> None:
+        """Put the parts of all together, at the first process, or everywhere."""
+        s = self._part
+        own = numbers(s.spans)
+        own = own[self._parted.tiles.foreign[own] == 0]
+        work = self.control.totals[WORK].copy()
+        found = {
+            "points": [[a for _, a in arrays_of(block.points)] for block in s.blocks],
+            "tiling": [
+                {name: getattr(b.tiling, name)[:rows] for name, rows in in_use(b.tiling)}
+                | {"report": b.tiling.report[: max(b.tiling.count[0], 1)]}
+                for b in s.blocks
+            ],
+            "nodes": own,
+            "at nodes": [array[own] for _, array in of_nodes(s)],
+            "memory": [array[own] for array in self._memory()],
+            "work": work,
+        }
+        parts = self.crew.gathered(found)
+        if everywhere:
+            parts = self.crew.told(parts)
+        self.control.totals[WORK] = 0
+        if self.crew.leads:
+            self.control.totals[WORK] = sum(part["work"] for part in parts)
+        self._shown = True
+        if parts is not None:
+            self._join(parts)
+
+    def _join(self, parts: list[dict]) -> None:
+        whole = self._whole
+        blocks = []
+        for k, block in enumerate(whole.blocks):
+            points = joined(block.points, [part["points"][k] for part in parts])
+            _join_tilings(block.tiling, [part["tiling"][k] for part in parts])
+            blocks.append(block._replace(points=points))
+        self.tiles.empty_nodes(whole)
+        self._whole = whole = whole._replace(blocks=tuple(blocks))
+        self.tiles.lay_out(whole)
+        for part in parts:
+            for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):
+                array[part["nodes"]] = rows
+            for array, rows in zip(self._memory(), part["memory"], strict=True):
+                array[part["nodes"]] = rows
+
+    # --- steps ------------------------------------------------------------------------------------
+
+    def advance(self, count: int) -> int:
+        """Take up to `count` steps, all processes together; DONE, or why it stopped."""
+        self._see_parts()
+        self._tell("go", count, self.control.values, self.control.clock.view(np.ndarray))
+        return self.go(count)
+
+    def go(self, count: int, values: Any = None, clock: Any = None) -> int:
+        """Take the steps of this process, from these values and this clock."""
+        if values is not None:
+            self.control.values[:] = values
+            self.control.clock.view(np.ndarray)[:] = clock
+        with self._steps():
+            status = super().advance(count)
+        self._shown = False
+        return status
+
+    def compile(self) -> None:
+        """Have the loop over the steps compiled now, by all processes."""
+        self._see_parts()
+        self._tell("compile_part")
+        self.compile_part()
+
+    def compile_part(self) -> None:
+        """Compile the loop of this process."""
+        with self._steps():
+            super().compile()
+
+    @contextmanager
+    def _steps(self) -> Iterator[None]:
+        self._stepping = True
+        try:
+            yield
+        finally:
+            self._stepping = False
+
+    def _answer(self, what: int, a: int, b: int) -> int:
+        """What kernels ask of the other processes (karamelo_py.kernels.ranks)."""
+        try:
+            return self._answers[what](self, a, b) or 0
+        except BaseException:
+            # Nothing can be raised through a kernel, and the others wait.
+            traceback.print_exc()
+            sys.stderr.flush()
+            self.crew.abandon()
+            raise
+
+    def _boxes(self, number: int, arrays: int) -> None:
+        self._parted.tiles.exchange(self._part, number, arrays)
+
+    def _totals(self, first: int, count: int) -> None:
+        of_all = self.crew.added(self.control.totals[first : first + count])
+        for k in range(count):
+            self.control.answer[k] = rounded(of_all[k])
+
+    def _reports(self, *_: int) -> None:
+        self._agree((), ("move", "new_move", "new_rate", "wrong"))
+
+    def _heat(self, *_: int) -> None:
+        self._agree(("T_low", "coldest"), ("T_high", "hottest", "own_heat"))
+
+    def _agree(self, least: tuple, largest: tuple) -> None:
+        clock = self.control.clock[0]
+        own = [-clock[name] for name in least] + [clock[name] for name in largest]
+        found = self.crew.largest(np.array(own, float))
+        for name, value in zip((*least, *largest), found, strict=True):
+            clock[name] = -value if name in least else value
+
+    def _number(self, number: int, _: int) -> int:
+        return int(self.crew.added(np.array([number]))[0])
+
+    _answers: ClassVar[dict[int, Callable]] = {
+        BOXES: _boxes, TOTALS: _totals, REPORTS: _reports, HEAT: _heat, NUMBER: _number
+    }  # fmt: skip
+
+    # --- state that can be returned to ------------------------------------------------------------
+
+    def snapshot(self, before: Any = None) -> dict[str, np.ndarray]:
+        """Have every process keep its present state; what the first keeps.
+
+        Where a file to go on from has to hold it, that is the whole.
+        """
+        if self.hub.running.halve:
+            return super().snapshot(before)
+        self._see_parts()
+        self._tell("keep")
+        return self.keep()
+
+    def keep(self) -> dict[str, np.ndarray]:
+        """Copy every array of the part that a step changes."""
+        self._kept = {name: array.copy() for name, array in changing(self._parted)}
+        self._kept |= {
+            "values": self.control.values.copy(), "cuts": self._parted.tiles.cuts.copy()
+        }  # fmt: skip
+        return self._kept
+
+    def restore(self, snapshot: dict[str, np.ndarray]) -> None:
+        """Return to a snapshot, all processes together."""
+        if self.hub.running.halve:
+            super().restore(snapshot)
+            return
+        self._tell("go_back")
+        self.go_back()
+        self._shown = False
+        self.version += 1
+        self._handed_out = self.version
+
+    def go_back(self) -> None:
+        """Put back what was kept."""
+        s, tiles, kept = self._part, self._parted.tiles, self._kept
+        spans = used(s.spans)[1:].copy()
+        tiles.empty_nodes(s)
+        tiles.cuts[:] = kept["cuts"]
+        self._put({name: array.copy() for name, array in kept.items()})
+        for name, array in changing(self._parted):
+            array[...] = kept[name]
+        self.control.values[:] = kept["values"]
+        for marks in remembered_at(self._parted, spans):
+            marks[np.abs(marks) > self.step] = 0
+
+
+def _like(nodes: Nodes) -> Nodes:
+    """Nodes of the same kind, zero."""
+    fields = tuple(type(one)(np.zeros_like(one.array)) for one in nodes.fields)
+    return Nodes(*(np.zeros_like(array) for array in nodes[:-1]), fields)
+
+
+def _share(k: int, block: Block, low: int, high: int) -> dict[str, np.ndarray]:
+    """The points and tiles of the k-th block in the tiles from `low` to `high`, by name."""
+    tiling = block.tiling
+    count = tiling.count[0]
+    a, b = np.searchsorted(tiling.number[:count], (low, high))
+    begin, end = (tiling.range[a, 0], tiling.range[b - 1, 1]) if b > a else (0, 0)
+    found = {f"points/{k}/{name}": array[..., begin:end] for name, array in arrays_of(block.points)}
+    rows = {name: getattr(tiling, name)[a:b] for name in ROWS}
+    rows["range"] = rows["range"] - begin
+    rows["count"] = np.array([b - a, tiling.count[1]])
+    rows["share"] = shares_of(rows["range"], int(tiling.count[1]), len(tiling.share))
+    return found | {f"tiling/{k}/{name}": array for name, array in rows.items()}
+
+
+def _join_tilings(tiling: Tiling, parts: list[dict[str, np.ndarray]]) -> None:
+    """The tiles of all processes, one after another."""
+    counts = [int(part["count"][0]) for part in parts]
+    before = np.cumsum([0, *(int(part["range"][:, 1].max(initial=0)) for part in parts)])
+    for name in (*ROWS, "report"):
+        rows = []
+        for part, count, first in zip(parts, counts, before, strict=False):
+            own = part[name][: max(count, 1) if name == "report" else count].copy()
+            if name == "range":
+                own += first
+            elif name == "report":
+                own[own[:, 2] > 0, 2] += first
+                own = own if count else own[own[:, 2] > 0]
+            rows.append(own)
+        joint = np.concatenate(rows)
+        getattr(tiling, name)[: len(joint)] = joint
+    tiling.count[0] = sum(counts)
+    ranges = tiling.range[: tiling.count[0]]
+    tiling.share[:] = shares_of(ranges, int(tiling.count[1]), len(tiling.share))
+
+
+def _refuse_python(hooks: Any) -> None:
+    """Fixes that act from Python in every step see the whole scene: a process has a part."""
+    if hooks is not None and hooks.by_stage:
+        fix, _ = next(iter(hooks.by_stage.values()))[0]
+        raise ScriptError(
+            f"fix {fix.style} '{fix.id}' acts from Python in every step, which several processes "
+            "cannot share yet",
+            place=fix.place,
+            hint="run this scene with one process, and as many threads as there are cores",
+        )
