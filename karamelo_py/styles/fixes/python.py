@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import pickle
 import sys
+import zlib
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -92,7 +94,13 @@ class Python(Fix):
     number as ID, up to three as ID_x, ID_y, ID_z. ``fix python`` of the page on plug-ins says more.
 
     Every step comes back to Python for it, which takes some ten microseconds and the time of the
-    function. What the function itself remembers is not in files to go on from.
+    function.
+
+    What the function keeps from step to step goes into files to go on from where it is named:
+    ``remembers = ("taken", "left")`` in the module names variables of the module, and in the class
+    of an object that is called, attributes of the object. Numbers, texts, arrays, and lists,
+    tuples and dictionaries of these can be kept. Of what else has changed since the fix was made
+    a warning tells when the first such file is written.
 
     Example
     -------
@@ -105,6 +113,8 @@ class Python(Fix):
     """
 
     published = ("x", "y", "z", "")
+    remembers = ("state",)
+    told = False
 
     def __init__(
         self,
@@ -129,8 +139,29 @@ class Python(Fix):
         _check_arguments(function)
         super().__init__(hub, group)
         self.function = function
+        self.keeper = Keeper(function)
         self.point_fields = () if on_nodes else (Force,)
         setattr(self, moment, self._act)
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """What the function keeps and names; what else it has changed is told, once."""
+        keeper = self.keeper
+        forgotten = [] if self.told else keeper.forgotten()
+        if forgotten:
+            self.told = True
+            self.hub.warn(
+                f"fix python: {_name(self.function)} has changed {', '.join(forgotten)}, and files "
+                "to go on from do not hold that: a run goes on from there in another way",
+                place=self.place,
+                hint=f"remembers = {(*keeper.names, *forgotten)!r} in {keeper.place}, or in the "
+                "class of an object that is called",
+            )
+        return self.keeper.state()
+
+    @state.setter
+    def state(self, kept: dict[str, Any]) -> None:
+        self.keeper.restore(kept)
 
     def _act(self, view: Any) -> None:
         try:
@@ -153,6 +184,80 @@ class Python(Fix):
             self.publish("", numbers)
         else:
             self.publish_components(numbers)
+
+
+class Keeper:
+    """Who keeps what a function needs from step to step: the object it belongs to, or its module.
+
+    Attributes
+    ----------
+    names
+        What ``remembers`` names there.
+    place
+        Where this word belongs.
+
+    Raises
+    ------
+    ScriptError
+        If it names what is not there.
+    """
+
+    def __init__(self, function: Callable):
+        owner = getattr(function, "__self__", function)
+        self.place = f"the class {type(owner).__name__}"
+        self.data = vars(owner) if hasattr(owner, "__dict__") else {}
+        if inspect.isfunction(owner):
+            self.data, owner = owner.__globals__, sys.modules.get(owner.__module__)
+            self.place = f"the module {function.__module__}"
+        names = getattr(owner, "remembers", ())
+        self.names = (names,) if isinstance(names, str) else tuple(names)
+        self.owner, self.function = owner, function
+        for name in self.names:
+            if not hasattr(owner, name):
+                raise ScriptError(
+                    f"{self.place} remembers '{name}', which it does not have",
+                    argument="function",
+                    expected="a name that has its first value when the fix is made",
+                )
+        self.seen = self._look()
+
+    def state(self) -> dict[str, Any]:
+        """The values of the names."""
+        return {name: getattr(self.owner, name) for name in self.names}
+
+    def restore(self, kept: dict[str, Any]) -> None:
+        """Give the names their values."""
+        for name, value in kept.items():
+            setattr(self.owner, name, value)
+
+    def forgotten(self) -> list[str]:
+        """Names of what has changed since the last look and is not remembered."""
+        before, self.seen = self.seen, self._look()
+        return [name for name, seen in before.items() if self.seen.get(name, seen) != seen]
+
+    def _look(self) -> dict[str, int]:
+        """A sum over the bits of all data that the function may change, by name."""
+        data = dict(self.data)
+        if data.get("__name__") == "__main__":  # of a notebook, which has much else
+            data = {name: data[name] for name in self.function.__code__.co_names if name in data}
+        if inspect.isfunction(self.function):
+            code, cells = self.function.__code__, self.function.__closure__ or ()
+            data |= dict(zip(code.co_freevars, (cell.cell_contents for cell in cells), strict=True))
+        return {
+            name: _sum_of(value)
+            for name, value in data.items()
+            if name not in (*self.names, "remembers") and not name.startswith("__")
+        }
+
+
+def _sum_of(value: Any) -> int:
+    """A sum over the bits of data; the same for all that is none."""
+    if callable(value) or inspect.ismodule(value):
+        return 0
+    try:
+        return zlib.crc32(pickle.dumps(value))
+    except Exception:  # what is no data may refuse in any way
+        return 0
 
 
 def _name(function: Any) -> str:
