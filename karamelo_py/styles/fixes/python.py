@@ -91,7 +91,7 @@ class Python(Fix):
     The function is called with a view of the group: arrays with a row for each member (position,
     velocity, mass, force ... of points; position, velocity, velocity_update, mass, force ... of
     nodes), and dt and time. What it changes in them is taken over. What it returns is published: a
-    number as ID, up to three as ID_x, ID_y, ID_z. ``fix python`` of the page on plug-ins says more.
+    number as ID, up to three as ID_x, ID_y, ID_z. The page on plug-ins says more of these views.
 
     Every step comes back to Python for it, which takes some ten microseconds and the time of the
     function.
