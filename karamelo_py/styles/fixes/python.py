@@ -23,6 +23,11 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError, nearest
 
 MOMENTS = tuple(STAGES)
+# What a function may keep something in.
+DATA = (
+    *(int, float, complex, str, bytes, bytearray, list, dict, set, tuple),
+    *(np.ndarray, np.generic, np.random.Generator, np.random.RandomState),
+)
 
 
 def _is_of(module: Any, path: Path) -> bool:
@@ -208,7 +213,7 @@ class Keeper:
         self.data = vars(owner) if hasattr(owner, "__dict__") else {}
         if inspect.isfunction(owner):
             self.data, owner = owner.__globals__, sys.modules.get(owner.__module__)
-            self.place = f"the module {function.__module__}"
+            self.place = f"the module {function.__module__ or '__main__'}"
         names = getattr(owner, "remembers", ())
         self.names = (names,) if isinstance(names, str) else tuple(names)
         self.owner, self.function = owner, function
@@ -238,25 +243,23 @@ class Keeper:
     def _look(self) -> dict[str, int]:
         """A sum over the bits of all data that the function may change, by name."""
         data = dict(self.data)
-        if data.get("__name__") == "__main__":  # of a notebook, which has much else
-            data = {name: data[name] for name in self.function.__code__.co_names if name in data}
         if inspect.isfunction(self.function):
-            code, cells = self.function.__code__, self.function.__closure__ or ()
-            data |= dict(zip(code.co_freevars, (cell.cell_contents for cell in cells), strict=True))
+            seen = inspect.getclosurevars(self.function)
+            # A notebook has much else.
+            module = sys.modules.get(self.function.__module__)
+            notebook = self.function.__module__ == "__main__" or module is None
+            data = (dict(seen.globals) if notebook else data) | dict(seen.nonlocals)
         return {
             name: _sum_of(value)
             for name, value in data.items()
-            if name not in (*self.names, "remembers") and not name.startswith("__")
+            if isinstance(value, DATA) and name not in self.names and not name.startswith("__")
         }
 
 
 def _sum_of(value: Any) -> int:
-    """A sum over the bits of data; the same for all that is none."""
-    if callable(value) or inspect.ismodule(value):
-        return 0
     try:
         return zlib.crc32(pickle.dumps(value))
-    except Exception:  # what is no data may refuse in any way
+    except Exception:  # what stands in a list may refuse in any way
         return 0
 
 
