@@ -32,6 +32,8 @@ from test_laws_rigid import scene as pushed
 from test_laws_scripts import ALL, pulled
 from test_walls import scene as rubbed
 
+from karamelo_py.language import registry
+
 EVERY = "restart(2, r.*.h5)\n"
 
 
@@ -115,7 +117,8 @@ TOOLS = (
     "fix(F, indent/minimize_penetration, all, sphere, 0.1, 0.45, 0.55, 0, 3, 0, 0, 0.2)",
     "fix(W, contact/minimize_penetration/plane, body, 0.32, 0, 0, 1, 0, 0, 0.3)",
     "fix(I, indent, all, sphere, 500, 0.13, 0.45, 0.55, 0)",
-    "log_modify(custom, step, F_x, W_x, I_y)", "set_dt(0.001)", "run(6)",
+    "fix(C, cuttingtool, all, 0.1, 0.35 + time, 0.36, 0, -1, 0, 0, 0.4, 0.5, 0.6, 0.36)",
+    "log_modify(custom, step, F_x, W_x, I_y, C_x)", "set_dt(0.001)", "run(6)",
 )  # fmt: skip
 GROUPS = """\
 region(low, block, 0.3, 0.3, 0.3, 0.5)
@@ -141,9 +144,62 @@ save_plot(e.svg)
 LOADS = (
     "fix(F, force_particles, all, 2*time, -1)", "fix(T, edge_traction, all, box, xhi, 0.2, y*time)",
     "fix(P, edge_pressure, all, box, 5*time)", "fix(calm, local_damping, all, 0.8)",
+    "fix(Ek, kinetic_energy, all)", "fix(Es, strain_energy, all)",
     "compute(E, energy_balance, all)", "set_output(1)",
-    "log_modify(custom, step, dt, limit, F_y, T_x, P_x, E_drift)", "run(6)",
+    "log_modify(custom, step, dt, limit, F_y, T_x, P_x, E_drift, Ek, Es)", "run(6)",
 )  # fmt: skip
+PYTHON = """\
+fix(v, initial_velocity_nodes, all, 0.2*sin(9*x0), 0)
+fix(push, python, all, pumps.push)
+region(everywhere, block, INF, INF, INF, INF)
+group(nodes, nodes, region, everywhere, all)
+fix(brake, python, nodes, pumps.brake)
+log_modify(custom, step, push_x, push_y, brake)
+"""
+# Tools of Karamelo, of which one needs space, and computes of points: all in a few points.
+BENCH = """\
+region(face, block, 0.46, INF, INF, INF, INF, INF)
+group(face, particles, region, face, all)
+fix(s, initial_stress, all, 3*x0, 1, 0, 0, 0, -2*y0)
+fix(v, initial_velocity_particles, all, sin(9*x0), 0, y0)
+fix(M, meldtool, all, 0.1, y, 0.03, 0.4, 0.35, 10*time, 0.31, 2, 0.12)
+fix(W, impenetrablesurface, all, 0.5, 0.42, 0.36, 0.35, 3, 4, time)
+fix(T, neumann_bc_mech, face, -7*time, 1, NULL)
+compute(s, average_stress, face)
+compute(c, center_of_mass, face)
+compute(q, position_quantile, all, 0.8)
+compute(m, max_position, all)
+compute(r, reference, all, ../curve.csv, vx)
+compute(now, reference, c_x, ../curve.csv, vx, max, relative)
+log_modify(custom, step, M_x, W_x, T_x, s_11, c_z, q_x, m_z, r, now)
+set_dt(0.001)
+run(4)
+"""
+CURVE = "x, vx\n0, 0\n0.4, 0.5\n2, 1\n"
+FACE = """
+    group(face, particles, region, end, all)
+    region(other, block, 0.9, 1)
+    group(other, particles, region, other, all)
+    fix(hold, temperature_particles, face, 301 + time)
+    fix(lamp, heat_flux_particles, other, 7*time)
+    fix(air, convection_particles, other, 0.01, 200)
+"""
+FLUIDS = """
+method(ulmpm, TFLIP, quadratic-spline, 0.98)
+scheme(usl/unlimited)
+dimension(1, 0, 1, 0.1)
+region(left, block, 0.2, 0.4)
+region(right, block, 0.6, 0.8)
+eos(water, fluid, 2, 100, 7)
+strength(thin, fluid, 0.1)
+material(water, eos-strength, water, thin)
+eos(air, ideal-gas, 1.2, 1.4, p=10)
+material(air, eos-strength, air, thin)
+solid(water, region, left, 2, water, 0.1)
+solid(air, region, right, 2, air, 0.1)
+fix(v, initial_velocity_particles, all, sin(9*x0))
+run(6)
+"""
 FLOWS = {
     "a": "zerilli-armstrong, 80, 0.4, 0.2, 0, 0.0028, 0.000115, 0.3, 0.5",
     "b": "tabulated, 80, 0, 0.4, 1, 0.9",
@@ -152,6 +208,8 @@ FLOWS = {
     "e": "mu-i, 80, 0.382, 0.643, 0.279, 1, 2",
     "f": "drucker-prager, 80, 0.1, 30, 5, fit=plane-strain",
     "g": "mohr-coulomb, 80, 0.1, 30, 5",
+    "h": "swift, 80, 0.4, 0.5, 0.01, 0.5",
+    "i": "linear, 80",
 }
 
 
@@ -216,13 +274,43 @@ SCENES = {
     "reflected": thrown(2, "reflect", "run(8)", "run(22)"),
     "tools": block(2, *TOOLS),
     "groups": block(2, GROUPS, "run(7)"),
+    "functions in Python": block(2, PYTHON, "run(5)"),
+    "bench": block(3, BENCH, size=(0.2, 0.1, 0.1)),
+    "faces with heat": slab(FACE, ", lamp_s, air_s", "run(6)"),
+    "fluids": FLUIDS,
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_every_part(run_interpreted, name):
+def test_every_part(run_interpreted, tmp_path, name):
     """Contact, heat, damage, edges, tools, computes that look back."""
+    (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
     goes_on(run_interpreted, with_files(SCENES[name]), files=3)
+
+
+CHANGING = {
+    **dict.fromkeys(["fix", "compute", "material", "eos", "strength"], r"{family}\(\s*\w+\s*,\s*"),
+    **dict.fromkeys(["damage", "temperature"], r"{family}\(\s*\w+\s*,\s*"),
+    **dict.fromkeys(["method", "scheme"], r"{family}\("),
+    **dict.fromkeys(["transfer", "basis"], r"method\([^)]*\b"),
+    "dump": r"dump\(\s*\w+\s*,\s*\w+\s*,\s*",
+}
+
+
+@pytest.mark.parametrize("family", CHANGING)
+def test_every_style_is_in_some_scene(family):
+    """What the program registers, and a step may change, goes on above."""
+    meshes = ["m.vtk" if way[3] in MESHED else None for way in ways()]
+    scenes = [scene(*way, mesh=mesh) for way, mesh in zip(ways(), meshes, strict=True)]
+    text = "\n".join([*SCENES.values(), OUTPUTS, *scenes])
+    begin = CHANGING[family].format(family=family)
+    found = {
+        style
+        for style in registry.names(family)
+        if registry.origin(family, style).startswith("karamelo-py ")
+        and not re.search(rf"{begin}{re.escape(style)}\s*[,)]", text)
+    }
+    assert found == set()
 
 
 def content(path: Path) -> dict:
@@ -311,6 +399,10 @@ dump(d5, all, grid/hdf5, 3, nodes.h5, vx, mass, occupied=true)
 dump(d6, all, vtk, 4, p.*.vtu, vx)
 dump(d7, all, movie, 3, m.gif, 300, 300, vx)
 dump(d8, all, grid, 3, g.*.txt, vx, fx, mass)
+dump(d9, all, grid/gz, 3, g.*.gz, vx, mass)
+dump(e1, all, grid/bin, 3, g.*.bin, vx, mass)
+dump(e2, all, grid/vtk, 4, g.*.vtu, vx)
+dump(e3, all, pyplot, 5, p.*.png, 1, 1, vx)
 """
 
 
@@ -321,7 +413,7 @@ def test_outputs_go_on_in_their_files(run_interpreted):
              "E0 = value(E_total)", "run_time(0.03*E0/E0)", "write_restart(w.h5)",
              "fix(g, body_force, all, E0, 0)", "run_while(time < 0.12)"]  # fmt: skip
     script = with_files(block(2, fly, OUTPUTS, *lines, size=(0.2, 0.1)))
-    whole = goes_on(run_interpreted, script, files=9)
+    whole = goes_on(run_interpreted, script, files=6)
     again = whole.with_name("between")
     shutil.copytree(whole, again)
     run_interpreted(script, "-restart", "w.h5", folder="between")
@@ -359,6 +451,41 @@ test_another_number_of_threads = pytest.mark.xdist_group("identical")(
 
 FLY = block(2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "set_dt(0.001)", "run(4)",
             size=(0.2, 0.1))  # fmt: skip
+
+
+def test_what_a_function_forgets_is_told(run_interpreted, tmp_path):
+    """Variables of its module and attributes of its object that it changes; once."""
+    module = """
+        total, list_of, gain = 0.0, [], 2
+        def pull(points):
+            global total
+            total += 1
+            list_of.append(gain)
+        class Rope:
+            remembers = "length"
+            length, pulled = 1.0, 0
+            def __call__(self, points):
+                self.length += 1
+                self.pulled += 1
+        rope = Rope()
+        rope.pulled = 3
+        class Wrong:
+            remembers = ("here", "there")
+            here = 1
+            def __call__(self, points):
+                pass
+        wrong = Wrong()
+    """
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "ropes.py").write_text(dedent(module), encoding="utf-8")
+    fixes = "fix(p, python, all, ropes.pull)\nfix(r, python, all, ropes.rope)\n"
+    err = run_interpreted(with_files(FLY.replace("run(4)", fixes + "run(4)"))).err
+    assert err.count("pull has changed total, list_of, and files to go on from") == 1
+    assert "remembers = ('total', 'list_of') in the module ropes" in err
+    assert err.count("Rope has changed pulled, and") == 1
+    assert "remembers = ('length', 'pulled') in the class Rope" in err
+    wrong = run_interpreted(FLY + "fix(p, python, all, ropes.wrong)\nrun(1)\n", status=1).err
+    assert "the class Wrong remembers 'there', which it does not have" in wrong
 
 
 def test_a_longer_run_with_other_steps(run_interpreted):
@@ -499,8 +626,9 @@ def test_what_cannot_be_written_is_told(run_interpreted):
 
 # Prints what is forgotten: in an interpreter of its own, which compiles nothing.
 WATCH = """
+from pathlib import Path
 import numpy as np
-from test_restart import OUTPUTS, SCENES, block
+from test_restart import CURVE, OUTPUTS, SCENES, block
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.memory import remembered
@@ -508,6 +636,7 @@ from karamelo_py.scene.hub import Hub
 
 PLAIN = (int, float, str, bool, list, dict, np.ndarray, type(None))
 fly = "fix(v, initial_velocity_particles, all, sin(9*x0), 0)"
+Path("curve.csv").write_text(CURVE)
 scenes = {**SCENES, "outputs": block(2, fly, OUTPUTS, "run(5)", size=(0.2, 0.1))}
 for name, script in scenes.items():
     hub = Hub(Console(quiet=True))
@@ -522,7 +651,7 @@ for name, script in scenes.items():
         rehearse()
 
     hub.rehearse = look
-    hub.interpreter.run_text(script)
+    hub.interpreter.run_text(script.replace("../curve", "curve"))
     assert before
     for part, old in before:
         for key, value in vars(part).items():

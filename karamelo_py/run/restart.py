@@ -226,7 +226,7 @@ def memories(hub: Hub) -> Memories:
 
 def give_back(hub: Hub, kept: Memories) -> None:
     """Let all parts remember what they did then; outputs go on from there in their files."""
-    parts, arrays = kept
+    parts, arrays = kept[0], [array.copy() for array in kept[1]]
     there = {tuple(key): memory for key, memory in parts}
     for key, part in _parts(hub):
         if key in there:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import pickle
 import sys
+import zlib
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -21,6 +23,11 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError, nearest
 
 MOMENTS = tuple(STAGES)
+# What a function may keep something in.
+DATA = (
+    *(int, float, complex, str, bytes, bytearray, list, dict, set, tuple),
+    *(np.ndarray, np.generic, np.random.Generator, np.random.RandomState),
+)
 
 
 def _is_of(module: Any, path: Path) -> bool:
@@ -89,10 +96,16 @@ class Python(Fix):
     The function is called with a view of the group: arrays with a row for each member (position,
     velocity, mass, force ... of points; position, velocity, velocity_update, mass, force ... of
     nodes), and dt and time. What it changes in them is taken over. What it returns is published: a
-    number as ID, up to three as ID_x, ID_y, ID_z. ``fix python`` of the page on plug-ins says more.
+    number as ID, up to three as ID_x, ID_y, ID_z. The page on plug-ins says more of these views.
 
     Every step comes back to Python for it, which takes some ten microseconds and the time of the
-    function. What the function itself remembers is not in files to go on from.
+    function.
+
+    What the function keeps from step to step goes into files to go on from where it is named:
+    ``remembers = ("taken", "left")`` in the module names variables of the module, and in the class
+    of an object that is called, attributes of the object. Numbers, texts, arrays, and lists,
+    tuples and dictionaries of these can be kept. Of what else has changed since the fix was made
+    a warning tells when the first such file is written.
 
     Example
     -------
@@ -105,6 +118,8 @@ class Python(Fix):
     """
 
     published = ("x", "y", "z", "")
+    remembers = ("state",)
+    told = False
 
     def __init__(
         self,
@@ -129,8 +144,29 @@ class Python(Fix):
         _check_arguments(function)
         super().__init__(hub, group)
         self.function = function
+        self.keeper = Keeper(function)
         self.point_fields = () if on_nodes else (Force,)
         setattr(self, moment, self._act)
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """What the function keeps and names; what else it has changed is told, once."""
+        keeper = self.keeper
+        forgotten = [] if self.told else keeper.forgotten()
+        if forgotten:
+            self.told = True
+            self.hub.warn(
+                f"fix python: {_name(self.function)} has changed {', '.join(forgotten)}, and files "
+                "to go on from do not hold that: a run goes on from there in another way",
+                place=self.place,
+                hint=f"remembers = {(*keeper.names, *forgotten)!r} in {keeper.place}, or in the "
+                "class of an object that is called",
+            )
+        return self.keeper.state()
+
+    @state.setter
+    def state(self, kept: dict[str, Any]) -> None:
+        self.keeper.restore(kept)
 
     def _act(self, view: Any) -> None:
         try:
@@ -153,6 +189,78 @@ class Python(Fix):
             self.publish("", numbers)
         else:
             self.publish_components(numbers)
+
+
+class Keeper:
+    """Who keeps what a function needs from step to step: the object it belongs to, or its module.
+
+    Attributes
+    ----------
+    names
+        What ``remembers`` names there.
+    place
+        Where this word belongs.
+
+    Raises
+    ------
+    ScriptError
+        If it names what is not there.
+    """
+
+    def __init__(self, function: Callable):
+        owner = getattr(function, "__self__", function)
+        self.place = f"the class {type(owner).__name__}"
+        self.data = vars(owner) if hasattr(owner, "__dict__") else {}
+        if inspect.isfunction(owner):
+            self.data, owner = owner.__globals__, sys.modules.get(owner.__module__)
+            self.place = f"the module {function.__module__ or '__main__'}"
+        names = getattr(owner, "remembers", ())
+        self.names = (names,) if isinstance(names, str) else tuple(names)
+        self.owner, self.function = owner, function
+        for name in self.names:
+            if not hasattr(owner, name):
+                raise ScriptError(
+                    f"{self.place} remembers '{name}', which it does not have",
+                    argument="function",
+                    expected="a name that has its first value when the fix is made",
+                )
+        self.seen = self._look()
+
+    def state(self) -> dict[str, Any]:
+        """The values of the names."""
+        return {name: getattr(self.owner, name) for name in self.names}
+
+    def restore(self, kept: dict[str, Any]) -> None:
+        """Give the names their values."""
+        for name, value in kept.items():
+            setattr(self.owner, name, value)
+
+    def forgotten(self) -> list[str]:
+        """Names of what has changed since the last look and is not remembered."""
+        before, self.seen = self.seen, self._look()
+        return [name for name, seen in before.items() if self.seen.get(name, seen) != seen]
+
+    def _look(self) -> dict[str, int]:
+        """A sum over the bits of all data that the function may change, by name."""
+        data = dict(self.data)
+        if inspect.isfunction(self.function):
+            seen = inspect.getclosurevars(self.function)
+            # A notebook has much else.
+            module = sys.modules.get(self.function.__module__)
+            notebook = self.function.__module__ == "__main__" or module is None
+            data = (dict(seen.globals) if notebook else data) | dict(seen.nonlocals)
+        return {
+            name: _sum_of(value)
+            for name, value in data.items()
+            if isinstance(value, DATA) and name not in self.names and not name.startswith("__")
+        }
+
+
+def _sum_of(value: Any) -> int:
+    try:
+        return zlib.crc32(pickle.dumps(value))
+    except Exception:  # what stands in a list may refuse in any way
+        return 0
 
 
 def _name(function: Any) -> str:
