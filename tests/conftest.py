@@ -121,14 +121,20 @@ def run_interpreted(tmp_path, _interpreter) -> Callable[..., Result]:
 def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndarray]]:
     """``state_interpreted(script, *columns)``: the exact state at the end, or columns of it.
 
-    With ``boxes=True`` points give to boxes of small tiles, as many points do, not to the nodes.
+    With ``boxes=True`` points give to boxes of small tiles, as many points do, not to the nodes;
+    with ``ranks=N`` so many share them. Files are kept in `out`.
     """
 
-    def run(script: str, *columns: str, boxes: bool = False) -> dict[str, np.ndarray]:
+    def run(
+        script: str, *columns: str, boxes: bool = False, ranks: int = 1, out: str = ""
+    ) -> dict[str, np.ndarray]:
         path = _prepared(tmp_path, script)
         file = str(tmp_path / "state.npz")
         request = {"folder": str(tmp_path), "arguments": [str(path)], "state": file}
         request["columns"], request["boxes"] = columns, boxes
+        if out:
+            (tmp_path / out).mkdir()
+        request["ranks"], request["out"] = ranks, out and str(tmp_path / out)
         answer = _ask(_interpreter, request)
         assert answer["status"] == 0, answer["err"]
         with np.load(file) as arrays:

@@ -7,17 +7,28 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 import numpy as np
+from crews import together
 
+from karamelo_py.app.launch import share
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
+from karamelo_py.run.crew import Crew
 from karamelo_py.scene.hub import Hub
 
 
-def final_hub(script: Path, threads: int | None = None) -> Hub:
-    """The hub after a script has run."""
+def final_hub(
+    script: Path,
+    threads: int | None = None,
+    crew: Crew | None = None,
+    folder: Path | None = None,
+) -> Hub:
+    """The hub after a script has run, where a crew is given as one of its ranks."""
     hub = Hub(Console(quiet=True))
     hub.settings.threads = threads
-    hub.folder = Path(mkdtemp(dir=Path(script).parent))  # others write logs at the same time
+    if crew is not None:
+        share(hub, crew)
+    # Others write logs at the same time.
+    hub.folder = folder or Path(mkdtemp(dir=Path(script).parent))
     hub.interpreter = Interpreter(hub)
     hub.interpreter.run_file(str(script))
     return hub
@@ -29,9 +40,13 @@ def final_columns(script: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
     return {name: hub.fields.particle(name) for name in names}
 
 
-def final_state(script: Path, threads: int | None = None) -> dict[str, np.ndarray]:
-    """The state of the hub after a script has run."""
-    return state_of(final_hub(script, threads))
+def final_state(
+    script: Path, threads: int | None = None, ranks: int = 1, folder: Path | None = None
+) -> dict[str, np.ndarray]:
+    """The state of the hub after a script has run; files are kept in `folder`, if any."""
+    if ranks == 1:
+        return state_of(final_hub(script, threads, folder=folder))
+    return together(ranks, lambda crew: state_of(final_hub(script, threads, crew, folder)))[0]
 
 
 def state_of(hub: Hub) -> dict[str, np.ndarray]:
@@ -55,6 +70,6 @@ def same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> bool:
     for name in a:
         assert np.isfinite(a[name]).all(), name
         assert a[name].dtype == b[name].dtype
-        difference = np.abs(a[name] - b[name]).max()
+        difference = np.abs(a[name] - b[name]).max(initial=0)
         assert a[name].tobytes() == b[name].tobytes(), f"{name} differs by up to {difference}"
     return True

@@ -14,6 +14,7 @@ import os
 import sys
 import traceback
 import warnings
+from pathlib import Path
 
 
 def save_state(request: dict) -> int:
@@ -28,7 +29,11 @@ def save_state(request: dict) -> int:
     if request["boxes"]:
         tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 2, 3: 2}
     try:
-        arrays = final_columns(script, columns) if columns else final_state(script)
+        ranks, folder = request["ranks"], request["out"] and Path(request["out"])
+        if columns:
+            arrays = final_columns(script, columns)
+        else:
+            arrays = final_state(script, ranks=ranks, folder=folder)
         np.savez(request["state"], **arrays)
     except Exception:
         traceback.print_exc()

@@ -258,6 +258,8 @@ CLOCK = np.dtype(
         ("own_heat", np.float64),  # largest rise of a temperature by the work of its point
         ("set_low", np.float64),  # what fixes have set at nodes
         ("set_high", np.float64),
+        ("rise", np.float64),  # largest rate that fixes heat points at
+        ("fall", np.float64),
     ]
 )
 TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values

@@ -61,6 +61,7 @@ from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
 from karamelo_py.kernels.p2g import load_of, scattered
 from karamelo_py.kernels.step import conduct, read_reports, step_size, visit_here
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
+from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
@@ -342,6 +343,7 @@ def _(hooks, stage, target, s):
     node_hooks(
         stage, target, Line(), s.grids, s.heat.nodes, s.spans, hooks, s.control, step_size(s), 1.0
     )
+    agree_on_heat(s.control.ranks, s.control)
     clock.coldest = min(clock.coldest, clock.set_low)
     clock.hottest = max(clock.hottest, clock.set_high)
 
@@ -376,9 +378,14 @@ def _(hooks, s):
 
 @at_heated_points.on(Hooks)
 def _(hooks, s):
+    clock = s.control.clock[0]
+    clock.rise = clock.fall = 0.0
     clear_totals(SUPPLY_HEAT, hooks, s.control)
     _supply_blocks(s, hooks)
     publish_totals(SUPPLY_HEAT, hooks, s.control)
+    agree_on_heat(s.control.ranks, s.control)
+    clock.hottest += step_size(s) * clock.rise
+    clock.coldest += step_size(s) * clock.fall
 
 
 @shared

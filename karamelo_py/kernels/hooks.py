@@ -453,7 +453,6 @@ def _(what, kin, hooks, control, dt, h, count):
         _evaluate(hooks, h, 1, count, control, np.int64(BEFORE), 0.0)
     slot = hooks.table[h].slot
     clock = control.clock[0]
-    rise = fall = 0.0
     for q in range(count):
         p = hooks.chosen[q]
         before = what.supply[0, p]
@@ -472,13 +471,11 @@ def _(what, kin, hooks, control, dt, h, count):
         what.temperature[0, p] = T
         if slot >= 0:
             add_to(control.totals, slot, supply - before)
-        rate = (supply - before) / what.capacity[0, p] if what.capacity[0, p] > 0 else 0.0
-        rise, fall = max(rise, rate), min(fall, rate)
+        # What the fastest point takes, another may have got before.
+        rate = supply / what.capacity[0, p] if what.capacity[0, p] > 0 else 0.0
+        clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
         if share == 0:
             clock.coldest, clock.hottest = min(clock.coldest, T), max(clock.hottest, T)
-    # What the fastest point takes, another may have got before.
-    clock.hottest += dt * rise
-    clock.coldest += dt * fall
 
 
 @subkernel

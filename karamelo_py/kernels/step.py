@@ -295,8 +295,11 @@ def _(hooks, stage, target, s):
 
 @at_nodes.on(Hooks)
 def _(hooks, stage, target, s):
-    kept = s.control.clock[0].kept
-    node_hooks(stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), kept)
+    clock = s.control.clock[0]
+    node_hooks(
+        stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), clock.kept
+    )
+    clock.set_low = clock.set_high = 0.0  # of temperatures only
 
 
 @shared

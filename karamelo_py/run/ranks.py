@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -32,7 +33,16 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
 OVER = "over"
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+# The first hears of Ctrl-C, and of batch systems.
+ENDING = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
 ROWS = ("number", "range", "grid", "box")  # of a tiling
+
+
+class Abandoned(Exception):
+    """The first process has found a fault in the midst of a step, and tells of it."""
 
 
 class Ranks(Simulation):
@@ -45,7 +55,8 @@ class Ranks(Simulation):
         self._shown = True  # the whole has the present state
         self._handed_out = -1  # the version of the whole that the parts have
         self._leading = False
-        self._stepping = False
+        self._stepping = False  # arrays are those of the part
+        self._at_work = False  # steps are taken
         self._kept: dict[str, np.ndarray] = {}
         self._prepared = False
         super().__init__(hub, previous)
@@ -79,6 +90,12 @@ class Ranks(Simulation):
             self._part = self._parted.tiles.migrate(self._part)
             self._parted.setup = self._part
             self._parted.tiles.sort(self._part)
+        elif self._at_work:
+            raise ScriptError(
+                "a fix in Python moves points at the start of a step, which several processes "
+                "cannot share",
+                hint="one process, and as many threads as there are cores",
+            )
         else:
             super().sort()
             self._handed_out = -1
@@ -130,8 +147,9 @@ class Ranks(Simulation):
 
     def follow(self) -> None:
         """Do what the first process says, until its run is over."""
-        for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
-            signal.signal(number, signal.SIG_IGN)
+        if threading.current_thread() is threading.main_thread():
+            for number in ENDING:
+                signal.signal(number, signal.SIG_IGN)
         hub = self.hub
         hub.restart = hub.interpreter.replay = None
         while True:
@@ -144,7 +162,8 @@ class Ranks(Simulation):
                 if stepped and more:
                     self.gather(everywhere=True)
                 return
-            getattr(self, what)(*arguments)
+            with suppress(Abandoned):
+                getattr(self, what)(*arguments)
 
     def _tell(self, what: str, *arguments: Any) -> None:
         self.crew.told((what, *arguments))
@@ -164,8 +183,6 @@ class Ranks(Simulation):
     def _see_parts(self) -> None:
         """Hand out the whole where the parts do not have its present state."""
         if not self._prepared:
-            for fixes in (self._python, self._first):
-                _refuse_python(fixes)
             self._tell("prepare", self.begun)
             self._prepared = True
         if self._handed_out == self.version:
@@ -297,13 +314,57 @@ class Ranks(Simulation):
         with self._steps():
             super().compile()
 
+    def act(self, function: Callable[[Setup], None], _: Setup) -> None:
+        """In the midst of a step: the first acts on the whole, and all take over what it did."""
+        self.gather()
+        crew, control = self.crew, self.control
+        if not crew.leads:
+            if (told := crew.told()) is None:
+                raise Abandoned
+            self._take_back(*told, crew.handed_out(None))
+            return
+        self._stepping = False
+        try:
+            function(self._whole)
+        except BaseException:
+            crew.told(None)
+            raise
+        self._stepping = True
+        whole = self._whole
+        nodes = numbers(whole.spans)
+        told = (
+            control.values, control.clock.view(np.ndarray), nodes,
+            [array[nodes] for _, array in of_nodes(whole)],
+        )  # fmt: skip
+        crew.told(told)
+        cuts = self._parted.tiles.cuts
+        shares = [
+            [_share(k, block, *cuts[r : r + 2]) for k, block in enumerate(whole.blocks)]
+            for r in range(crew.size)
+        ]
+        self._take_back(*told, crew.handed_out(shares))
+
+    def _take_back(
+        self, values: np.ndarray, clock: np.ndarray, nodes: np.ndarray, rows: list, share: list
+    ) -> None:
+        """Put what the first has changed into the arrays that a step is at work on."""
+        s = self._part
+        self.control.values[:] = values
+        self.control.clock.view(np.ndarray)[:] = clock
+        here = np.isin(nodes, numbers(s.spans))
+        for (_, array), found in zip(of_nodes(s), rows, strict=True):
+            array[nodes[here]] = found[here]
+        for k, block in enumerate(s.blocks):
+            for name, array in arrays_of(block.points):
+                array[...] = share[k][f"points/{k}/{name}"]
+
     @contextmanager
     def _steps(self) -> Iterator[None]:
-        self._stepping = True
+        self._stepping = self._at_work = True
         try:
             yield
         finally:
-            self._stepping = False
+            self._stepping = self._at_work = False
 
     def _answer(self, what: int, a: int, b: int) -> int:
         """What kernels ask of the other processes (karamelo_py.kernels.ranks)."""
@@ -328,7 +389,8 @@ class Ranks(Simulation):
         self._agree((), ("move", "new_move", "new_rate", "wrong"))
 
     def _heat(self, *_: int) -> None:
-        self._agree(("T_low", "coldest"), ("T_high", "hottest", "own_heat"))
+        least = ("T_low", "coldest", "set_low", "fall")
+        self._agree(least, ("T_high", "hottest", "set_high", "rise", "own_heat"))
 
     def _agree(self, least: tuple, largest: tuple) -> None:
         clock = self.control.clock[0]
@@ -429,15 +491,3 @@ def _join_tilings(tiling: Tiling, parts: list[dict[str, np.ndarray]]) -> None:
     tiling.count[0] = sum(counts)
     ranges = tiling.range[: tiling.count[0]]
     tiling.share[:] = shares_of(ranges, int(tiling.count[1]), len(tiling.share))
-
-
-def _refuse_python(hooks: Any) -> None:
-    """Fixes that act from Python in every step see the whole scene: a process has a part."""
-    if hooks is not None and hooks.by_stage:
-        fix, _ = next(iter(hooks.by_stage.values()))[0]
-        raise ScriptError(
-            f"fix {fix.style} '{fix.id}' acts from Python in every step, which several processes "
-            "cannot share yet",
-            place=fix.place,
-            hint="run this scene with one process, and as many threads as there are cores",
-        )

@@ -113,20 +113,23 @@ class PythonHooks:
                 if not isinstance(hook, CompiledHook):
                     self.by_stage.setdefault(STAGES[name], []).append((fix, hook))
 
+    def act(self, function: Callable, s: Setup, *arguments: Any) -> None:
+        """Call what acts from Python on a setup."""
+        self.simulation.act(lambda whole: function(self, whole, *arguments), s)
 
-@at_nodes.on(PythonHooks)
-def _(hooks, stage, target, s):
-    at_nodes(hooks.compiled, stage, target, s)
-    for fix, hook in hooks.by_stage.get(stage, ()):
+
+def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
+    for fix, hook in hooks.by_stage[stage]:
         hook(NodesView(s, fix.group, stage, before_update=target == ON_VELOCITY))
 
 
-@at_points.on(PythonHooks)
-def _(hooks, stage, then, s):
-    at_points(hooks.compiled, stage, then, s)
-    if stage == INITIAL_INTEGRATE:
-        hooks.simulation.clear_forces()
-    for fix, hook in hooks.by_stage.get(stage, ()):
+def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
+    # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
+    _on_nodes(hooks, s._replace(nodes=s.heat.nodes), stage, target)
+
+
+def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:
+    for fix, hook in hooks.by_stage[stage]:
         view = PointsView(hooks.simulation, fix.group, bool(then))
         hook(view)
         if view.moved and stage == INITIAL_INTEGRATE:
@@ -135,20 +138,34 @@ def _(hooks, stage, then, s):
             s.control.clock[0].drift = np.inf
 
 
+@at_nodes.on(PythonHooks)
+def _(hooks, stage, target, s):
+    at_nodes(hooks.compiled, stage, target, s)
+    if stage in hooks.by_stage:
+        hooks.act(_on_nodes, s, stage, target)
+
+
+@at_points.on(PythonHooks)
+def _(hooks, stage, then, s):
+    at_points(hooks.compiled, stage, then, s)
+    if stage == INITIAL_INTEGRATE:
+        hooks.simulation.clear_forces()
+    if stage in hooks.by_stage:
+        hooks.act(_on_points, s, stage, then)
+
+
 @at_heat_nodes.on(PythonHooks)
 def _(hooks, stage, target, s):
     at_heat_nodes(hooks.compiled, stage, target, s)
-    # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
-    for fix, hook in hooks.by_stage.get(stage, ()):
-        heat = s._replace(nodes=s.heat.nodes)
-        hook(NodesView(heat, fix.group, stage, before_update=target == ON_VELOCITY))
+    if stage in hooks.by_stage:
+        hooks.act(_on_heat_nodes, s, stage, target)
 
 
 @at_heated_points.on(PythonHooks)
 def _(hooks, s):
     at_heated_points(hooks.compiled, s)
-    for fix, hook in hooks.by_stage.get(SUPPLY_HEAT, ()):
-        hook(PointsView(hooks.simulation, fix.group, then=False))
+    if SUPPLY_HEAT in hooks.by_stage:
+        hooks.act(_on_points, s, SUPPLY_HEAT, 0)
 
 
 class Simulation:
@@ -190,6 +207,10 @@ class Simulation:
     def leading(self) -> Iterator[None]:
         """While a run goes on: other processes, if there are any, follow this one."""
         yield
+
+    def act(self, function: Callable[[Setup], None], s: Setup) -> None:
+        """Call what acts from Python on the arrays of the whole scene."""
+        function(s)
 
     @property
     def stepped(self) -> Setup:

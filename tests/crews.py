@@ -1,0 +1,82 @@
+"""Processes that share a scene, as threads of one: what MPI does, without it."""
+
+from __future__ import annotations
+
+import copy
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.run.crew import Crew
+
+PATIENCE = 60  # seconds that one waits for the others
+
+
+class Threads(Crew):
+    """One of several threads, each with a scene of its own, which talk as ranks do."""
+
+    def __init__(self, rank: int, size: int, barrier: threading.Barrier, board: list):
+        self.rank, self.size = rank, size
+        self._barrier, self._board = barrier, board
+
+    def everyone(self, thing: Any) -> list:
+        self._board[self.rank] = thing
+        self._barrier.wait(PATIENCE)
+        found = copy.deepcopy(self._board)
+        self._barrier.wait(PATIENCE)
+        return found
+
+    def told(self, thing: Any = None) -> Any:
+        return self.everyone(thing)[0]
+
+    def gathered(self, thing: Any) -> list | None:
+        found = self.everyone(thing)
+        return found if self.leads else None
+
+    def handed_out(self, things: Sequence | None) -> Any:
+        return self.everyone(things)[0][self.rank]
+
+    def swapped(self, things: Sequence) -> list:
+        return [of[self.rank] for of in self.everyone(things)]
+
+    def added(self, array: np.ndarray) -> np.ndarray:
+        return sum(self.everyone(array))
+
+    def largest(self, array: np.ndarray) -> np.ndarray:
+        return np.max(self.everyone(array), axis=0)
+
+    def passed(self, given: dict, taken: dict) -> None:
+        of_all = self.everyone(given)
+        for rank, array in taken.items():
+            array[...] = of_all[rank][self.rank]
+
+    def abandon(self) -> None:
+        self._barrier.abort()
+
+
+def together(size: int, act: Callable[[Crew], Any]) -> list:
+    """What `act` returns to each of so many; the first error of any is raised."""
+    barrier, board = threading.Barrier(size), [None] * size
+    found: list = [None] * size
+    errors: list[BaseException] = []
+
+    def run(rank: int) -> None:
+        try:
+            found[rank] = act(Threads(rank, size, barrier, board))
+        except BaseException as error:
+            errors.append(error)
+            barrier.abort()
+
+    threads = [threading.Thread(target=run, args=(rank,)) for rank in range(size)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for error in errors:
+        if not isinstance(error, threading.BrokenBarrierError):
+            raise error
+    if errors:
+        raise errors[0]
+    return found

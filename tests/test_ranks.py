@@ -1,0 +1,40 @@
+"""Several processes that share a scene: the bits of one.
+
+Here they are threads that talk as processes do, interpreted; the last tests start processes.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+from scenes import SCHEMES, block
+from states import same_bits
+from test_restart import CURVE, SCENES, same_files, with_files
+
+MOVING = (
+    "fix(v, initial_velocity_particles, all, 0.9+sin(40*x0), 0.5*cos(70*y0))",
+    "log_modify(custom, step, time)",
+    "set_output(1000)",
+    "dt_factor(0.4)",
+)
+
+
+def shared(state_interpreted, tmp_path, script: str, ranks: int = 2) -> bool:
+    whole = state_interpreted(script, boxes=True, out="whole")
+    parts = state_interpreted(script, boxes=True, ranks=ranks, out="parts")
+    same_files(tmp_path / "whole", tmp_path / "parts")
+    return same_bits(whole, parts)
+
+
+@pytest.mark.parametrize("scheme, transfer", [*product(SCHEMES, ("FLIP", "APIC"))])
+def test_schemes(state_interpreted, tmp_path, scheme, transfer):
+    script = block(2, *MOVING, "run(30)", scheme=scheme, transfer=transfer, size=(0.3, 0.2))
+    assert shared(state_interpreted, tmp_path, with_files(script, "restart(9, r.*.h5)\n"))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_part(state_interpreted, tmp_path, name):
+    """Contact, heat, damage, edges, tools, computes that look back."""
+    (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
+    assert shared(state_interpreted, tmp_path, with_files(SCENES[name]))
