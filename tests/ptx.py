@@ -76,7 +76,7 @@ def visit_point(visit, s, block, then, dt, p, report):
     width = OneByOne()
     stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
     totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
-    totals = gather_nodes(width, visit.tasks, w, stencil, totals)
+    totals = gather_nodes(width, stencil, visit.tasks, w, totals)
     moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, zero_of(width, dt))
     report[p, 0] = moved
     report[p, 1] = rate
@@ -84,7 +84,7 @@ def visit_point(visit, s, block, then, dt, p, report):
         return
     stencil = restencil(visit.weights, w, stencil, p)
     loads = load_all(visit.quantities, w, p, dt)
-    scatter_nodes(width, visit.quantities, w, stencil, loads)
+    scatter_nodes(width, stencil, visit.quantities, w, loads)
 
 
 def visit_node(task, kin, nodes, n, dt):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import log1p, sin
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,34 +17,68 @@ from karamelo_py.compiler.compile import (
     kernel,
     of_present,
     real,
+    shared,
 )
-from karamelo_py.compiler.fields import load, store
+from karamelo_py.compiler.fields import field, load, store
 from karamelo_py.compiler.lanes import Eights, Fours, group
 from karamelo_py.compiler.powers import exponential, logarithm, power
-from karamelo_py.compiler.tuples import row
+from karamelo_py.compiler.tuples import add_scaled, row, scale
+from karamelo_py.kernels.arrays import arrays_of, with_nodes
+from karamelo_py.kernels.g2p import NodalMean, empty, gathered, settled
+from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
+from karamelo_py.kernels.sweep import OldWeights, Serial, Visit, sweep_points
 from karamelo_py.kernels.visit import place_at
-from karamelo_py.points.basis import entry, locate, support
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.points.basis import (
+    carried,
+    carrier,
+    carriers,
+    carry,
+    deformed,
+    entry,
+    extent,
+    locate,
+    support,
+)
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
+from karamelo_py.points.basis.cpdi import SQUARE
+from karamelo_py.points.basis.cpdi.parallel import R4
+from karamelo_py.points.basis.cpdi.quadrilateral import Q4
+from karamelo_py.points.basis.cpdi.simplex import T3
+from karamelo_py.points.basis.cpgimp import (
+    CPGIMPCorners,
+    CPGIMPDet,
+    CPGIMPDiagonal,
+    CPGIMPStretch,
+)
 from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
 from karamelo_py.points.basis.ugimp import UGIMP
+from karamelo_py.points.boundary import ReflectingGrid, reflected
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import PlaneStrain, Space, zero_tensor
-from karamelo_py.points.laws import advance, initial_state, law_kind, plastic_strain
+from karamelo_py.points.laws import Absent, advance, initial_state, law_kind, plastic_strain
 from karamelo_py.points.laws.damages.damage_johnson_cook import JohnsonCookDamage
 from karamelo_py.points.laws.eos.fluid import Tait
 from karamelo_py.points.laws.eos.linear import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
+from karamelo_py.points.laws.further import Further
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.plastic_rate import PlasticRate
 from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
 from karamelo_py.points.laws.strengths.fluid import Viscous
 from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strengths.mu_i import MuI
 from karamelo_py.points.laws.strengths.plastic import LinearHardening
+from karamelo_py.points.laws.strengths.zerilli_armstrong import ZerilliArmstrong
 from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
 from karamelo_py.points.laws.viscosity.artificial import ArtificialViscosity
+from karamelo_py.run.lowering import lower
+from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.xdist_group("lanes")
 KIN = PlaneStrain()
@@ -170,6 +205,15 @@ LAWS = [
         WEAR,
         PlasticWork(0.9, 385.0, 0.0, 1e5, 298.0, 1356.0),
     ),
+    EosStrength(
+        LinearPressure(1e-3, 1e3),
+        ZerilliArmstrong.given(400.0, 0.1, 1.0, 0.5, 0.003, 1e-4, 0.2, 0.3),
+    ),
+    EosStrength(
+        LinearPressure(1e-3, 1e3),
+        MuI(400.0, 0.4, 0.6, 0.3, 1e-3, 2e3),
+        further=Further(PlasticRate(1e-3), Absent()),
+    ),
     # Its response is computed for one lane after another.
     EosStrength(LinearPressure(1e-3, 1e3), DruckerPrager.given(400.0, 0.1, 30.0, 5.0)),
 ]
@@ -259,9 +303,22 @@ GRID = Grid(
 )  # fmt: skip
 
 
+@shared
+def _grown(basis, grid, stencil, here, seen):
+    """The place behind a step in which `seen` is the displacement of the nodes."""
+    new = deformed(basis, KIN, here, tuple(real(c, here[0]) for c in (0.1, 0.2, -0.1, 0.05)))
+    for corner in range(carried(basis, KIN)):
+        u = real(0, here[0]), real(0, here[0])
+        for j in range(carriers(basis, KIN)):
+            i, weight = carrier(basis, KIN, grid, stencil, corner, j)
+            u = add_scaled(u, weight, row(seen, i, 0, u))
+        new = carry(basis, KIN, new, here, corner, scale(real(1e-3, u[0]), u))
+    return (*new, extent(basis, KIN, grid, new) + real(0, here[0]))
+
+
 @kernel
 def _map(basis, grid, x, mass, nodes, seen, out, p):
-    """Mass and position to the nodes, and a field of the nodes to the points."""
+    """Mass and position to the nodes, and a field of the nodes to the points and their domains."""
     here = place_at(basis, KIN, x, p)
     stencil = locate(basis, KIN, grid, here)
     total = real(0, here[0]), real(0, here[0]), real(0, here[0])
@@ -275,7 +332,7 @@ def _map(basis, grid, x, mass, nodes, seen, out, p):
             fma(gradient[0], found[1], total[1]),
             fma(gradient[1], found[2], total[2]),
         )
-    store(out, p, total)
+    store(out, p, total + _grown(basis, grid, stencil, here, seen))
 
 
 @kernel
@@ -290,27 +347,130 @@ def _map_in_lanes(basis, grid, x, mass, nodes, seen, out, n):
         _map(basis, grid, x, mass, nodes, seen, out, group(Fours(), q, min(4, n - q)))
 
 
-@pytest.mark.parametrize(
-    "basis", [Linear(), QuadraticSpline(), CubicSpline(), BernsteinQuadratic(), UGIMP()]
-)
+HALF = (0.125, 0.125)
+DOMAINS = {
+    Linear: (),
+    QuadraticSpline: (),
+    CubicSpline: (),
+    BernsteinQuadratic: (),
+    UGIMP: HALF,
+    CPGIMPDet: HALF,
+    CPGIMPDiagonal: (*HALF, *HALF, 1.0, 0.0, 0.0, 1.0),
+    CPGIMPStretch: (*HALF, *HALF, 1.0, 0.0, 0.0, 1.0),
+    CPGIMPCorners: HALF,
+    R4: (0.125, 0.01, 0.02, 0.125),
+    Q4: [np.array(corner) / 8 for corner in SQUARE],
+    T3: [np.array(corner) / 8 for corner in ((-1, -1), (1, -1), (0, 2))],
+}
+
+
+@pytest.mark.parametrize("kind", DOMAINS)
 @pytest.mark.parametrize("spread", [0.1, 2.4], ids=["one cell", "many cells"])
-def test_weights_gather_and_scatter(basis, spread):
+def test_weights_gather_and_scatter(kind, spread):
     """Points of one cell take the short way; sums at nodes differ by the order of additions."""
-    n = 14
+    n, basis = 14, kind()
     rng = np.random.default_rng(3)
-    x = np.full((4, n), 0.125)  # the last are half sizes of domains
-    x[:2] = 0.05 + spread * rng.uniform(size=(2, n))
     mass = rng.uniform(1, 2, n)
+    x = 0.2 + spread * rng.uniform(size=(2, n))
+    domain = np.array(DOMAINS[kind])
+    if domain.ndim == 2:  # corners
+        x = np.concatenate([x, *(x + corner[:, None] for corner in domain)])
+    else:
+        x = np.concatenate([x, np.repeat(domain[:, None], n, axis=1)])
+    x[2:] *= 1 + 0.1 * rng.uniform(size=(len(x) - 2, n))
     per_cell = basis.nodes_per_cell
     step = per_cell * GRID.ny + 1
     grid = GRID._replace(step_x=step)
     count = (per_cell * GRID.nx + 1) * step
     seen = rng.normal(size=(count, 4))
     alone, together = np.zeros((2, count, 4))
-    of_alone, of_together = np.zeros((2, 3, n))
+    of_alone, of_together = np.zeros((2, 3 + len(x) + 1, n))
     _map_alone(basis, grid, x, mass, alone, seen, of_alone, n)
     _map_in_lanes(basis, grid, x, mass, together, seen, of_together, n)
     assert of_together.tobytes() == of_alone.tobytes()
+    assert np.isfinite(of_alone).all()
     assert alone[:, 0].sum() == pytest.approx(mass.sum(), rel=1e-14)
     np.testing.assert_allclose(together[:, :3], alone[:, :3], rtol=0, atol=1e-14 * mass.sum())
     assert (together[:, 3] == 0).all()  # what lies behind the components of a record
+
+
+@kernel
+def _reflect(grid, x, v, moment, out, p):
+    like = zero_tensor(KIN, x[0, p])
+    place, velocity = load(x, p, like[:2]), load(v, p, like[:2])
+    y, v, moment, met = reflected(grid, KIN, place, velocity, load(moment, p, like[:4]))
+    store(out, p, y + v + moment + met)
+
+
+@kernel
+def _reflect_alone(grid, x, v, moment, out, n):
+    for p in range(n):
+        _reflect(grid, x, v, moment, out, p)
+
+
+@kernel
+def _reflect_in_lanes(grid, x, v, moment, out, n):
+    for q in range(0, n, 4):
+        _reflect(grid, x, v, moment, out, group(Fours(), q, min(4, n - q)))
+
+
+def test_edges_that_reflect():
+    n = 30
+    rng = np.random.default_rng(6)
+    x = rng.uniform(-0.5, 3.5, (2, n))  # from 0 to 3 in x, to 2.5 in y
+    v, moment = rng.normal(size=(2, n)), rng.normal(size=(4, n))
+    alone, together = np.zeros((2, 10, n))
+    _reflect_alone(ReflectingGrid(*GRID), x, v, moment, alone, n)
+    _reflect_in_lanes(ReflectingGrid(*GRID), x, v, moment, together, n)
+    assert together.tobytes() == alone.tobytes()
+    assert 0 < alone[8:].sum() < 2 * n
+
+
+class Alone(NamedTuple):
+    """A task that does nothing and knows no lanes."""
+
+
+empty.on(Alone)(lambda task, w, x: ())
+gathered.on(Alone)(lambda task, w, stencil, k, total: total)
+settled.on(Alone)(lambda task, w, stencil, p, dt, total, totals, fastest: (real(0, dt), fastest))
+WARM_DISK = """
+method(tlmpm, FLIP, linear, 1, thermo-mechanical)
+dimension(2, 0, 1, 0, 1, 0.2)
+region(disk, cylinder, 0.5, 0.5, 0.4)
+material(rubber, linear, 1000, 1000, 0.3, 385, 0.1)
+solid(disk, region, disk, 2, rubber, 0.2, 300)
+"""
+
+
+def _visited(*more):
+    """All arrays behind one visit of heat, with these tasks too."""
+    hub = Hub(Console(quiet=True))
+    hub.interpreter = Interpreter(hub)
+    hub.interpreter.run_text(WARM_DISK)
+    setup, tiles = lower(hub)
+    tiles.sort(setup)
+    heat = setup.heat
+    mean = NodalMean(np.zeros_like(field(heat.nodes.fields, NodalMean)))
+    to = heat.buffers.nodes._replace(sums=np.zeros_like(heat.nodes.sums), fields=(mean,))
+    s = with_nodes(setup, heat.nodes, heat.buffers._replace(nodes=to))
+    rng = np.random.default_rng(5)
+    points = s.blocks[0].points
+    given = [one.array for one in (*points.fields, *s.nodes.fields)]
+    for array in (points.v, s.nodes.velocity, s.nodes.update, *given):
+        array[:] = 1 + 0.1 * rng.uniform(size=array.shape)
+    tasks = (TemperatureGradient(), Warming(), *more)
+    visit = Visit(tasks, (HeatContent(), HeatFlow()), OldWeights())
+    sweep_points(Serial(), visit, s, s.blocks[0], 1, True, True, 1e-3)
+    assert (s.blocks[0].tiling.report[:, 2] == 0).all()
+    return dict(arrays_of(points)), (to.sums, mean.array)
+
+
+def test_heat():
+    """Points have the bits of points alone; sums at nodes differ by the order of additions."""
+    together, nodes = _visited()
+    alone, nodes_alone = _visited(Alone())
+    for name, array in alone.items():
+        assert together[name].tobytes() == array.tobytes(), name
+    assert np.ptp(alone["heat gradient"]) > 0
+    for array, expected in zip(nodes, nodes_alone, strict=True):
+        np.testing.assert_allclose(array, expected, rtol=1e-13)

@@ -31,13 +31,9 @@ full = pytest.mark.full
 both = pytest.mark.parametrize("kinematics", ["plane", "space"])
 
 FORMULA = "Numba for CUDA does not know numpy.floor, ceil, rint and trunc of a number"
-POWER = "calls the power of CUDA's library (x**y)"
 UNROLLED = "NVVM unrolls its loop over the nodes; what a back end would have to forbid"
 # What does not compile, or does not stay in registers, and why.
 EXCEPTIONS = {
-    "test_bases[ulmpm cpgimp det-plane]": POWER,
-    "test_bases[ulmpm cpgimp det-space]": POWER,
-    "test_heat[space]": POWER,
     "test_bases[ulcpdi linear H8-space]": "more than the 255 registers of a thread, all in one",
     **{
         f"test_bases[{base}-space]": UNROLLED

@@ -91,7 +91,7 @@ def subkernel(function: Callable) -> Callable:
 
     Python must not call it: there is nothing of it that Python could call.
     """
-    inlining.left.add(function.__qualname__)
+    inlining.claim(function.__qualname__, inlining.left)
     return njit(**_HOW, no_cpython_wrapper=True)(function)
 
 
@@ -101,7 +101,7 @@ def entered(function: Callable) -> Callable:
     What other kernels call is kept on disk for all of them; Python calls what holds the tuples.
     """
     names = inspect.signature(function).parameters
-    inlining.kept.add(function.__qualname__)
+    inlining.claim(function.__qualname__, inlining.kept)
     inner = kernel(function, no_cpython_wrapper=True)
     call = define(
         ", ".join(names),

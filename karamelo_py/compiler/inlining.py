@@ -31,6 +31,13 @@ left: set[str] = set()  # qualified names of functions that nobody but compiled 
 kept: set[str] = set()  # the same, of those that are kept on disk
 
 
+def claim(name: str, of: set[str]) -> None:
+    """Put a function into `left` or `kept`: its name is all that tells it from others later."""
+    if name in (kept if of is left else left):
+        raise NameError(f"there is another '{name}', which is compiled in another way: rename it")
+    of.add(name)
+
+
 def _is_inner(library: codegen.JITCodeLibrary, names: set[str]) -> bool:
     """Whether a library is of one of these functions, with nothing for others to call it by."""
     return library.name in names and len(_own_functions(library)) == 1

@@ -27,7 +27,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import (
+    accumulate,
+    choose,
     fma,
+    of_present,
     over_blocks,
     point_function,
     real,
@@ -37,6 +40,7 @@ from karamelo_py.compiler.compile import (
 from karamelo_py.compiler.fields import field, load, load_vector, scalar, store, vector
 from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
 from karamelo_py.kernels.arrays import (
+    MASS,
     ON_UPDATE,
     ON_VELOCITY,
     POST_HEAT_TO_GRID,
@@ -65,7 +69,6 @@ from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
-from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import Line, dimension
 from karamelo_py.points.laws import (
     conductivity,
@@ -104,8 +107,8 @@ class Conductance(NamedTuple):
     kept = False
 
 
-class Face(NamedTuple):
-    """Area that a point shows to what is around it."""
+class Volume(NamedTuple):
+    """Volume of a point."""
 
     array: Any
 
@@ -150,12 +153,13 @@ class Conducting(NamedTuple):
     nodes: Nodes
     buffers: Buffers
 
-    point_fields = (Temperature, Capacity, Conductance, Face, Supply, Share, HeatGradient)
+    point_fields = (Temperature, Capacity, Conductance, Volume, Supply, Share, HeatGradient)
 
 
 class HeatContent(NamedTuple):
     """Scatter heat capacity and heat, as if the points' gradients reached to the nodes."""
 
+    in_lanes = True
     says = "heat to grid"
     reads = ("x", "mass", "state", "material", "heat gradient")
 
@@ -168,6 +172,7 @@ class HeatContent(NamedTuple):
 class TemperatureGradient(NamedTuple):
     """Gather the gradient of the nodal temperature."""
 
+    in_lanes = True
     says = "gradient of temperature"
     reads = ("x",)
     writes = ("heat gradient",)
@@ -176,6 +181,7 @@ class TemperatureGradient(NamedTuple):
 class HeatFlow(NamedTuple):
     """Scatter the heat flow and what fixes supply."""
 
+    in_lanes = True
     says = "heat flow"
     reads = ("state", "material", "deformation gradient", "heat gradient", "conductance")
 
@@ -188,6 +194,7 @@ class HeatFlow(NamedTuple):
 class Warming(NamedTuple):
     """Gather the change of the nodal temperature; settle the temperature of the point."""
 
+    in_lanes = True
     says = "temperature"
     reads = ("x", "state", "material", "temperature", "capacity", "conductance", "share")
     writes = ("state",)
@@ -219,11 +226,11 @@ def _(quantity, w, p, like):
     field(fields, Temperature)[0, p] = T
     field(fields, Capacity)[0, p] = capacity
     field(fields, Conductance)[0, p] = conductance
-    field(fields, Face)[0, p] = face(w.kin, volume, load_vector(w.kin, w.places.x, p))
+    field(fields, Volume)[0, p] = volume
     # Fixes may supply heat, and reset what share of the change the point takes.
     field(fields, Supply)[0, p] = real(0, like)
     field(fields, Share)[0, p] = real(1, like)
-    return capacity, conductance, T, _gradient(w, p)
+    return of_present(p, capacity), of_present(p, conductance), T, _gradient(w, p)
 
 
 @shared
@@ -241,12 +248,9 @@ def _(quantity, w, stencil, k, load):
     for axis in range(len(gradient)):
         T = fma(gradient[axis], arm[axis], T)
     part = weight * capacity
-    sums, mean = w.nodes.sums, field(w.nodes.fields, NodalMean)
-    sums[i, 0] += part
-    sums[i, 1] = fma(part, T, sums[i, 1])
+    accumulate(w.nodes.sums, i, MASS, (part, part * T))
     part = weight * conductance
-    mean[i, 0] = fma(part, T, mean[i, 0])
-    mean[i, 1] += part
+    accumulate(field(w.nodes.fields, NodalMean), i, 0, (part * T, part))
 
 
 @load_of.on(HeatFlow)
@@ -256,17 +260,18 @@ def _(quantity, w, p, like):
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     against = pulled_back(w.frame, w.kin, _gradient(w, p), f)
     fields = w.points.fields
-    return scale(-field(fields, Conductance)[0, p], against), field(fields, Supply)[0, p]
+    conductance = of_present(p, field(fields, Conductance)[0, p])
+    return scale(-conductance, against), of_present(p, field(fields, Supply)[0, p])
 
 
 @scattered.on(HeatFlow)
 def _(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     flow, supply = load
-    total = fma(at_least_round_off(weight), supply, w.nodes.sums[i, 2])
+    total = at_least_round_off(weight) * supply
     for axis in range(len(flow)):
         total = fma(flow[axis], gradient[axis], total)
-    w.nodes.sums[i, 2] = total
+    accumulate(w.nodes.sums, i, of_force(Line()), (total,))
 
 
 # --- from nodes to points ---------------------------------------------------------------------
@@ -310,11 +315,11 @@ def _(task, w, stencil, p, dt, total, totals, fastest):
     fields = w.points.fields
     T = field(fields, Temperature)[0, p]
     capacity = field(fields, Capacity)[0, p]
-    if capacity > 0:
-        rate = field(fields, Conductance)[0, p] / capacity * w.grid.inv_h * w.grid.inv_h
-        hidden = min(real(4 * dimension(w.kin), dt) * rate * dt, real(1, dt))
-        change = total[0] + hidden * (total[1] - T)
-        T = fma(field(fields, Share)[0, p], change, T)
+    some = capacity > 0
+    rate = field(fields, Conductance)[0, p] / choose(some, capacity, real(1, capacity))
+    hidden = real(4 * dimension(w.kin), dt) * (rate * w.grid.inv_h * w.grid.inv_h) * dt
+    change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
+    T = choose(some, fma(field(fields, Share)[0, p], change, T), T)
     store(w.points.state, p, with_temperature(law, w.kin, state, T))
     # By what factor conduction has become faster than in the undeformed body.
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
@@ -354,7 +359,7 @@ def _supply(block, s, hooks):
     warmth = Warmth(
         field(fields, Capacity),
         field(fields, Temperature),
-        field(fields, Face),
+        field(fields, Volume),
         field(fields, Supply),
         field(fields, Share),
         points.mass,

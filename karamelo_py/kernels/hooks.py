@@ -28,6 +28,7 @@ import numpy as np
 from numba import types
 
 from karamelo_py.compiler.compile import caller_of, entered, point_function, subkernel
+from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
@@ -55,6 +56,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.totals import WORK, add_to, counts, number_of_all, publish
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
+from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import dimension
 
 _F8 = types.float64
@@ -397,7 +399,7 @@ class Warmth(NamedTuple):
 
     capacity: np.ndarray  # (1, n)
     temperature: np.ndarray
-    face: np.ndarray
+    volume: np.ndarray
     supply: np.ndarray
     share: np.ndarray
     mass: np.ndarray
@@ -460,7 +462,7 @@ def _(what, kin, hooks, control, dt, h, count):
             hooks.table[h].address,
             what.capacity[0, p],
             what.temperature[0, p],
-            what.face[0, p],
+            face(kin, what.volume[0, p], load_vector(kin, what.x, p)),
             before,
             hooks.scratch[VALUE, q],
             hooks.scratch[BEFORE, q],

@@ -40,8 +40,7 @@ from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.sums import sum_tile
 from karamelo_py.kernels.visit import Work, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
-from karamelo_py.points.basis.product import sees_same_nodes, with_one_node
-from karamelo_py.points.boundary import reflected
+from karamelo_py.points.basis.product import Stencil, sees_same_nodes, with_one_node
 from karamelo_py.points.frames import Total, Updated, follows
 from karamelo_py.points.grid import inside, renumbered
 
@@ -164,15 +163,11 @@ def in_lanes(visit, s, block):
 @by_type(in_lanes)
 def _in_lanes(visit, s, block):
     tasks, quantities = visit[0], visit[1]
-    basis, transfer, averaging, grids = (
-        s[s.fields.index(name)] for name in ("basis", "transfer", "averaging", "grids")
-    )
+    of_scene = (s[s.fields.index(name)] for name in ("basis", "transfer", "averaging"))
     law = block[block.fields.index("laws")]
-    parts = {part.instance_class for part in (*tasks, *quantities, basis, transfer, averaging)}
+    parts = {part.instance_class for part in (*tasks, *quantities, *of_scene)}
     parts.update(classes_in(law))
-    if not all(getattr(part, "in_lanes", False) for part in parts) or reflected.defined(
-        grids.instance_class
-    ):
+    if not all(getattr(part, "in_lanes", False) for part in parts):
         return lambda visit, s, block: OneByOne()
     made = lanes_for(block[0][block[0].fields.index("mass")].dtype.bitwidth)
     return lambda visit, s, block: made()
@@ -234,38 +229,38 @@ def _scatter(quantities, w, stencil, loads):
         scattered_all(quantities, w, stencil, k, loads)
 
 
-@point_function()
-def gather_nodes(width, tasks, w, stencil, totals):
+@point_function(tags=2)
+def gather_nodes(width, stencil, tasks, w, totals):
     """The totals of the tasks over all nodes of the stencil."""
 
 
-@gather_nodes.on(OneByOne)
-def _(width, tasks, w, stencil, totals):
+@gather_nodes.otherwise
+def _(width, stencil, tasks, w, totals):
     return _gather(tasks, w, stencil, totals)
 
 
-@gather_nodes.on(Fours)
-@gather_nodes.on(Eights)
-def _(width, tasks, w, stencil, totals):
+@gather_nodes.on(Fours, Stencil)
+@gather_nodes.on(Eights, Stencil)
+def _(width, stencil, tasks, w, totals):
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
     if sees_same_nodes(stencil):
         return _gather(tasks, w, with_one_node(stencil), totals)
     return _gather(tasks, w, stencil, totals)
 
 
-@point_function()
-def scatter_nodes(width, quantities, w, stencil, loads):
+@point_function(tags=2)
+def scatter_nodes(width, stencil, quantities, w, loads):
     """Give all nodes of the stencil their parts."""
 
 
-@scatter_nodes.on(OneByOne)
-def _(width, quantities, w, stencil, loads):
+@scatter_nodes.otherwise
+def _(width, stencil, quantities, w, loads):
     _scatter(quantities, w, stencil, loads)
 
 
-@scatter_nodes.on(Fours)
-@scatter_nodes.on(Eights)
-def _(width, quantities, w, stencil, loads):
+@scatter_nodes.on(Fours, Stencil)
+@scatter_nodes.on(Eights, Stencil)
+def _(width, stencil, quantities, w, loads):
     if sees_same_nodes(stencil):
         _scatter(quantities, w, with_one_node(stencil), loads)
     else:
@@ -300,7 +295,7 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
         rate = fastest
         if gathers:
             totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
-            totals = gather_nodes(width, visit.tasks, w, stencil, totals)
+            totals = gather_nodes(width, stencil, visit.tasks, w, totals)
             moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
         elif follows(s.frame):
             here = inside(grid, s.kin, load_vector(s.kin, places.x, p))
@@ -314,7 +309,7 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
         if scatters and fits(visit.weights, s.room, moved):
             stencil = restencil(visit.weights, w, stencil, p)
             loads = load_all(visit.quantities, w, p, dt)
-            scatter_nodes(width, visit.quantities, out, stencil, loads)
+            scatter_nodes(width, stencil, visit.quantities, out, loads)
     tiling.report[t, 0] = largest(furthest)
     tiling.report[t, 1] = largest(fastest)
     tiling.report[t, 2] = wrong

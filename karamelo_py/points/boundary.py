@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.compile import choose, point_function, real, shared
 from karamelo_py.compiler.fields import vector
 from karamelo_py.compiler.tuples import multiply_each
 from karamelo_py.points.grid import Grid, in_cells, pick
@@ -47,13 +47,13 @@ def beyond(grid, direction, y):
     """-1 below the lower edge, 1 above the upper one, else 0."""
     a = in_cells(grid, direction, y)
     end = pick(direction, grid.lx, grid.ly, grid.lz)
-    return real(-1, y) if a < 0 else (real(1, y) if a > end else real(0, y))
+    return choose(a < 0, real(-1, y), choose(a > end, real(1, y), real(0, y)))
 
 
 @shared
 def turn(grid, direction, y, v):
     """-1 where a point beyond the edge goes further out, else 1."""
-    return real(-1, y) if beyond(grid, direction, y) * v > 0 else real(1, y)
+    return choose(beyond(grid, direction, y) * v > 0, real(-1, y), real(1, y))
 
 
 @shared
@@ -66,10 +66,10 @@ def hit(grid, direction, y):
 def mirror(grid, direction, y):
     """`y` put back as far inside the edge as it is beyond."""
     side = beyond(grid, direction, y)
-    edge = pick(direction, grid.x0, grid.y0, grid.z0)
-    if side > 0:
-        edge += pick(direction, grid.lx, grid.ly, grid.lz) * grid.h
-    return edge + (edge - y) if abs(side) > 0 else y
+    lower = pick(direction, grid.x0, grid.y0, grid.z0)
+    upper = lower + pick(direction, grid.lx, grid.ly, grid.lz) * grid.h
+    edge = choose(side > 0, real(upper, y), real(lower, y))
+    return choose(abs(side) > 0, edge + (edge - y), y)
 
 
 def in_every_direction(function: Callable) -> Callable:

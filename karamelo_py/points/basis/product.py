@@ -56,7 +56,7 @@ def sees_same_nodes(stencil):
 @shared
 def with_one_node(stencil):
     """The stencil of points that see the same nodes: their numbers have no lanes."""
-    lines = tuple(Along(first_lane(line.first), *line[1:]) for line in stencil.lines)
+    lines = tuple(type(line)(first_lane(line.first), *line[1:]) for line in stencil.lines)
     return Stencil(lines, stencil.inv_r)
 
 

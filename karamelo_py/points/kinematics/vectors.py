@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.symbols import add_product, call
+from karamelo_py.compiler.tuples import row
 from karamelo_py.points.kinematics.components import (
     Components,
     Symmetric,
@@ -11,28 +12,12 @@ from karamelo_py.points.kinematics.components import (
     Vector,
     formula,
 )
-from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
 
 
-@point_function()
+@shared
 def vector_at(kin, array, i):
     """Row `i` of `array` (n, >= d) as a vector."""
-
-
-@vector_at.on(Line)
-def _(kin, array, i):
-    return (array[i, 0],)
-
-
-@vector_at.on(PlaneStrain)
-@vector_at.on(Axisymmetric)
-def _(kin, array, i):
-    return (array[i, 0], array[i, 1])
-
-
-@vector_at.on(Space)
-def _(kin, array, i):
-    return (array[i, 0], array[i, 1], array[i, 2])
+    return row(array, i, 0, (0,) * kin.dimension)
 
 
 @formula()

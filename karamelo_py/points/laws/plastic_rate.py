@@ -26,6 +26,8 @@ CELLS = 1000
 class PlasticRate(NamedTuple):
     """Rate of the equivalent plastic strain, smoothed over a time."""
 
+    in_lanes = True
+
     time: float
 
 

@@ -37,6 +37,7 @@ class Domain(NamedTuple):
     least_nodes = 2
     steady_moment = True
     steep_edge = False
+    in_lanes = True
     element = None
 
 

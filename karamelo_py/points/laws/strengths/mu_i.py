@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.compile import choose, real
 from karamelo_py.compiler.tuples import plus, scale
 from karamelo_py.language.signature import Positive
-from karamelo_py.points.kinematics import contract, zero_symmetric
+from karamelo_py.points.kinematics import contract
 from karamelo_py.points.laws.eos import pressure
 from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond
 from karamelo_py.points.laws.strengths.linear import elastic_trial
@@ -54,6 +54,8 @@ class MuI(NamedTuple):
     drucker-prager, mohr-coulomb, eos linear, material eos-strength
     """
 
+    in_lanes = True
+
     G: Annotated[float, Positive]
     mu_s: Annotated[float, Positive]
     mu_2: Annotated[float, Positive]
@@ -88,25 +90,24 @@ def _(strength, memory, j):
 
 @respond.on(MuI)
 def _(strength, law, kin, s, strain, j, memories, dt):
-    zero, half = real(0, j), real(0.5, j)
+    zero, one = real(0, j), real(1, j)
     memory = memories.strength
     elastic = elastic_ratio(strength, memory, j)
     p = pressure(law.eos, elastic, memories.energy, memories.heat)
     p = plus(p, thermal_pressure(law.temperature, memories.heat))
-    if not p > zero:
-        return zero_symmetric(kin, j), (memory[0], zero), zero
+    together = p > zero
     trial = elastic_trial(kin, strength.G, s, strain)
-    shear = sqrt(half * contract(kin, trial, trial))
-    slow = strength.mu_s * p
-    if shear <= slow:
-        return trial, (memory[0], zero), zero
+    shear = sqrt(real(0.5, j) * contract(kin, trial, trial))
+    flows = together & (shear > strength.mu_s * p)
+    p = choose(together, p, one)
+    slow, fast = strength.mu_s * p, strength.mu_2 * p
     # (shear - tau)/(G dt) is the shear rate that tau = mu(I) p asks for: a quadratic equation.
-    fast = strength.mu_2 * p
     grain = strength.d * sqrt(strength.rho_s / p)
     viscous = strength.I0 * strength.G * dt / grain
     b = fast + shear + viscous
     c = fast * shear + slow * viscous
     tau = real(2, c) * c / (b + sqrt(b * b - real(4, c) * c))
-    slip = (shear - tau) / strength.G
+    slip = choose(flows, (shear - tau) / strength.G, zero)
+    share = choose(flows, tau / choose(flows, shear, one), choose(together, one, zero))
     ep = memory[0] + slip * sqrt(real(1 / 3, slip))
-    return scale(tau / shear, trial), (ep, slip / dt * grain), tau * slip
+    return scale(share, trial), (ep, slip / dt * grain), tau * slip

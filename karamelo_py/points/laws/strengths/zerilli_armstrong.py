@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from math import exp
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.compile import choose, real
+from karamelo_py.compiler.powers import exponential
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
 from karamelo_py.points.laws.strengths.johnson_cook import power_law
@@ -53,6 +53,8 @@ class ZerilliArmstrong(NamedTuple):
     johnson_cook, plastic, temperature plastic_work
     """
 
+    in_lanes = True
+
     G: float
     C0: float
     C1: float
@@ -96,9 +98,8 @@ def _(strength, memory, increment, heat, dt):
     # exp(C4 T ln(rate)) is the rate to a power.
     power = strength.C4 * T
     rate, rate_slope = power_law(real(1, T), power, increment / (dt * strength.epsdot0))
-    if not power > 0:
-        rate = real(1, T)
-    thermal = exp(-strength.C3 * T)
+    rate = choose(power > 0, rate, real(1, rate))
+    thermal = exponential(-strength.C3 * T)
     factor = strength.C1 + root
     slope += thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
     return strength.C0 + thermal * rate * factor + athermal, slope
