@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 
 
@@ -34,4 +35,4 @@ def _(kin, volume, x):
 
 @face.on(Space)
 def _(kin, volume, x):
-    return volume ** real(2 / 3, volume)
+    return power(volume, real(2 / 3, volume))

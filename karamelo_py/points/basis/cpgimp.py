@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, index, real, shared
+from karamelo_py.compiler.powers import power
 from karamelo_py.compiler.symbols import Symbol, call
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.basis import carried, carrier, carriers, carry, deformed, mapped_again
@@ -222,7 +223,7 @@ def _stretched_box(kin, place: Vector, factors: Vector, f: Tensor):
 
 @deformed.on(CPGIMPDet)
 def _(basis, kin, place, dl):
-    return _scaled_box(kin, place, volume_ratio(kin, dl) ** stretched_share(kin, dl[0]))
+    return _scaled_box(kin, place, power(volume_ratio(kin, dl), stretched_share(kin, dl[0])))
 
 
 @deformed.on(CPGIMPDiagonal)
