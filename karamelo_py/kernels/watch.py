@@ -69,7 +69,7 @@ def _clear(control):
 
 
 @entered
-def _take(control):
+def _take_energies(control):
     clock, answer = control.clock[0], control.answer
     clock.kinetic = answer[KINETIC]
     clock.stored = answer[STORED] + clock.born_with
@@ -82,7 +82,7 @@ def sum_energies(s):
     _clear(s.control)
     _sum_blocks(s)
     collect(s.control.ranks, s.control, KINETIC, 3)
-    _take(s.control)
+    _take_energies(s.control)
 
 
 @entered
