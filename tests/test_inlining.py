@@ -14,6 +14,7 @@ from numba.core.typing import context, templates
 
 from karamelo_py.compiler import inlining
 from karamelo_py.compiler.compile import entered, kernel, shared
+from karamelo_py.kernels import contact, heat  # noqa: F401  (with all that they stand on)
 
 
 @shared
@@ -50,6 +51,12 @@ def test_what_is_inlined(tmp_path, monkeypatch):
     assert names["doubled"]
     assert not names["called"]
     assert not names["plain"]
+
+
+def test_names_are_of_one_kind():
+    """Numba tells a library by the qualified name of its function, without the module."""
+    assert {"_touch_pair"} <= inlining.left and {"_touch_nodes"} <= inlining.kept
+    assert not inlining.left & inlining.kept
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

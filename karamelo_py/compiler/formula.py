@@ -77,6 +77,20 @@ class Program(NamedTuple):
 
 
 @subkernel
+def _whole(op, a):
+    """A number without its fraction; by sums, which every target of Numba knows."""
+    if not abs(a) < 2.0**52:
+        return a  # whole, or no number
+    far = math.copysign(2.0**52, a)
+    near = (a + far) - far
+    if near > a and (op == _FLOOR or (op == _TRUNC and a > 0.0)):
+        near -= 1.0
+    elif near < a and (op == _CEIL or (op == _TRUNC and a < 0.0)):
+        near += 1.0
+    return math.copysign(near, a)  # -0.0 too
+
+
+@subkernel
 def _function(op, a):
     """Any function of one number: one chain of choices, where a loop for each would be too much."""
     if op == _NEG:
@@ -99,14 +113,8 @@ def _function(op, a):
         return math.sin(a)
     if op == _COS:
         return math.cos(a)
-    if op == _FLOOR:
-        return np.floor(a)
-    if op == _CEIL:
-        return np.ceil(a)
-    if op == _ROUND:
-        return np.rint(a)
-    if op == _TRUNC:
-        return np.trunc(a)
+    if _FLOOR <= op <= _TRUNC:
+        return _whole(op, a)
     if op == _CBRT:
         return math.copysign(math.pow(abs(a), 1.0 / 3.0), a)
     if op == _LOG10:

@@ -346,6 +346,7 @@ class _Globals(dict):
 _modules: dict[int, _Globals] = {}
 _copies: dict[Any, Any] = {}
 _choosers: dict[Callable, list[Callable]] = {}
+_left: set[Callable] = set()
 
 
 class _Module:
@@ -442,7 +443,7 @@ def _copy(thing: Any) -> Any:
         return _Emitted(thing)
     if isinstance(thing, type) and issubclass(thing, tuple):
         return thing
-    if hasattr(thing, "py_func") or cpu_target.typing_context._lookup_global(thing):
+    if thing in _left or hasattr(thing, "py_func") or cpu_target.typing_context._lookup_global(thing):
         return _Emitted(thing)
     if isinstance(thing, python.FunctionType):
         return _copied(thing)
@@ -538,6 +539,11 @@ def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
     if found is not None:
         note(found.parts)
     return found
+
+
+def leave(function: Callable) -> None:
+    """Leave a function to Numba: its loops stay loops."""
+    _left.add(function)
 
 
 def forget() -> None:
