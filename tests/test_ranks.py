@@ -8,9 +8,10 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
+from combinations import MESHED, scene, write_mesh
 from scenes import SCHEMES, block
 from states import same_bits
-from test_restart import CURVE, SCENES, same_files, with_files
+from test_restart import CURVE, SCENES, same_files, ways, with_files
 
 MOVING = (
     "fix(v, initial_velocity_particles, all, 0.9+sin(40*x0), 0.5*cos(70*y0))",
@@ -37,4 +38,15 @@ def test_schemes(state_interpreted, tmp_path, scheme, transfer):
 def test_every_part(state_interpreted, tmp_path, name):
     """Contact, heat, damage, edges, tools, computes that look back."""
     (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
-    assert shared(state_interpreted, tmp_path, with_files(SCENES[name]))
+    # Without memory: both run in one process here.
+    script = SCENES[name].replace("pumps.", "shoves.")
+    assert shared(state_interpreted, tmp_path, with_files(script))
+
+
+@pytest.mark.parametrize("way", ways(), ids=lambda way: " ".join(filter(None, way)))
+def test_every_way(state_interpreted, tmp_path, way):
+    """Methods, bases, transfers, schemes and kinematics; three ranks."""
+    option = way[3]
+    mesh = write_mesh(tmp_path / "m.vtk", MESHED[option]) if option in MESHED else None
+    script = with_files(scene(*way, mesh=mesh, steps=4))
+    assert shared(state_interpreted, tmp_path, script, ranks=3)
