@@ -131,7 +131,7 @@ IN_KERNEL = {
     # what is done at points and nodes in the two visits of musl, four points at once or one by one
     "OldWeights", "PresentWeights", "Strain", "Move", "MassMomentum", "MomentumAgain",
     "InternalForce", "Update", "MomentumToVelocity", "Fours",
-    "PointByPoint",
+    "PointByPoint", "Stencil",
 }  # fmt: skip
 
 

@@ -443,7 +443,8 @@ def _copy(thing: Any) -> Any:
         return _Emitted(thing)
     if isinstance(thing, type) and issubclass(thing, tuple):
         return thing
-    if thing in _left or hasattr(thing, "py_func") or cpu_target.typing_context._lookup_global(thing):
+    known = cpu_target.typing_context._lookup_global
+    if thing in _left or hasattr(thing, "py_func") or known(thing):
         return _Emitted(thing)
     if isinstance(thing, python.FunctionType):
         return _copied(thing)
