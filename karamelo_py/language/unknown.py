@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any, Protocol
 
 from karamelo_py.language import registry
+from karamelo_py.language.own_words import in_own_words
 from karamelo_py.script import expressions
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS
@@ -27,6 +28,7 @@ class Names(Protocol):
 
     hub: Any
     variables: dict[str, Any]
+    statement: Any  # in progress
     frames: list[Any]  # scripts in progress, the innermost last
 
     def knows(self, name: str) -> bool:
@@ -49,7 +51,7 @@ def unknown_call(script: Names, name: str, place: Any, statement: bool) -> Scrip
     """The error for a call of what is no command, or no function."""
     commands = registry.names("command")
     what = "command" if statement else "function"
-    other = instead("command", name) if statement else None
+    other = in_own_words(script, name) or instead("command", name) if statement else None
     if script.knows(name) and not other:
         return ScriptError(
             f"'{name}' is not a {what} but a variable",
