@@ -114,3 +114,18 @@ def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):
     (told,) = places(err)
     assert told[0] == 2
     assert hint in err.partition("hint: ")[2]
+
+
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("plot(e, 2, time, Ekk)", "did you mean 'Ek', which stands further down, in line 9?"),
+        ("plot(e, 2, t, time)", "did you mean 'time'?"),
+        ("plot(e, 2, stp, time)", "did you mean 'step'?"),
+        ("plot(e, 2, time, time, rigth)", "axis=right"),
+        ("plot(e, 2, time, time, log)", "scale=log"),
+    ],
+)
+def test_slips_in_a_plot(run_interpreted, line, hint):
+    lines = [line, "compute(Ek, kinetic_energy, all)", "run(1)"]
+    assert f"hint: {hint}" in run_interpreted(block(2, "# a plot", *lines), status=1).err

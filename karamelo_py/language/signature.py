@@ -39,7 +39,7 @@ from karamelo_py.language.kinds import (
     kind_of,
 )
 from karamelo_py.language.own_words import longer
-from karamelo_py.script.errors import Place, ScriptError, meant
+from karamelo_py.script.errors import Place, ScriptError, meant, nearest
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
@@ -214,6 +214,10 @@ def _bind(
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
         gap = with_gap(given)
         hint = longer(name, given) if len(given) < needed else None
+        if surplus is not None:
+            values = {word: f"{p.name}={word}" for p in by_name.values() for word in p.kind.words}
+            word = surplus.text if surplus.text in values else nearest(surplus.text, values)
+            hint = values.get(word or "", hint)
         if gap:
             hint = f"is a comma missing in '{gap.text}'?"
         missing = [p.shown for p in slots[len(given) : needed]] or [f"{m}=..." for m in missing]

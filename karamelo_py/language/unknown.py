@@ -122,7 +122,10 @@ def unknown_name(script: Names, name: str, place: Any) -> ScriptError:
         if name == "t"
         else nearest(name, known) or by_style.get(nearest(name, by_style) or "")
     )
+    later = {} if close else _further_down(script)
     hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
+    if below := nearest(name, later):
+        hint = f"did you mean '{below}', which stands further down, in line {later[below]}?"
     if re.match("leq|geq", name) and not close:
         hint = f"{name[:3]} stands in front of a bound in fix velocity_nodes only"
     if name.upper() in WORDS:
@@ -165,6 +168,19 @@ def _not_published(script: Names, name: str, place: Any) -> ScriptError | None:
                 hint=f"did you mean '{close}'?" if close else None,
             )
     return None
+
+
+def _further_down(script: Names) -> dict[str, int]:
+    """Variables, fixes and computes that the script makes further down, with their lines."""
+    found = {}
+    for frame in script.frames:
+        for statement in frame.statements[frame.next :]:
+            if isinstance(statement, Assignment):
+                found[statement.name] = statement.place.line
+            elif isinstance(statement, Call) and statement.name in ("fix", "compute"):
+                ID = statement.arguments[0].code.strip() if statement.arguments else ""
+                found[ID] = statement.place.line
+    return found
 
 
 def defined_later(script: Names, name: str) -> Any:
