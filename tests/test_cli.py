@@ -45,3 +45,36 @@ def test_help_of_bench_lists_what_it_measures(capsys):
 @pytest.mark.parametrize("option", ["-var", "--var", "-v"])
 def test_variables(run_script, option):
     assert "a = 4" in run_script("a = 3\nprint(a)\n", option, "a", "4").out
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("in.a --thread 2", "there is no option --thread\n"),
+        ("in.a --thread 2", "did you mean --threads?"),
+        ("in.a --treads=2", "did you mean --threads?"),
+        ("sweep in.a -var n=1,2 --job 2", "did you mean -jobs?"),
+        ("in.a -var n=10", "hint: -var n 10"),
+        ("in.a -var n ten", "-var n ten is a text, and the script has a number here"),
+        ("in.a in.b", "one word too many: in.b"),
+        ("check", "expected: karamelo-py check SCRIPT"),
+        ("run", "expected: karamelo-py SCRIPT"),
+        ("in.a -out in.b/x", "hint: -out x is a folder in this one"),
+        ("in.aa", "did you mean in.a?"),
+        ("sweep in.aa -var n=1", "did you mean in.a?"),
+        ("view q.*.txt", "no file matches q.*.txt"),
+        ("plot Ek", "hint: karamelo-py plot log.mpm Ek"),
+        ("plot log.mpm E", "did you mean 'Es' or 'Ek'?"),
+        ("in.a -restart r.2.h5 r.10.h5 r.7.h5", "there is no file r.10.h5"),
+        ("in.a -restart r.2.h5 in.b", "one word too many: in.b"),
+    ],
+)  # fmt: skip
+def test_what_a_slip_of_the_pen_says(tmp_path, monkeypatch, capsys, words, says):
+    """Options and names that are nearly right; pictures are no scripts."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "in.a").write_text("n = 3\nprint(n)\n")
+    (tmp_path / "in.b").write_text("print(1)\n")
+    (tmp_path / "in.aa.png").write_text("a picture")
+    (tmp_path / "log.mpm").write_text("Step Time Ek Es\n0 0 1 2\n")
+    assert main(words.split()) == 1
+    assert says in capsys.readouterr().err

@@ -131,13 +131,15 @@ def test_solids_as_in_2020(run_interpreted):
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("method_modify(FLIP, 0.99)", "method(tlmpm, FLIP, linear, 0.99)"),
-        ("solid(s, block, 0, 1, 0, 1, 2, rubber, 0.1)", "region(box, block, ...)"),
-        ("solid(s, cylinder, 0.5, 0.5, 0.1, 2, rubber, 0.1)", "region(box, cylinder, ...)"),
-        ("solid(s, rectangle, 0, 1, 0, 1, 2, rubber, 0.1)", "solid(ID, region, box, ppc"),
+        ("method_modify(FLIP, 0.99)", "method(ulmpm, FLIP, linear, 0.99), in the place of line 1"),
+        ("method_modify(PIC, cubic-spline)", "method(ulmpm, PIC, cubic-spline), in the place"),
+        ("solid(s, block, 0, 1, 0, 2*H, 2, rubber, 0.1)", "region(box, block, 0, 1, 0, 2*H), and"),
+        ("solid(s, cylinder, 0.5, 0, 0.1, 2, rubber, 0.1)", "region(box, cylinder, 0.5, 0, 0.1), "),
+        ("solid(s, rectangle, 0, 1, 0, 1, 2, m, 0.1)", "and solid(s, region, box, 2, m, 0.1)"),
+        ("solid(s, sphere)", "solid(ID, region, box, ppc"),
         ("strength(s, JC, 1, 1, 1, 1, 1, 1)", "the style johnson_cook"),
         ("region(r, block, INF, INF, 0.5, INF, INF, INF)", "too many in 2D"),
-        ("partition_domain(nodes)", "linear weights"),
+        ("partition_domain(nodes)", "method(ulmpm, FLIP, linear, 1), in the place"),
         ("eos(e, shock, 2, 100, 10, 1.5, 2, 1)", "eos(ID, shock, rho0, K, c0, S, Gamma, cv, Tr"),
         ("strength(s, johnson_cook, 1, 1, 1, 1, 1, 1)", "johnson_cook, G, A, B, n, epsdot0, C, m"),
     ],
@@ -146,3 +148,14 @@ def test_words_of_2020_say_what_to_write(run_interpreted, line, says):
     result = run_interpreted(block(2, line), status=1)
     assert says in result.err
     assert "did you mean" not in result.err
+
+
+def test_a_domain_without_a_size_is_told_with_that_of_the_block(run_interpreted):
+    script = "L = 1\ndimension(3)\nregion(b, block, 0, L, 0, 2*L, 0, 1)\n"
+    err = run_interpreted(script + "method_modify(FLIP, cubic-spline)\n", status=1).err
+    assert "dimension(3, 0, L, 0, 2*L, 0, 1, h) is as large as this block" in err
+
+
+def test_one_method_where_the_script_has_none(run_interpreted):
+    err = run_interpreted("method_modify(FLIP, cubic-spline)\n", status=1).err
+    assert "method(tlmpm, FLIP, cubic-spline, 0.99), at the top of the script" in err

@@ -166,6 +166,10 @@ def test_a_function_of_a_module(run_interpreted, tmp_path):
         ("ropes.leaves", "fix python: leaves: SystemExit: 0 (ropes.py:6)"),
         ("ropes.two", "two cannot be called with one argument: missing a required argument: 'b'"),
         ("ropes.pull", "the method has to be thermo-mechanical"),
+        ("ropes.column", "PointsView has no ['vy']: write .velocity[:, 1]"),
+        ("ropes.column", "\n  ropes.py:12 in column: deeper(points)\n  ropes.py:10 in deeper: "),
+        ("ropes.nothing", "its attributes are force, heat_supply, mass, position"),
+        ("ropes.library", "hint: mend the function there:\n  ropes.py:16 in library: def library"),
     ],
 )
 def test_functions_with_faults(run_interpreted, tmp_path, line, says):
@@ -173,6 +177,9 @@ def test_functions_with_faults(run_interpreted, tmp_path, line, says):
     (tmp_path / "run" / "ropes.py").write_text(
         "def pull(points):\n    return points.heat_supply\n\ndef broken(points): return 1/0\n"
         "\ndef leaves(points): raise SystemExit(0)\n\ndef two(points, b): pass\n"
+        "def deeper(points):\n    return points['vy']\ndef column(points):\n    deeper(points)\n"
+        "def nothing(points):\n    points['nonsense'] = 1\n"
+        "import json\ndef library(points): json.loads('{')\n"
     )
     result = run_interpreted(block(2, f"fix(p, python, all, {line})", "run(1)"), status=1)
     assert says in result.err
@@ -203,8 +210,13 @@ def test_errors_carry_message_and_place(tmp_path, capsys):
         Simulation(tmp_path / "in.wrnog")
     with pytest.raises(AttributeError, match="did you mean 'solid'"):
         sim.solidd()
-    with pytest.raises(KeyError, match="did you mean 's1"):
-        sim.points["s1"]
+    for name, says in (
+        ("s1", "did you mean 's1"),
+        ("nonsense", "there is no 'nonsense'; there are"),
+    ):
+        with pytest.raises(KeyError, match=says) as missing:
+            sim.points[name]
+        assert str(missing.value).startswith("there is no")
     with pytest.raises(TypeError, match="is no number"):
         sim.region("box", "block", [0, 1])
     with pytest.warns(KarameloWarning, match="has no effect"):

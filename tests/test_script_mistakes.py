@@ -92,9 +92,16 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("units lj", "units(m, kg, s)"),
         ("write_data end.dat", "write_restart(file)"),
         ("region(b, block, 0 1, 0, 1)", "is a comma missing in '0 1'?"),
-        ("eos(e, shock, 1, 1, 1, 0, 1, 0)", "eos(ID, shock, rho0, K, c0, S, 0, 0, 0, 0, 0)"),
-        ("strength(s, johnson_cook, 1, 1, 1, 1, 0, 0)", "n, epsdot0, C, 0, 0, 1)"),
-        ("damage(d, damage_johnson_cook, 1, 1, 1, 0, 1)", "d3, d4, 0, epsdot0, 0, 1)"),
+        ("eos(e, shock, 7, K, 6, 0, 5, 4)", "eos(e, shock, 7, K, 6, 5, 4, 0, 0, 0, 0)"),
+        ("eos(e, shock, 7, 6)", "eos(e, shock, rho0, K, c0, S, 0, 0, 0, 0, 0)"),
+        (
+            "strength(s, johnson_cook, 1, 2, 3, n, 4, C)",
+            "(s, johnson_cook, 1, 2, 3, n, 4, C, 0, 0, 1)",
+        ),
+        (
+            "damage(d, damage_johnson_cook, 1, 1, 1, 0, 1)",
+            "damage(d, damage_johnson_cook, 1, 1, 1, 0, 0, 1, 0, 1)",
+        ),
         ("fix(f, indent/pinball, all)", "indent/minimize_penetration"),
         ("my speed = 3", "a name has no blanks: my_speed = ..."),
         ("x AND y", "write and"),
@@ -107,3 +114,18 @@ def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):
     (told,) = places(err)
     assert told[0] == 2
     assert hint in err.partition("hint: ")[2]
+
+
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("plot(e, 2, time, Ekk)", "did you mean 'Ek', which stands further down, in line 9?"),
+        ("plot(e, 2, t, time)", "did you mean 'time'?"),
+        ("plot(e, 2, stp, time)", "did you mean 'step'?"),
+        ("plot(e, 2, time, time, rigth)", "axis=right"),
+        ("plot(e, 2, time, time, log)", "scale=log"),
+    ],
+)
+def test_slips_in_a_plot(run_interpreted, line, hint):
+    lines = [line, "compute(Ek, kinetic_energy, all)", "run(1)"]
+    assert f"hint: {hint}" in run_interpreted(block(2, "# a plot", *lines), status=1).err

@@ -77,6 +77,15 @@ def test_view_takes_files_in_the_order_of_their_steps(tmp_path, monkeypatch, cap
     assert (tmp_path / "f.16.png").exists()
 
 
+def test_a_pattern_in_quotes_is_that_of_a_shell(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    hub = FakeHub(tmp_path, dimension=2)
+    hub.dumps["d"] = Particle(hub, 5, "p.*.dump", "vx")
+    hub.run(10)
+    assert call(capsys, "view", "p.*.dump", "-o", "v.*.png")[0] == 0
+    assert sorted(path.name for path in tmp_path.glob("v.*")) == ["v.0.png", "v.10.png", "v.5.png"]
+
+
 def test_colours_mean_the_same_in_all_pictures(tmp_path, monkeypatch, capsys):
     """The first picture knows of the larger values of the second, which is as if drawn alone."""
     monkeypatch.chdir(tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -30,6 +31,13 @@ karamelo-py help STYLE           explain a style: karamelo-py help body_force
 karamelo-py help FAMILY STYLE    where a name means several things:
                                  karamelo-py help fix kinetic_energy
 karamelo-py styles [FAMILY]      list commands and styles"""
+USAGE = """\
+karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [-log FILE] [-out FOLDER]
+                          [-restart FILE]
+                          [--trust-geometries] [--quiet] [--debug]
+       karamelo-py COMMAND ..."""
+VARIABLE = ("-var", "--var", "-v")
+RESTART = ("-restart", "--restart")
 RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 
 
@@ -101,8 +109,56 @@ def _dispatch(arguments: list[str]) -> int:
         arguments = ["run", *arguments]
     if first == "help" and len(arguments) == 2 and arguments[1] in COMMANDS[1:]:
         arguments = [arguments[1], "-h"]
-    options = _parser(arguments[0]).parse_args(arguments)
+    if arguments[0] in ("run", "check"):
+        arguments = _one_file(arguments)
+    parser, commands = _parser(arguments[0])
+    options, surplus = parser.parse_known_args(arguments)
+    if surplus:
+        raise _surplus(surplus, arguments[0], commands.choices.get(arguments[0], parser))
     return options.act(options)
+
+
+def _one_file(arguments: list[str]) -> list[str]:
+    """The last of the files behind -restart where a shell has put all that match a pattern.
+
+    Raises
+    ------
+    ScriptError
+        For ``-var NAME=VALUE``.
+    """
+    chosen: list[str] = []
+    for word in arguments:
+        before = chosen[-1] if chosen else ""
+        if before in VARIABLE and (given := re.fullmatch(r"([^\W\d]\w*)=(.+)", word)):
+            raise ScriptError(
+                f"-var takes a name and a value, with a blank between them, not {word}",
+                hint=f"-var {given[1]} {given[2]}",
+            )
+        if chosen[-2:-1] and chosen[-2] in RESTART and _unnumbered(word) == _unnumbered(before):
+            chosen[-1] = max(word, before, key=_numbers)
+        else:
+            chosen.append(word)
+    return chosen
+
+
+def _unnumbered(name: str) -> str:
+    return re.sub(r"\d+", "#", name)
+
+
+def _numbers(name: str) -> list[int]:
+    return [int(digits) for digits in re.findall(r"\d+", name)]
+
+
+def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError:
+    """The error for words that a command line has no use for."""
+    option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
+    close = nearest(option, parser.options()) if option else None
+    usage = USAGE if command == "run" else parser.format_usage().removeprefix("usage: ").rstrip()
+    return ScriptError(
+        f"there is no option {option}" if option else f"one word too many: {words[0]}",
+        expected=usage,
+        hint=f"did you mean {close}?" if close else None,
+    )
 
 
 class CommandLine(argparse.ArgumentParser):
@@ -112,18 +168,19 @@ class CommandLine(argparse.ArgumentParser):
         usual = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
         super().__init__(**(usual | options))
 
+    def options(self) -> list[str]:
+        """All words that begin an option."""
+        return [word for action in self._actions for word in action.option_strings]
+
     def error(self, message: str) -> NoReturn:
         raise ScriptError(message, expected=self.format_usage().removeprefix("usage: ").rstrip())
 
 
-def _parser(command: str) -> CommandLine:
-    """The command line; what only `command` needs is there only for it."""
+def _parser(command: str) -> tuple[CommandLine, Any]:
+    """The command line and its subparsers; what only `command` needs is there only for it."""
     parser = CommandLine(
         prog="karamelo-py",
-        usage="karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [-log FILE] [-out FOLDER]\n"
-        "                          [-restart FILE]\n"
-        "                          [--trust-geometries] [--quiet] [--debug]\n"
-        "       karamelo-py COMMAND ...",
+        usage=USAGE,
         description=f"karamelo-py {__version__}: the material point method",
         epilog="karamelo-py COMMAND -h explains a command. karamelo-py SCRIPT is short for\n"
         "karamelo-py run SCRIPT.",
@@ -160,7 +217,7 @@ def _parser(command: str) -> CommandLine:
         add_output_options(script)
         if name == "run":
             script.add_argument(
-                "-restart", "--restart", type=Path, metavar="FILE",
+                *RESTART, type=Path, metavar="FILE",
                 help="go on from a file that restart(...) has written",
             )  # fmt: skip
         script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
@@ -173,13 +230,13 @@ def _parser(command: str) -> CommandLine:
             import_module(module).add_parser(commands)
         else:
             commands.add_parser(name, help=summary)
-    return parser
+    return parser, commands
 
 
 def add_variables(parser: CommandLine, text: str) -> None:
     """Let a command line set variables of scripts."""
     parser.add_argument(
-        "-var", "--var", "-v", nargs=2, action="append", default=[], metavar=("NAME", "VALUE"),
+        *VARIABLE, nargs=2, action="append", default=[], metavar=("NAME", "VALUE"),
         help=text,
     )  # fmt: skip
 
@@ -203,7 +260,8 @@ def ranks_option(text: str) -> int:
 def _run(options: argparse.Namespace) -> int:
     script = options.input or options.script
     if script is None:
-        raise ScriptError("no script is named", expected="karamelo-py SCRIPT")
+        command = "karamelo-py check" if options.checking else "karamelo-py"
+        raise ScriptError("no script is named", expected=f"{command} SCRIPT")
     crew = None
     if (options.ranks or launched()[0]) > 1:
         from karamelo_py.app.launch import join, launch

@@ -34,7 +34,11 @@ def direct(hub: Hub, options: argparse.Namespace) -> None:
             if not hub.checking:
                 options.out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise ScriptError(f"cannot write to {options.out}: {error.strerror}") from error
+            raise ScriptError(
+                f"cannot write to {options.out}: {error.strerror}",
+                expected="a folder, or the name of one that can be made",
+                hint=f"-out {options.out.name or 'run'} is a folder in this one",
+            ) from error
         hub.folder = options.out.absolute()
     if options.log is not None:
         hub.output.log.file = options.log

@@ -10,7 +10,7 @@ from typing import Any
 
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import Curve, Plots
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, nearest_few
 
 SUMMARY = "Draw columns of a log."
 TEXT = """\
@@ -39,6 +39,12 @@ def add_parser(subparsers: Any) -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace) -> int:
     """Draw what the command line asks for; returns the exit status."""
+    if not options.log.exists() and not options.log.suffix:
+        raise ScriptError(
+            f"there is no log {options.log}",
+            expected="the name of a log, and then the columns",
+            hint=f"karamelo-py plot log.mpm {options.log}",
+        )
     rows = read(options.log)
     known = list(dict.fromkeys(name for row in rows for name in row))
     if not options.columns and not options.right:
@@ -47,11 +53,11 @@ def run(options: argparse.Namespace) -> int:
     picture_format(options.output)
     for name in (options.x, *options.columns, *options.right):
         if name not in known:
-            close = nearest(name, known)
+            close = " or ".join(f"'{column}'" for column in nearest_few(name, known))
             raise ScriptError(
                 f"{options.log} has no column '{name}'",
                 expected="one of " + " ".join(known),
-                hint=f"did you mean '{close}'?" if close else None,
+                hint=f"did you mean {close}?" if close else None,
             )
     no_units = SimpleNamespace(units=None)
     plots = Plots(SimpleNamespace(output=no_units, fixes={}, computes={}, folder=Path()))

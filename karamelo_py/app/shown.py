@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.script.errors import nearest
+from karamelo_py.script.errors import NoItem, nearest_few
 
 
 class Table(Mapping):
@@ -22,9 +22,9 @@ class Table(Mapping):
     def __getitem__(self, name: str) -> np.ndarray:
         names = self._names()
         if name not in names:
-            close = nearest(name, names)
-            hint = f"; did you mean '{close}'?" if close else ""
-            raise KeyError(f"there is no '{name}'{hint}")
+            close = nearest_few(str(name), names)
+            hint = f"did you mean {' or '.join(map(repr, close))}? " if close else ""
+            raise NoItem(f"there is no '{name}'; {hint}there are {', '.join(names) or 'none'}")
         return self._column(name)
 
     def __iter__(self) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import glob
 from collections.abc import Iterable
 from pathlib import Path
 from types import SimpleNamespace
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         raise ScriptError("view draws .png", expected="a file name ending in .png, .gif or .mp4")
     frames = Frames(options.fps)
     # Named by number, 1000 comes after 999.
-    files = sorted(options.files, key=lambda path: (_number(path), path.name))
+    files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
     drawn = 0
     with unwarned():
         picture = None
@@ -76,6 +77,26 @@ def run(options: argparse.Namespace) -> int:
         frames.save(options.output)
     print(f"{options.output}: {drawn} {'frame' if movie else 'picture'}{'s' * (drawn > 1)}")
     return 0
+
+
+def _matching(names: Iterable[Path]) -> set[Path]:
+    """The files of these names; a pattern that no shell has replaced stands for all that match.
+
+    Raises
+    ------
+    ScriptError
+        If none does.
+    """
+    found: set[Path] = set()
+    for name in names:
+        if name.exists() or not glob.has_magic(str(name)):
+            found.add(name)
+            continue
+        there = glob.glob(str(name))
+        if not there:
+            raise ScriptError(f"no file matches {name}", expected="dumps of an earlier run")
+        found |= {Path(file) for file in there}
+    return found
 
 
 def _number(path: Path) -> int:

@@ -7,6 +7,7 @@ from typing import Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
+from karamelo_py.language.own_words import SHAPES, filled
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
@@ -15,9 +16,6 @@ from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, own_grids, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse_text
-
-# Words that stood in the place of the style region in 2020.
-SHAPES = ("block", "box", "cylinder", "rectangle", "sphere")
 
 
 def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> None:
@@ -61,6 +59,13 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
             kind = "region"
         elif kind in SHAPES and arguments and arguments[0].word() in hub.regions:
             kind = "region"
+        elif hint := filled(hub.interpreter.statement):
+            raise ScriptError(
+                f"unknown solid style '{kind}'",
+                argument="kind",
+                expected="one of " + ", ".join(registry.names("solid")),
+                hint=hint,
+            )
     target = registry.find("solid", kind)
     new = signature.call(target, hub, list(arguments), f"solid {kind}")
     warn_of_coinciding(hub, new, ID)

@@ -44,6 +44,11 @@ class Argument:
     def place(self) -> Place:
         return self._raw.place
 
+    @property
+    def statement(self) -> Any:
+        """The statement that the script is at."""
+        return self._interpreter.statement
+
     def __repr__(self) -> str:
         return f"Argument({self.text!r})"
 

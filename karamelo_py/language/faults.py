@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import sysconfig
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -101,6 +102,22 @@ def places_of(error: Exception) -> list[tuple[str, int]]:
     compiled = (frame.f_locals.get("func") for frame, _ in frames)
     codes = [f.__code__ for f in compiled if inspect.isfunction(f)]
     return [*named, *((code.co_filename, code.co_firstlineno) for code in codes), *here]
+
+
+# Not of the user: this program, Python's own library, and what is installed.
+_OTHERS = (
+    str(Path(__file__).parents[1]),
+    *map(sysconfig.get_path, ("stdlib", "purelib", "platlib")),
+)
+
+
+def steps_to(error: BaseException) -> list[str]:
+    """``ropes.py:12 in pull: inner(points)``: the lines of the user that led to an exception."""
+    return [
+        f"{Path(frame.filename).name}:{frame.lineno} in {frame.name}: {frame.line}".rstrip(": ")
+        for frame in traceback.extract_tb(error.__traceback__)
+        if not frame.filename.startswith(_OTHERS)
+    ]
 
 
 def place_in(code: Any, error: BaseException) -> str:

@@ -337,6 +337,8 @@ class Interpreter:
             # What was a word at first may have become an expression of variables.
             if isinstance(self.variables.get(name), str):
                 self.variables[name] = self._preset_value(name)
+            if isinstance(self.variables[name], str):
+                self._refuse_text(name, statement)
             return
         if name not in self.variables and (name in FUNCTIONS or registry.knows("command", name)):
             kind = "function" if name in FUNCTIONS else "command"
@@ -351,6 +353,18 @@ class Interpreter:
                 hint="choose another name",
             )
         self.variables[name] = self._right_hand_side(statement.node, statement.right)
+
+    def _refuse_text(self, name: str, statement: Assignment) -> None:
+        """Refuse a text from the command line for what is a number in the script."""
+        try:
+            own = self.evaluate(statement.node, statement.right)
+        except ScriptError:
+            return
+        if isinstance(own, float):
+            raise ScriptError(
+                f"-var {name} {self._presets[name]} is a text, and the script has a number here",
+                expected=f"a number or a formula, as in -var {name} {statement.right.code.strip()}",
+            )
 
     def _right_hand_side(self, node: Node, raw: Raw) -> Value:
         try:

@@ -38,8 +38,8 @@ from karamelo_py.language.kinds import (
     is_raw,
     kind_of,
 )
-from karamelo_py.script.errors import Place, ScriptError, meant
-from karamelo_py.script.other_programs import SHORTER
+from karamelo_py.language.own_words import longer
+from karamelo_py.script.errors import Place, ScriptError, meant, nearest
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
@@ -213,7 +213,11 @@ def _bind(
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
         gap = with_gap(given)
-        hint = SHORTER.get(name) if len(given) < needed else None
+        hint = longer(name, given) if len(given) < needed else None
+        if surplus is not None:
+            values = {word: f"{p.name}={word}" for p in by_name.values() for word in p.kind.words}
+            word = surplus.text if surplus.text in values else nearest(surplus.text, values)
+            hint = values.get(word or "", hint)
         if gap:
             hint = f"is a comma missing in '{gap.text}'?"
         missing = [p.shown for p in slots[len(given) : needed]] or [f"{m}=..." for m in missing]

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any, Protocol
 
 from karamelo_py.language import registry
+from karamelo_py.language.own_words import in_own_words
 from karamelo_py.script import expressions
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.expressions import SEEDS
@@ -27,6 +28,7 @@ class Names(Protocol):
 
     hub: Any
     variables: dict[str, Any]
+    statement: Any  # in progress
     frames: list[Any]  # scripts in progress, the innermost last
 
     def knows(self, name: str) -> bool:
@@ -49,7 +51,7 @@ def unknown_call(script: Names, name: str, place: Any, statement: bool) -> Scrip
     """The error for a call of what is no command, or no function."""
     commands = registry.names("command")
     what = "command" if statement else "function"
-    other = instead("command", name) if statement else None
+    other = in_own_words(script, name) or instead("command", name) if statement else None
     if script.knows(name) and not other:
         return ScriptError(
             f"'{name}' is not a {what} but a variable",
@@ -120,7 +122,10 @@ def unknown_name(script: Names, name: str, place: Any) -> ScriptError:
         if name == "t"
         else nearest(name, known) or by_style.get(nearest(name, by_style) or "")
     )
+    later = {} if close else _further_down(script)
     hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
+    if below := nearest(name, later):
+        hint = f"did you mean '{below}', which stands further down, in line {later[below]}?"
     if re.match("leq|geq", name) and not close:
         hint = f"{name[:3]} stands in front of a bound in fix velocity_nodes only"
     if name.upper() in WORDS:
@@ -163,6 +168,19 @@ def _not_published(script: Names, name: str, place: Any) -> ScriptError | None:
                 hint=f"did you mean '{close}'?" if close else None,
             )
     return None
+
+
+def _further_down(script: Names) -> dict[str, int]:
+    """Variables, fixes and computes that the script makes further down, with their lines."""
+    found = {}
+    for frame in script.frames:
+        for statement in frame.statements[frame.next :]:
+            if isinstance(statement, Assignment):
+                found[statement.name] = statement.place.line
+            elif isinstance(statement, Call) and statement.name in ("fix", "compute"):
+                ID = statement.arguments[0].code.strip() if statement.arguments else ""
+                found[ID] = statement.place.line
+    return found
 
 
 def defined_later(script: Names, name: str) -> Any:

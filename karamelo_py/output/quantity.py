@@ -7,7 +7,7 @@ from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant, nearest
 from karamelo_py.script.expressions import POINT_SEEDS
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
@@ -76,8 +76,8 @@ class Quantity:
                 error.place = argument.place
             if error.message == f"unknown name '{text}'":
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
-                close = nearest(text, KEYWORDS)
-                error.hint = f"did you mean '{close}'?" if close else error.hint
+                if not (error.hint or "").startswith("did you mean"):
+                    error.hint = meant(text, KEYWORDS) or error.hint
                 if text in hub.fields.particle_names():
                     error.hint = (
                         f"{text} differs from point to point: dump(...) writes it, and "

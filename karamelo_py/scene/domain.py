@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from karamelo_py.language.own_words import words_of
 from karamelo_py.language.scene import Scene
 from karamelo_py.scene.lattice import CHUNK, RELATIVE_TOLERANCE, Lattice
 from karamelo_py.script.errors import ScriptError
@@ -82,6 +83,17 @@ class Domain:
         return inside
 
 
+def _around(hub: Scene, dimension: int) -> str | None:
+    """A domain as large as the block that the statement in progress would make."""
+    words = words_of(hub.interpreter.statement)
+    if words[1:2] != ["block"] or len(words) < 2 + 2 * dimension or "INF" in " ".join(words):
+        return None
+    ends = ", ".join(words[2 : 2 + 2 * dimension])
+    return (
+        f"dimension({dimension}, {ends}, h) is as large as this block; what moves needs more room"
+    )
+
+
 def require_domain(hub: Scene) -> Domain:
     """The domain of the scene.
 
@@ -99,6 +111,7 @@ def require_domain(hub: Scene) -> Domain:
                 "directions there are",
                 expected=f"create_domain({', '.join(ends)}, h) before this line, or in its place "
                 f"dimension({announced}, {', '.join(ends)}, h)",
+                hint=_around(hub, announced),
             )
         raise ScriptError(
             "there is no domain yet",

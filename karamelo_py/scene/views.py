@@ -6,6 +6,7 @@ by assignment or in place, is written back when it returns; what cannot be chang
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -29,7 +30,7 @@ from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.step import corners_that_move
 from karamelo_py.points.transfers import Moment
-from karamelo_py.script.errors import nearest
+from karamelo_py.script.errors import NoItem, nearest
 
 
 class Shown:
@@ -67,6 +68,17 @@ class Shown:
         now[...] = value
 
 
+# Columns of dumps, by the letters around the direction, and the arrays that hold them.
+_COLUMN = re.compile("([vfb]?)([xyz])(0?)")
+_VECTORS = {
+    ("", ""): "position",
+    ("", "0"): "reference_position",
+    ("v", ""): "velocity",
+    ("f", ""): "force",
+    ("b", ""): "force",
+}
+
+
 class _View:
     """A view whose fields are the only attributes, and take only what fits."""
 
@@ -95,6 +107,23 @@ class _View:
 
     def __getattr__(self, name: str) -> Any:
         raise self._unknown(name)
+
+    def __getitem__(self, name: Any) -> Any:
+        raise self._no_column(name)
+
+    def __setitem__(self, name: Any, value: Any) -> None:
+        raise self._no_column(name)
+
+    def _no_column(self, name: Any) -> KeyError:
+        """The error for a column in brackets, which says the attribute."""
+        kind = type(self).__name__
+        split = _COLUMN.fullmatch(str(name))
+        attribute = _VECTORS.get((split[1], split[3])) if split else name
+        if isinstance(getattr(type(self), str(attribute), None), Shown):
+            place = f"[:, {'xyz'.index(split[2])}]" if split else ""
+            return NoItem(f"{kind} has no ['{name}']: write .{attribute}{place}")
+        names = ", ".join(n for n in dir(type(self)) if isinstance(getattr(type(self), n), Shown))
+        return NoItem(f"{kind} has no ['{name}']; its attributes are {names}")
 
     def _unknown(self, name: str) -> AttributeError:
         names = [*self._fields, *(n for n in dir(type(self)) if not n.startswith("_"))]
@@ -236,6 +265,8 @@ class PointsView(_View):
 
     def __getitem__(self, kind: type) -> np.ndarray:
         """(n, components) of a field that a fix declares in its ``point_fields``."""
+        if isinstance(kind, str):
+            raise self._no_column(kind)
         if kind not in self._declared:
             array = np.array(self._gather(self._of(kind)))
             self._declared[kind] = array, array.copy()

@@ -21,6 +21,13 @@ class Place(NamedTuple):
     text: str
 
 
+class NoItem(KeyError):
+    """What is not there in brackets; its text is the whole message."""
+
+    def __str__(self) -> str:
+        return self.args[0]
+
+
 class Quit(Exception):
     """The statement quit: the script ends here, and that is fine."""
 
@@ -143,6 +150,15 @@ def meant(name: str, names: Iterable[str]) -> str | None:
     """``did you mean '...'?`` with the one of `names` most like `name`; None without any."""
     close = nearest(name, names)
     return f"did you mean '{close}'?" if close else None
+
+
+def nearest_few(name: str, names: Iterable[str]) -> list[str]:
+    """Up to three of `names` that are like `name`, the one most like it first."""
+    names = list(names)
+    first = nearest(name, names)
+    begin = [n for n in names if len(name) > 1 and n.lower().startswith(name.lower())]
+    like = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
+    return list(dict.fromkeys([*([first] if first else []), *like, *begin]))[:3]
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:

@@ -124,14 +124,26 @@ INSTEAD = {
 # Commands that there are here, too, with other arguments.
 OTHERWISE = {"units": "units(m, kg, s) names the units of all numbers; or leave it out"}
 
-# What stands for the arguments that earlier forms of Karamelo's laws did not have.
-SHORTER = {
-    "eos shock": "without heat and viscosity: eos(ID, shock, rho0, K, c0, S, 0, 0, 0, 0, 0); "
-    "0, 0 at the end is no viscosity",
-    "strength johnson_cook": "without softening by heat: "
-    "strength(ID, johnson_cook, G, A, B, n, epsdot0, C, 0, 0, 1)",
-    "damage damage_johnson_cook": "without a temperature: "
-    "damage(ID, damage_johnson_cook, d1, d2, d3, d4, 0, epsdot0, 0, 1)",
+# Earlier forms of Karamelo's laws, by the number of arguments behind the style (None: any other):
+# what the line does without, and its arguments here, of which {0} is the first of the script.
+_NO_HEAT = "without heat and viscosity: "
+_NO_TEMPERATURE = "without a temperature: "
+_NO_SOFTENING = "without softening by heat: "
+SHORTER: dict[str, dict[int | None, tuple[str, tuple[str, ...]]]] = {
+    "eos shock": {
+        None: (_NO_HEAT, ("rho0", "K", "c0", "S", "0", "0", "0", "0", "0")),
+        6: (_NO_HEAT, ("{0}", "{1}", "{2}", "{4}", "{5}", "0", "0", "0", "0")),
+        7: ("without viscosity: ", (*(f"{{{k}}}" for k in range(7)), "0", "0")),
+    },
+    "strength johnson_cook": {
+        None: (_NO_SOFTENING, ("G", "A", "B", "n", "epsdot0", "C", "0", "0", "1")),
+        6: (_NO_SOFTENING, (*(f"{{{k}}}" for k in range(6)), "0", "0", "1")),
+    },
+    "damage damage_johnson_cook": {
+        None: (_NO_TEMPERATURE, ("d1", "d2", "d3", "d4", "0", "epsdot0", "0", "1")),
+        5: (_NO_TEMPERATURE, ("{0}", "{1}", "{2}", "{3}", "0", "{4}", "0", "1")),
+        6: (_NO_TEMPERATURE, (*(f"{{{k}}}" for k in range(6)), "0", "1")),
+    },
 }
 
 

@@ -10,6 +10,19 @@ from karamelo_py.script.errors import ScriptError
 _LARGEST_SCRIPT = 100_000_000
 
 
+# What programs write beside scripts.
+_WRITTEN = (
+    *(".png", ".pdf", ".svg", ".gif", ".mp4", ".gz", ".bin", ".h5", ".vtu", ".pvd", ".csv", ".txt"),
+    *(".LAMMPS", ".log", ".part"),
+)
+
+
+def scripts_in(folder: Path) -> list[str]:
+    """Names of the files in a folder that may be scripts."""
+    files = folder.iterdir() if folder.is_dir() else ()
+    return sorted(file.name for file in files if file.suffix not in _WRITTEN and file.is_file())
+
+
 def read_script(path: Path) -> str:
     """The text of a script file.
 
@@ -26,8 +39,7 @@ def read_script(path: Path) -> str:
         data = path.read_bytes()
     except FileNotFoundError:
         parent = path.parent
-        siblings = sorted(p.name for p in parent.iterdir()) if parent.is_dir() else []
-        close = difflib.get_close_matches(path.name, siblings, n=1)
+        close = difflib.get_close_matches(path.name, scripts_in(parent), n=1)
         raise ScriptError(
             f"there is no file {path}"
             if parent.is_dir()

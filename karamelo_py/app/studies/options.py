@@ -10,6 +10,7 @@ from karamelo_py.app.studies.case import Launch
 from karamelo_py.app.studies.study import default_jobs
 from karamelo_py.app.studies.variables import VALUES, check_script, choices, texts
 from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.reading import scripts_in
 
 
 def new_parser(subparsers: Any, name: str, summary: str, description: str, run: Any) -> Any:
@@ -71,8 +72,7 @@ def family(options: Any, *, timed: bool = False, repeat: int = 1) -> tuple[dict,
     """
     if not options.script.is_file():
         folder = options.script.parent
-        siblings = [p.name for p in folder.iterdir()] if folder.is_dir() else []
-        close = nearest(options.script.name, siblings)
+        close = nearest(options.script.name, scripts_in(folder))
         raise ScriptError(
             f"there is no file {options.script}",
             expected="the name of a script",

@@ -15,7 +15,7 @@ import numpy as np
 
 from karamelo_py.kernels.hooks import ACTS_ON, STAGES
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.language.faults import KNOWN, cause_of, place_in
+from karamelo_py.language.faults import KNOWN, cause_of, place_in, steps_to
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.group import AnyGroup, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -178,7 +178,7 @@ class Python(Fix):
             told = ScriptError(
                 f"fix python: {_name(self.function)}: {what}",
                 place=self.place,
-                hint="the function has to be mended there; --debug shows the traceback",
+                hint="\n  ".join(["mend the function there:", *steps_to(error)]),
             )
             told.complete = True
             raise told from error
