@@ -35,6 +35,12 @@ class Threads(Crew):
         found = self.everyone(thing)
         return found if self.leads else None
 
+    def lined_up(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        found = self.everyone(own)
+        if self.leads:
+            assert [len(one) for one in found] == list(counts)
+            out[:] = np.concatenate(found)
+
     def handed_out(self, things: Sequence | None) -> Any:
         return self.everyone(things)[0][self.rank]
 

@@ -302,12 +302,13 @@ def clear_total(hooks, h, control):
 def publish_total(hooks, h, control):
     """Publish the totals of a hook."""
     slot = hooks.table[h].slot
-    if slot < 0:
-        return
     rubs = hooks.programs[h, FRICTION].begin >= 0
+    first, last = 3, -1
     for c in range(3):
-        if rubs or hooks.programs[h, c].begin >= 0:
-            publish(control, slot + c, 1)
+        if slot >= 0 and (rubs or hooks.programs[h, c].begin >= 0):
+            first, last = min(first, c), c
+    if last >= 0:
+        publish(control, slot + first, last - first + 1)
 
 
 @subkernel

@@ -71,6 +71,10 @@ class Crew:
         """What each has, for all."""
         return self.world.allgather(thing)
 
+    def lined_up(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        """Put the numbers of all, one after another, into `out` of the first."""
+        self.world.Gatherv(own, (out, counts) if self.leads else None)
+
     def handed_out(self, things: Sequence | None) -> Any:
         """The own one of the things that the first has for each."""
         return self.world.scatter(things)

@@ -25,7 +25,7 @@ from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import BOXES, CALL, HEAT, NUMBER, REPORTS, TOTALS, Linked
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.crew import Crew
-from karamelo_py.run.shares import SharedTiles, joined
+from karamelo_py.run.shares import SharedTiles, joined, sized
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.state import changing, of_nodes, remembered_at, take_points, take_tiling
 from karamelo_py.run.tiles import in_tiles, in_use, numbers, shares_of, used
@@ -220,6 +220,10 @@ class Ranks(Simulation):
             one[nodes] = rows
         if not self.crew.leads:
             self.control.totals[WORK] = 0
+            # From here on the whole is with the first alone.
+            self._whole = self._whole._replace(
+                blocks=tuple(b._replace(points=sized(b.points, 0)) for b in self._whole.blocks)
+            )
         self._put({name: array for block in found for name, array in block.items()})
 
     def _put(self, found: dict[str, np.ndarray]) -> None:
@@ -248,7 +252,7 @@ class Ranks(Simulation):
         own = own[self._parted.tiles.foreign[own] == 0]
         work = self.control.totals[WORK].copy()
         found = {
-            "points": [[a for _, a in arrays_of(block.points)] for block in s.blocks],
+            "counts": [block.points.mass.size for block in s.blocks],
             "tiling": [
                 {name: getattr(b.tiling, name)[:rows] for name, rows in in_use(b.tiling)}
                 | {"report": b.tiling.report[: max(b.tiling.count[0], 1)]}
@@ -259,25 +263,48 @@ class Ranks(Simulation):
             "memory": [array[own] for array in self._memory()],
             "work": work,
         }
-        parts = self.crew.gathered(found)
-        if everywhere:
-            parts = self.crew.told(parts)
+        parts = self.crew.everyone(found) if everywhere else self.crew.gathered(found)
         self.control.totals[WORK] = 0
         if self.crew.leads:
             self.control.totals[WORK] = sum(part["work"] for part in parts)
         self._shown = True
+        self._line_up(parts)
+        if everywhere:
+            self._spread()
         if parts is not None:
             self._join(parts)
 
+    def _line_up(self, parts: list[dict] | None) -> None:
+        """Put the points of all into the whole of the first, one process after another."""
+        whole = []
+        for k, (block, own) in enumerate(zip(self._whole.blocks, self._part.blocks, strict=True)):
+            counts = [part["counts"][k] for part in parts] if parts is not None else []
+            points = sized(block.points, sum(counts)) if self.crew.leads else block.points
+            rows = [array for _, array in arrays_of(points)]
+            for row, (_, array) in zip(rows, arrays_of(own.points), strict=True):
+                for c in np.ndindex(array.shape[:-1]):
+                    self.crew.lined_up(array[c], row[c] if self.crew.leads else None, counts)
+            whole.append(block._replace(points=points))
+        self._whole = self._whole._replace(blocks=tuple(whole))
+
+    def _spread(self) -> None:
+        """Give the points of the whole to all."""
+        blocks = self._whole.blocks
+        own = [[a for _, a in arrays_of(b.points)] for b in blocks] if self.crew.leads else None
+        found = self.crew.told(own)
+        self._whole = self._whole._replace(
+            blocks=tuple(
+                block._replace(points=joined(block.points, [arrays]))
+                for block, arrays in zip(blocks, found, strict=True)
+            )
+        )
+
     def _join(self, parts: list[dict]) -> None:
+        """Tiles and nodes of the whole from those of all."""
         whole = self._whole
-        blocks = []
         for k, block in enumerate(whole.blocks):
-            points = joined(block.points, [part["points"][k] for part in parts])
             _join_tilings(block.tiling, [part["tiling"][k] for part in parts])
-            blocks.append(block._replace(points=points))
         self.tiles.empty_nodes(whole)
-        self._whole = whole = whole._replace(blocks=tuple(blocks))
         self.tiles.lay_out(whole)
         for part in parts:
             for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):

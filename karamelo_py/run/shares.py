@@ -81,7 +81,10 @@ class SharedTiles(Tiles):
             for rank, parts in enumerate(gone):
                 chosen = np.flatnonzero(to == rank)
                 parts.append([np.take(a, chosen, axis=-1) for _, a in arrays_of(block.points)])
+        # What stays is not packed and unpacked.
+        stay, gone[self.crew.rank] = gone[self.crew.rank], []
         come = self.crew.swapped(gone)
+        come[self.crew.rank] = stay
         blocks = tuple(
             block._replace(points=joined(block.points, [parts[k] for parts in come]))
             for k, block in enumerate(s.blocks)
@@ -187,6 +190,14 @@ class SharedTiles(Tiles):
             for array in arrays:
                 array[rows] = taken[rank][:, first : first + array.shape[1]]
                 first += array.shape[1]
+
+
+def sized(points: Points, count: int) -> Points:
+    """Points of the kind of `points`, so many: these, where they are as many already."""
+    if points.mass.size == count:
+        return points
+    empty = [np.empty((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
+    return joined(points, [empty])
 
 
 def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
