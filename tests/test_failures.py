@@ -197,7 +197,7 @@ except SimulationError as error:
 
 
 def test_the_last_good_state_is_from_before_energy_grew(tmp_path):
-    """The block leaves at step 313; growth is seen at 300, behind the first step of the run, 251."""
+    """The block leaves at step 313; growth is seen at 300, behind the first step of a run, 251."""
     scene = block(2, "fix(v, initial_velocity_particles, all, 2, 0)", "set_dt(0.001)", *OUTPUT)
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", f"SCENE = {scene!r}\n{GROWN}"], cwd=tmp_path,
