@@ -5,6 +5,7 @@ Interpreted; the compiled loop finds the same things in the same places.
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -180,3 +181,29 @@ def test_a_step_that_is_given_may_be_large_beside_what_moves(run_interpreted):
     run(5)
     """
     assert "fallen" not in run_interpreted(script).err
+
+
+# The clock is told that energy has grown: a scene in which it does, and fails, takes thousands.
+GROWN = """
+from karamelo_py import Simulation, SimulationError
+sim = Simulation(SCENE, out="files")
+sim.run(250)
+sim.hub.simulation.setup.control.clock[0].first_mean -= 1e6
+try:
+    sim.run(200)
+except SimulationError as error:
+    print(error)
+"""
+
+
+def test_the_last_good_state_is_from_before_energy_grew(tmp_path):
+    """The block leaves at step 313; growth is seen at 300, behind the first step of a run, 251."""
+    scene = block(2, "fix(v, initial_velocity_particles, all, 2, 0)", "set_dt(0.001)", *OUTPUT)
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", f"SCENE = {scene!r}\n{GROWN}"], cwd=tmp_path,
+        capture_output=True, text=True, env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert "step 313, " in done.stdout and "leaves the domain" in done.stdout, done.stderr
+    assert "The state from before energy grew is in files/last_good.251.h5" in done.stdout
+    assert [path.name for path in (tmp_path / "files").glob("*.h5")] == ["last_good.251.h5"]
+    assert read_log(tmp_path / "files" / "log.mpm").Step[-1] == 312

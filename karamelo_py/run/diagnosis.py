@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
@@ -14,7 +16,7 @@ from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK, STOPPE
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain
+from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain, grown_little
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError
 
@@ -46,17 +48,25 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> tuple[str, str]:
 def stop(
     hub: Hub, simulation: Simulation, status: int, snapshot: dict, place: Place | None
 ) -> NoReturn:
-    """Return to the last good state, write it, and raise what the user should know."""
+    """Return to the last good state, write it, and raise what the user should know.
+
+    Where energy has grown before, that is the state from before it was seen to; log and dumps end
+    with the last state that has no trouble of its own.
+    """
     step = simulation.step
     message, hint = trouble(hub, simulation, status)
-    if status in (GAINED, HEATED, STOPPED):
+    grown = not grown_little(simulation)
+    if grown or status in (GAINED, HEATED, STOPPED):
         simulation.restore(snapshot)
-        if status == STOPPED and step > simulation.step:
-            simulation.advance(step - simulation.step)
-    path = _write_last_good(hub)
+    path = _write_last_good(hub) if grown else None
+    if status not in (GAINED, HEATED) and step > simulation.step:
+        simulation.advance(step - simulation.step)
+    path = path or _write_last_good(hub)
+    _end_outputs(hub)
     if path is not None:
         name = os.path.relpath(path)
-        hint += f". The last good state is in {name}; karamelo-py SCRIPT -restart {name} goes on"
+        which = "The state from before energy grew" if grown else "The last good state"
+        hint += f". {which} is in {name}; karamelo-py SCRIPT -restart {name} goes on"
     raise ScriptError(message, place=place, hint=hint)
 
 
@@ -213,19 +223,27 @@ def _place(x: np.ndarray) -> str:
 
 
 def _write_last_good(hub: Hub) -> Path | None:
-    """Write the present state: to a file to go on from, and to the outputs of the script.
-
-    What prevents that is told as a warning, as another error is on its way. A file of somebody
-    else is left alone. The files of restart(...) would hold the same once more.
-    """
-    written = None
+    """Write the present state to a file to go on from; a file of somebody else is left alone."""
+    written: list[Path] = []
     path = restart.path_of(hub, Path(LAST_GOOD))
-    try:
-        if hub.output.writes and (not path.exists() or restart.is_restart(path)):
-            written = restart.write(hub, Path(LAST_GOOD), within=True)
+    if hub.output.writes and (not path.exists() or restart.is_restart(path)):
+        with _told(hub):
+            written.append(restart.write(hub, Path(LAST_GOOD), within=True))
+            # The files of restart(...) would hold the same once more.
             for item in hub.output.last:
                 item.last_step = hub.update.step
+    return written[0] if written else None
+
+
+def _end_outputs(hub: Hub) -> None:
+    with _told(hub):
         hub.output.write(last=True)
+
+
+@contextmanager
+def _told(hub: Hub) -> Iterator[None]:
+    """What prevents writing is told as a warning: another error is on its way."""
+    try:
+        yield
     except ScriptError as error:
         hub.warn(error.message, hint=error.hint, place=error.place)
-    return written
