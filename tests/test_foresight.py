@@ -102,12 +102,6 @@ FAILURES = {
             {"method": "ulmpm, AFLIP, quadratic-spline, 1"},
         )
     ],
-    "lost heat": [
-        (
-            {"law": "air", "method": "ulmpm, XPIC, quadratic-spline, 2"},
-            {"law": "air", "method": "ulmpm, TPIC, quadratic-spline"},
-        ),
-    ],
     "fast shocks": [
         (
             {"law": "metal", "method": "ulmpm, FLIP, linear, 1", "v": "-1, 0"},

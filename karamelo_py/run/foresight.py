@@ -20,12 +20,11 @@ from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpgimp import CPGIMPDiagonal
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws import law_kind, specific_volume
-from karamelo_py.points.laws.eos.ideal_gas import IdealGas
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
 from karamelo_py.points.laws.thermoelastic import Thermoelastic
-from karamelo_py.points.transfers import Moment, lost_shares
+from karamelo_py.points.transfers import Moment
 from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
@@ -273,17 +272,6 @@ def _loose_points(s: Foreseen) -> Iterator[Failure]:
         )
 
 
-def _lost_heat(s: Foreseen) -> Iterator[Failure]:
-    gases = s.solids(IdealGas)
-    if gases and not lost_shares.defined(type(s.transfer)):
-        yield Failure(
-            "lost heat",
-            f"the kinetic energy that {s.words} takes does not heat the gas of solid "
-            f"'{gases[0].id}': strong shocks lag behind (the front of a blast by a tenth)",
-            "FLIP, APIC or TPIC, which give it back",
-        )
-
-
 def _fast_shocks(s: Foreseen) -> Iterator[Failure]:
     flip = isinstance(s.transfer, FLIP) and s.transfer.alpha > 0.99
     spline = not isinstance(s.basis, Linear)
@@ -349,7 +337,6 @@ RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _hourglass,
     _lost_spin,
     _loose_points,
-    _lost_heat,
     _fast_shocks,
     _giving_base,
 )
