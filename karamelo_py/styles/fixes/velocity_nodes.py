@@ -102,7 +102,8 @@ class VelocityNodes(Fix):
     Publishes the reaction, the force that holds the nodes, as ID_x, ID_y, ID_z, friction among it.
     The work of friction heats the points, where they have a temperature; the wall takes none of it.
     Where two such fixes hold a node in one direction, the later one decides, and has the rest of
-    the reaction.
+    the reaction. In ulmpm/contacts a solid whose cells have all corners in the group is held by all
+    nodes that its points see, where all components are given.
 
     See Also
     --------
@@ -149,6 +150,13 @@ class VelocityNodes(Fix):
             self.post_velocities_to_grid = node_hook(
                 prescribe_mapped_at_most if most else prescribe_mapped_at_least, publishes=False
             )
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Numbers of the nodes that it acts on."""
+        if None in self.formulas or self.bound:
+            return self.group.nodes
+        return self.hub.update.method.held_with(self.hub, self.group.nodes)
 
     def _one_bound(self) -> str:
         """The bound that all components have.
