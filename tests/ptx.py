@@ -109,7 +109,7 @@ def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]
     """Every visit of the points in a step of a scene, each once; those in stages, if asked for."""
     visits = of_rows(fused(scheme.rows)) + (of_rows(staged(scheme.rows)) if in_stages else [])
     if isinstance(setup.transfer, XPIC):
-        visits.append(Visit((SeriesTerm(),), (SeriesBack(),), OldWeights()))
+        visits.append(Visit((SeriesTerm(0),), (SeriesBack(),), OldWeights()))
     if isinstance(setup.averaging, FBar):
         visits.append(Visit((TrialStrain(),), (Volumes(),), OldWeights()))
         visits.append(Visit((AverageStress(),), (AveragedForce(),), OldWeights()))

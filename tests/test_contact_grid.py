@@ -277,6 +277,28 @@ def glide(gap: float, v: float, steps: int, basis: str = "linear") -> str:
     """
 
 
+def held(script: str, high: float = 0.2) -> str:
+    """The same with a soft base whose nodes are held up to a height."""
+    return script.replace("region, b, 2, rock", "region, b, 2, soft").replace(
+        "fix(start",
+        f"""region(low, block, INF, INF, INF, {high})
+        group(low, nodes, region, low, solid, base)
+        fix(hold, velocity_nodes, low, 0, 0)
+        fix(start""",
+    )
+
+
+def test_a_base_held_at_the_corners_of_its_cells_is_rigid(run_interpreted):
+    """By all nodes that its points see, so that the normal is upright; not where only a part is."""
+    script = glide(0, 0.2, 12, "quadratic-spline")
+    rigid, whole, part = (
+        run_interpreted(text).log for text in (script, held(script), held(script, 0.11))
+    )
+    assert rigid.rub_x.min() < 0
+    assert whole.v_x == pytest.approx(rigid.v_x, rel=1e-12)
+    assert abs(part.v_x - rigid.v_x).max() > 0.01
+
+
 def test_no_friction_across_a_gap(run_interpreted):
     """Half a cell above the base both have mass at its nodes; the block slides on freely."""
     log = run_interpreted(glide(H / 2, 0, 30)).log

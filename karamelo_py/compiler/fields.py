@@ -53,6 +53,11 @@ def pair(kin: Any) -> int:
     return 2
 
 
+def triple(kin: Any) -> int:
+    """Three numbers."""
+    return 3
+
+
 def vector(kin: Any) -> int:
     """The components of a vector."""
     return kin.dimension

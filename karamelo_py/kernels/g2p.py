@@ -21,7 +21,7 @@ from karamelo_py.compiler.fields import (
 )
 from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
 from karamelo_py.kernels.arrays import of_change
-from karamelo_py.kernels.loss import Lost, Rubbed, warm, warm_by_friction
+from karamelo_py.kernels.loss import Rubbed, in_company, reflect, warm, warm_by_friction
 from karamelo_py.kernels.visit import (
     deformation_of,
     for_tags,
@@ -61,7 +61,7 @@ from karamelo_py.points.transfers import (
     updated_velocity,
     zero_moment,
 )
-from karamelo_py.points.transfers.xpic import Series, TermOfSeries
+from karamelo_py.points.transfers.xpic import Reflected, Series, TermOfSeries
 
 
 class Move(NamedTuple):
@@ -122,7 +122,9 @@ class AverageStress(NamedTuple):
 
 
 class SeriesTerm(NamedTuple):
-    """Gather the present term of the series of XPIC."""
+    """Gather term `k` of the series of XPIC, from 0."""
+
+    k: int
 
     in_lanes = True
     says = "term of the series to the points"
@@ -440,6 +442,7 @@ def _(task, w, stencil, p, dt, total, totals, fastest):
 @settled.on(SeriesTerm)
 def _(task, w, stencil, p, dt, total, totals, fastest):
     store(field(w.points.fields, TermOfSeries), p, total)
+    reflect(field(w.points.fields, Reflected), w, stencil, p, total, task.k)
     return real(0, dt), fastest
 
 
@@ -467,8 +470,9 @@ def _move(w, stencil, p, dt, total):
     step = scale(dt, constrained_velocity(law, v, displacing))
     y = add_scaled(x, real(1, dt), step)
     warm_by_friction(field(w.nodes.fields, Rubbed), w, stencil, p, v[0])
-    warm(field(w.nodes.fields, Lost), w, stencil, p, subtract(total[0], total[1]))
-    y, v, moment, hits = reflected(w.grid, w.kin, y, v, total[2])
+    warm(w, stencil, p, subtract(total[0], total[1]))
+    moment = in_company(w, stencil, p, total[2])
+    y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
     increase(field(w.points.fields, Bounces), p, hits)
     store(w.points.v, p, v)
     store(field(w.points.fields, Moment), p, moment)

@@ -7,6 +7,12 @@ On the way back points keep of v_i its mean and its moment, and m sum_i N_ip |v_
 what the moment holds, is gone at the point. FLIP, v -> alpha v + (1 - alpha) P v with P to the
 nodes and back, loses 1 - alpha^2 of the first sum and (1 - alpha)^2 of the second.
 
+For AFLIP and its kin these are the sums with their moments, and what is left out, the energy of the
+moments themselves, comes and goes: moments follow the velocity. XPIC leaves Q^m v of v, with Q =
+1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With r_k = Q^k v and w_k = S+ r_k, the terms of its
+series, this is half of |r_q|^2 + sum_(k >= q) |S w_k|^2 + 2 sum_(k >= [m/2]) sum_i N_ip
+|w_ki - S w_k|^2, q = [(m+1)/2]: each part is local, and never negative.
+
 The change dv by forces is no part of this. What forces give to velocities that points do not take
 does not strain the points either, where the strain is that of the points' velocity mapped again
 (musl): there is nothing to give back, and a hot point alone in its cells would heat itself by that.
@@ -26,8 +32,8 @@ from karamelo_py.compiler.compile import (
     round_off,
     shared,
 )
-from karamelo_py.compiler.fields import pair, scalar, store
-from karamelo_py.compiler.tuples import row, subtract
+from karamelo_py.compiler.fields import field, load, load_vector, scalar, store, triple
+from karamelo_py.compiler.tuples import add_scaled, row, scale, subtract
 from karamelo_py.kernels.arrays import MASS, of_change, of_momentum
 from karamelo_py.kernels.visit import law_of, state_of
 from karamelo_py.points.basis import entry, support
@@ -46,17 +52,22 @@ from karamelo_py.points.transfers import (
     lost_shares,
     zero_moment,
 )
+from karamelo_py.points.transfers.xpic import Reflected, Series
+
+# Share of the mass at its nodes from where on a point loses its moment, to the power of dimensions:
+# of points one a cell that stand on nodes it is 0.594 with quadratic splines, and less of others.
+ALONE = 0.6
 
 
 class Lost(NamedTuple):
-    """Kinetic energy that points bring to a node; what of the last it did not keep, per mass.
+    """Kinetic energy that points bring to a node; what it did not keep, per mass; and its mass.
 
-    Two numbers: a fused step brings the energy of the next step while points take back the loss.
+    A fused step brings the energy and mass of the next step while points take back the loss.
     """
 
     array: Any
 
-    shape = pair
+    shape = triple
     kept = False
     summed = True
 
@@ -134,20 +145,99 @@ def keep_loss(lost, kin, sums, n):
         # Of bodies that fly as one, the difference is round-off of either sign, and no heat.
         noise = real(8, mass) * round_off(mass) * kinetic
         lost[n, 1] = max(lost[n, 0] * factor - kinetic - noise, mass - mass)
+        lost[n, 2] = mass
 
 
 @shared
-def warm(lost, w, stencil, p, v):
+def warm(w, stencil, p, v):
     """Give point `p` as heat what it has lost on the way to the nodes and back.
 
     `v` is the velocity of the nodes at the point, before the update.
     """
+    lost, reflected = field(w.nodes.fields, Lost), field(w.points.fields, Reflected)
     if lost is not None:
-        law = law_of(w, p)
         moment = _moment_before(w, stencil, v, zero_moment(w.transfer, w.kin, v[0]))
-        heat = _gone(lost, w, stencil, v, moment) / specific_volume(law)
-        state = state_of(w, law, p, v[0])
-        store(w.points.state, p, warmed(law, w.kin, state, heat))
+        moment = in_company(w, stencil, p, moment)
+        _heat(w, p, _gone(lost, w, stencil, v, moment))
+    if reflected is not None:
+        last = gathered_term(w, stencil, subtract(v, v))
+        reflect(reflected, w, stencil, p, last, w.transfer.order - 1)
+        _heat(w, p, reflected[0, p])
+
+
+@shared
+def in_company(w, stencil, p, moment):
+    """What point `p` of a gas keeps of the `moment` of its nodes' velocity: none of it alone.
+
+    Nodes that nobody else sees show it what it gave them: its moment would stay for ever, driven by
+    its own pressure, and its volume grow without bounds, whatever the room around it. The energy of
+    what it does not keep heats it.
+    """
+    lost = field(w.nodes.fields, Lost)
+    if lost is None or len(moment) == 0:
+        return moment
+    mass = w.points.mass[p]
+    one = real(1, mass)
+    kept = (one - _own_share(lost, w, stencil, mass)) / real(1 - ALONE ** dimension(w.kin), mass)
+    return scale(max(min(kept, one), mass - mass), moment)
+
+
+@looping
+def _own_share(lost, w, stencil, mass):
+    """The share of a point of this mass in what its nodes have, by its weights."""
+    share = mass - mass
+    for k in range(support(w.basis, w.kin)):
+        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+        share += weight * weight * mass / max(lost[i, 2], real(1e-36, mass))
+    return share
+
+
+@shared
+def _heat(w, p, gone):
+    """Give point `p` the energy per mass that is gone."""
+    law = law_of(w, p)
+    state = state_of(w, law, p, gone)
+    store(w.points.state, p, warmed(law, w.kin, state, gone / specific_volume(law)))
+
+
+@shared
+def reflect(reflected, w, stencil, p, term, k):
+    """Take `term`, the k-th of XPIC's series at point `p`, from what is not in the series yet.
+
+    And add up the energy that this loses (see the head of the module).
+    """
+    if reflected is not None:
+        v = load_vector(w.kin, w.points.v, p)
+        like = v[0]
+        none, half, one = real(0, like), real(0.5, like), real(1, like)
+        before = load(reflected, p, (like, *v))
+        order = w.transfer.order
+        rest = subtract(choose(k == 0, v, before[1:]), term)
+        gone = choose(k == 0, none, before[0])
+        gone += choose(2 * k >= order - 1, one, none) * _spread(w, stencil, term)
+        gone += choose(2 * k >= order, half, none) * squared(term)
+        gone += choose((order + 1) // 2 == k + 1, half, none) * squared(rest)
+        store(reflected, p, (gone, *rest))
+
+
+@looping
+def gathered_term(w, stencil, term):
+    """The present term of XPIC's series at a point."""
+    for k in range(support(w.basis, w.kin)):
+        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+        term = add_scaled(term, weight, row(field(w.nodes.fields, Series), i, 0, term))
+    return term
+
+
+@looping
+def _spread(w, stencil, term):
+    """sum_i N_i |w_i - term|^2 of the present term w of XPIC's series."""
+    spread = term[0] - term[0]
+    for k in range(support(w.basis, w.kin)):
+        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+        apart = subtract(row(field(w.nodes.fields, Series), i, 0, term), term)
+        spread += weight * squared(apart)
+    return spread
 
 
 @shared

@@ -28,17 +28,13 @@ class TakeMeanStress(NamedTuple):
 
 
 class StartSeries(NamedTuple):
-    """First term of the series of XPIC: the velocity v, and its part in the new velocity."""
-
-    factor: float
+    """First term of the series of XPIC: the velocity v; the new one as far as it is known."""
 
     goes_through = ("sums", "series", "update", "update")
 
 
 class ExtendSeries(NamedTuple):
-    """Next term of the series of XPIC, and its part in the new velocity."""
-
-    factor: float
+    """Next term of the series of XPIC, in the new velocity, too."""
 
     goes_through = ("sums", "series", "series", "update", "update")
 
@@ -180,7 +176,7 @@ def _(task, kin, nodes, n, dt):
     for k in range(d):
         v = nodes.sums[n, of_momentum(kin) + k] * factor
         series[n, k] = v
-        nodes.update[n, of_change(kin) + k] = nodes.update[n, k] + task.factor * v
+        nodes.update[n, of_change(kin) + k] = nodes.update[n, k]
 
 
 @at_node.on(ExtendSeries)
@@ -189,6 +185,6 @@ def _(task, kin, nodes, n, dt):
     series = field(nodes.fields, Series)
     factor = per_mass(nodes, n, dt)
     for k in range(d):
-        v = series[n, d + k] * factor
+        v = series[n, k] - series[n, d + k] * factor
         series[n, k] = v
-        nodes.update[n, of_change(kin) + k] += task.factor * v
+        nodes.update[n, of_change(kin) + k] += v

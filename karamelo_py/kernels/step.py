@@ -419,16 +419,13 @@ def _(transfer, s, mode):
 
 @sum_series.on(XPIC)
 def _(transfer, s, mode):
-    # (I - (I - S S+)^m) v_p = S sum_k (-1)^(k+1) C(m, k) (S+ S)^(k-1) v, the sum from 1 to m
+    # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
     dt = step_size(s)
-    order = transfer.order
-    factor = float(order)
-    visit = Visit((SeriesTerm(),), (SeriesBack(),), OldWeights())
-    sweep_nodes(mode, StartSeries(real(factor - 1, dt)), s.kin, s.nodes, s.spans, dt)
-    for k in range(2, order + 1):
+    sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.spans, dt)
+    for k in range(transfer.order - 1):
+        visit = Visit((SeriesTerm(k),), (SeriesBack(),), OldWeights())
         visit_here(s, mode, visit, dt, True, True)
-        factor *= -float(order - k + 1) / k
-        sweep_nodes(mode, ExtendSeries(real(factor, dt)), s.kin, s.nodes, s.spans, dt)
+        sweep_nodes(mode, ExtendSeries(), s.kin, s.nodes, s.spans, dt)
     hold_axis(s.kin, s)
 
 

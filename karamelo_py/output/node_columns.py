@@ -108,7 +108,7 @@ def load(axis: int, hub: Scene, simulation: Any) -> np.ndarray:
         hook = fix.hooks().get("post_particles_to_grid")
         if not isinstance(hook, CompiledHook) or fix.formulas[axis] is None:
             continue
-        members = np.arange(len(out)) if fix.group.all else fix.group.nodes
+        members = np.arange(len(out)) if fix.group.all else fix.nodes
         members = members[mass[members] > 0]
         value = fix.formulas[axis].evaluate_points(hub.values, place[members])
         v = s.nodes.sums[members, of_momentum(s.kin) + axis] / mass[members]

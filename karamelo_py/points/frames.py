@@ -48,9 +48,9 @@ class DeformationGradient(NamedTuple):
         return identity(kin, 1.0)
 
     @staticmethod
-    def needed(law: type) -> bool:
+    def needed(law: NamedTuple) -> bool:
         """Whether a law has no F of its own."""
-        return not deformation.defined(law)
+        return not deformation.defined(type(law))
 
 
 class Total(NamedTuple):

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from itertools import product
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -19,13 +18,12 @@ from karamelo_py.language import registry
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpgimp import CPGIMPDiagonal
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.points.laws import law_kind, specific_volume
-from karamelo_py.points.laws.eos.ideal_gas import IdealGas
+from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
 from karamelo_py.points.laws.thermoelastic import Thermoelastic
-from karamelo_py.points.transfers import Moment, lost_shares
+from karamelo_py.points.transfers import Moment
 from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
@@ -273,17 +271,6 @@ def _loose_points(s: Foreseen) -> Iterator[Failure]:
         )
 
 
-def _lost_heat(s: Foreseen) -> Iterator[Failure]:
-    gases = s.solids(IdealGas)
-    if gases and not lost_shares.defined(type(s.transfer)):
-        yield Failure(
-            "lost heat",
-            f"the kinetic energy that {s.words} takes does not heat the gas of solid "
-            f"'{gases[0].id}': strong shocks lag behind (the front of a blast by a tenth)",
-            "FLIP, APIC or TPIC, which give it back",
-        )
-
-
 def _fast_shocks(s: Foreseen) -> Iterator[Failure]:
     flip = isinstance(s.transfer, FLIP) and s.transfer.alpha > 0.99
     spline = not isinstance(s.basis, Linear)
@@ -296,49 +283,6 @@ def _fast_shocks(s: Foreseen) -> Iterator[Failure]:
         )
 
 
-def _giving_base(s: Foreseen) -> Iterator[Failure]:
-    wide = type(s.basis).cells > 1 or getattr(s.basis, "shape", ())
-    if not wide or not s.method.fields_per_solid or len(s.hub.solids) < 2:
-        return
-    for fix in s.hub.fixes.values():
-        if not fix.prescribes_velocity or None in fix.formulas or fix.group.all:
-            continue
-        for k, solid in enumerate(s.hub.solids.values()):
-            lattice = s.hub.lattices[s.method.lattice_of(s.hub, solid)]
-            x = s.simulation.x[s.simulation.present & (s.simulation.solid_of == k)]
-            if _only_beyond(lattice, x, fix.group.nodes):
-                rho = 1 / specific_volume(solid.material.law)
-                yield Failure(
-                    "a base that gives way",
-                    f"fix '{fix.id}' holds all nodes about solid '{solid.id}', but not those "
-                    f"beyond that its points see with {s.method.basis_name} functions: there the "
-                    "base gives way, and the normal of contact turns (a block that slides on it "
-                    "feels three to five times its friction)",
-                    f"material({solid.material.id}, rigid, {rho:g}) for solid '{solid.id}', whose "
-                    "nodes all lead",
-                    fix.place,
-                )
-
-
-def _only_beyond(lattice: Any, x: np.ndarray, held: np.ndarray) -> bool:
-    """Whether the corners of the cells of points (n, d) are all held, and not the nodes beyond."""
-    marks = np.zeros(lattice.shape, np.bool_)
-    here = (held >= lattice.first) & (held < lattice.first + lattice.node_count)
-    marks.flat[held[here] - lattice.first] = True
-    d = lattice.dimension
-    cells = np.unique(((x - lattice.lo[:d]) / lattice.h).astype(np.int64), axis=0)
-
-    def all_held(reach: range) -> bool:
-        top = np.array(lattice.shape[:d]) - 1
-        for step in product(reach, repeat=d):
-            place = np.clip(cells + np.array(step), 0, top)
-            if not marks[tuple(place.T) + (0,) * (3 - d)].all():
-                return False
-        return True
-
-    return len(cells) > 0 and all_held(range(2)) and not all_held(range(-1, 3))
-
-
 RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _affine_noise,
     _strained_before,
@@ -349,9 +293,7 @@ RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _hourglass,
     _lost_spin,
     _loose_points,
-    _lost_heat,
     _fast_shocks,
-    _giving_base,
 )
 
 

@@ -59,7 +59,7 @@ class _Builder:
 
     def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
         """Add one compiled hook of a fix, which acts at `moment` of a step."""
-        begin, end = self._members(fix.group, hook)
+        begin, end = self._members(fix, hook)
         slot = -1
         if hook.publishes and fix.published:
             # Components lie one after another, from x on; a total without direction stands alone.
@@ -87,14 +87,14 @@ class _Builder:
                 return 0
         return groups[0].total()
 
-    def _members(self, group: Any, hook: CompiledHook) -> tuple[int, int]:
-        if group.all:
+    def _members(self, fix: Any, hook: CompiledHook) -> tuple[int, int]:
+        if fix.group.all:
             return -1, -1
         if hook.on_nodes:
-            members = group.nodes
+            members = fix.nodes
         else:
             members = np.zeros(self.points, np.int64)
-            members[group.ids] = 1
+            members[fix.group.ids] = 1
         begin = sum(len(m) for m in self.members)
         self.members.append(members)
         return begin, begin + len(members)

@@ -46,7 +46,7 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.points.transfers import lost_shares
+from karamelo_py.points.transfers import Moment, lost_shares
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
@@ -232,10 +232,14 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
 def returns_loss(hub: Hub) -> bool:
     """Whether kinetic energy that the transfer takes heats points of the scene.
 
-    FLIP with a share of 1 takes none that does not vanish with the step.
+    FLIP with a share of 1 takes none that does not vanish with the step, unless it keeps moments.
+    XPIC has its own way (`kernels.loss.reflect`).
     """
     transfer = hub.update.transfer
-    if not lost_shares.defined(type(transfer)) or getattr(transfer, "alpha", 0) == 1:
+    keeps_all = getattr(transfer, "alpha", 0) == 1 and Moment not in getattr(
+        transfer, "point_fields", ()
+    )
+    if not lost_shares.defined(type(transfer)) or keeps_all:
         return False
     return any(can(solid.material.law, taken_heat) for solid in hub.solids.values())
 
@@ -303,7 +307,7 @@ def lower_block(
     places = np.concatenate([method.places(kin, s, real) for s in solids])
     places = np.ascontiguousarray(places.T)
     here = places if method.frame.moves else places[: kin.dimension]
-    elastic = type(elastic_law(laws))
+    elastic = elastic_law(laws)
     own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
     points = Points(
         x=np.stack([here, here]),

@@ -109,6 +109,11 @@ class Fix:
         if group is not None:
             self.group = group
 
+    @property
+    def nodes(self) -> np.ndarray:
+        """Numbers of the nodes that it acts on, of fixes that act on nodes."""
+        return self.group.nodes
+
     def publish(self, name: str, value: float) -> None:
         """Publish `value` as ID_`name`, or as the plain ID when `name` is empty."""
         if name not in self.published:

@@ -51,12 +51,11 @@ def blended(transfer: type) -> None:
     def _(transfer, v, v_pic, dv):
         return blend(transfer.alpha, v, v_pic, dv)
 
+    # With P = S S+ from points to points, v becomes alpha v + (1 - alpha) P v + S dv.
+    @lost_shares.on(transfer)
+    def _(transfer, like):
+        pic = real(1, like) - transfer.alpha
+        return pic * (real(1, like) + transfer.alpha), pic * pic
+
 
 blended(FLIP)
-
-
-# With P = S S+ from points to points, v becomes alpha v + (1 - alpha) P v + S dv.
-@lost_shares.on(FLIP)
-def _(transfer, like):
-    pic = real(1, like) - transfer.alpha
-    return pic * (real(1, like) + transfer.alpha), pic * pic

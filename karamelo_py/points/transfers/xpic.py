@@ -6,6 +6,8 @@ from typing import Annotated, Any, NamedTuple
 
 from karamelo_py.compiler.fields import vector
 from karamelo_py.language.kinds import In
+from karamelo_py.points.laws import can
+from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.transfers import terms, updated_velocity
 
 
@@ -16,6 +18,24 @@ class TermOfSeries(NamedTuple):
 
     shape = vector
     kept = False
+
+
+class Reflected(NamedTuple):
+    """Energy per mass that XPIC has taken of a point so far; velocity not in the series yet."""
+
+    array: Any
+
+    kept = False
+
+    @staticmethod
+    def shape(kin: Any) -> int:
+        """A number and a vector."""
+        return 1 + kin.dimension
+
+    @staticmethod
+    def needed(law: NamedTuple) -> bool:
+        """Whether points of a law take as heat what a transfer takes."""
+        return can(law, taken_heat)
 
 
 class Series(NamedTuple):
@@ -37,8 +57,9 @@ class XPIC(NamedTuple):
 
     S maps nodes to points and S+ points to nodes by mass. Noise in the null space goes in a few
     steps, the motion that the grid sees stays (Hammerquist & Nairn 2017, "A new method for material
-    point method particle updates that reduces noise and enhances stability", eq. 24). Every order
-    beyond the first visits the points once more a step.
+    point method particle updates that reduces noise and enhances stability", eq. 24). The terms
+    w_0 = S+ v, w_k = w_(k-1) - S+ S w_(k-1) are summed at the nodes. Every order beyond the first
+    visits the points once more a step.
 
     Parameters
     ----------
@@ -52,7 +73,7 @@ class XPIC(NamedTuple):
 
     order: Annotated[int, In(1, 20)]
 
-    point_fields = (TermOfSeries,)
+    point_fields = (TermOfSeries, Reflected)
     node_fields = (Series,)
     inverts_spread = False
     in_lanes = True

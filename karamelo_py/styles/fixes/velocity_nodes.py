@@ -103,6 +103,8 @@ class VelocityNodes(Fix):
     The work of friction heats the points, where they have a temperature; the wall takes none of it.
     Where several such fixes hold a node in one direction, the last of them decides: the whole
     reaction of that node is its, and it alone rubs. A bound that a node keeps within holds nothing.
+    In ulmpm/contacts a solid whose cells have all corners in the group is held by all nodes that its
+    points see, where all components are given.
 
     See Also
     --------
@@ -149,6 +151,13 @@ class VelocityNodes(Fix):
             self.post_velocities_to_grid = node_hook(
                 prescribe_mapped_at_most if most else prescribe_mapped_at_least, publishes=False
             )
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Numbers of the nodes that it acts on."""
+        if None in self.formulas or self.bound:
+            return self.group.nodes
+        return self.hub.update.method.held_with(self.hub, self.group.nodes)
 
     def _one_bound(self) -> str:
         """The bound that all components have.

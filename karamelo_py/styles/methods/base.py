@@ -104,6 +104,10 @@ class Method:
         """Which of the grids the points of a solid see."""
         return 0
 
+    def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
+        """The nodes to hold where a fix gives all components of the velocity of `nodes`."""
+        return nodes
+
     def kinematics(self, hub: Hub) -> Any:
         """The kinematics of the scene."""
         return Axisymmetric() if hub.domain.axisymmetric else KINEMATICS[hub.domain.dimension]()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -48,6 +49,17 @@ def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
     return np.where(total > 0, takes[:, None] / np.where(total > 0, total, 1), 0.5)
 
 
+def _around(lattice: Lattice, cells: np.ndarray, steps: range) -> np.ndarray:
+    """Numbers of the nodes that lie so many steps from the first corners of cells (n, d)."""
+    top = np.array(lattice.shape[: lattice.dimension]) - 1
+    found = []
+    for step in product(steps, repeat=lattice.dimension):
+        place = np.clip(cells + np.array(step), 0, top).T
+        shape = lattice.shape[: lattice.dimension]
+        found.append(np.unique(np.ravel_multi_index(tuple(place), shape)))
+    return lattice.first + np.unique(np.concatenate(found))
+
+
 def prescribing(hub: Hub) -> list[Fix]:
     """Fixes that prescribe the velocity of nodes."""
     return [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
@@ -82,10 +94,10 @@ class ULMPMContacts(Method):
     at one node. A node at a surface loses what it has of the motion of approach: bars of 4, 8 and
     16 cells that collide lose 15, 11 and 4 % of the kinetic energy.
 
-    A base that does not move is best a rigid solid. Where fix velocity_nodes holds nodes of its
-    region instead, nodes beyond it that its points see with splines give way, which is told before
-    the run. With splines a base should be three cells thick: the surface of a thinner one seems
-    higher by a quarter of a cell or less.
+    A base that does not move is a rigid solid, or one whose cells have all corners in the group of
+    a fix velocity_nodes that gives all components: then the nodes beyond, which its points see with
+    splines and domains, are held, too. With splines a base should be three cells thick: the surface
+    of a thinner one seems higher by a quarter of a cell or less.
 
     The normal at a node is one for both solids, so that they get opposite impulses and momentum is
     kept: from the sums of m grad N of the two, that of the solid with a prescribed velocity, else
@@ -119,6 +131,25 @@ class ULMPMContacts(Method):
         """Publish the contact force."""
         hub.values.publish_vector(force_on(solid), DIRECTIONS)
         hub.values.publish_vector(torque_on(solid), DIRECTIONS)
+
+    def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
+        """`nodes`, and what else the points of a body see whose cells have all corners among them.
+
+        Splines and domains see nodes beyond. If these gave way, the normal of contact would turn.
+        """
+        if type(self.basis).cells == 1 and not getattr(self.basis, "shape", ()):
+            return nodes
+        of = np.array(fields(hub))
+        solids = list(hub.solids.values())
+        found = nodes
+        for k, lattice in enumerate(hub.lattices[: max(of, default=-1) + 1]):
+            places = np.concatenate([solids[i].x0 for i in np.flatnonzero(of == k)])
+            cells = np.unique(
+                ((places - lattice.lo[: lattice.dimension]) / lattice.h).astype(int), axis=0
+            )
+            if np.isin(_around(lattice, cells, range(2)), nodes).all():
+                found = np.union1d(found, _around(lattice, cells, range(-1, 3)))
+        return found
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """Contact where the fields of two solids meet."""
@@ -217,7 +248,7 @@ class ULMPMContacts(Method):
             prescribed[:] = 0
         self._prescribed = prescribed if fixes else None
         for fix in fixes:
-            nodes = slice(None) if fix.group.all else fix.group.nodes
+            nodes = slice(None) if fix.group.all else fix.nodes
             for k, formula in enumerate(fix.formulas):
                 if formula is not None:
                     prescribed[nodes, k] = 1 + hub.values.slot(f"{fix.id}_x")
