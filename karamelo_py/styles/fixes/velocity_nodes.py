@@ -103,8 +103,8 @@ class VelocityNodes(Fix):
     The work of friction heats the points, where they have a temperature; the wall takes none of it.
     Where several such fixes hold a node in one direction, the last of them decides: the whole
     reaction of that node is its, and it alone rubs. A bound that a node keeps within holds nothing.
-    In ulmpm/contacts a solid whose cells have all corners in the group is held by all nodes that its
-    points see, where all components are given.
+    In ulmpm/contacts a solid whose cells have all corners in the group is held by all nodes that
+    its points see, where all components are given.
 
     See Also
     --------
