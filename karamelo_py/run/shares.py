@@ -15,7 +15,7 @@ import numpy as np
 from karamelo_py.kernels.arrays import Block, Points, Setup, arrays_of
 from karamelo_py.kernels.sorting import order_points
 from karamelo_py.run.crew import Crew
-from karamelo_py.run.tiles import Boxes, Tiles, _buffers, _ragged, _steps, _summed
+from karamelo_py.run.tiles import Boxes, Tiles, buffers_of, ragged, steps_of, summed
 from karamelo_py.scene.lattice import Lattice
 
 IMBALANCE = 1.1  # largest share of the points over the mean: above it they are shared out anew
@@ -163,17 +163,17 @@ class SharedTiles(Tiles):
     def _own_nodes(self, tiles: np.ndarray, own: np.ndarray) -> None:
         self.foreign[self._marked] = 0
         away = own[self._first_of_place[self._place(tiles)] != self.crew.rank]
-        row, left = _ragged(away[:, 2] * away[:, 3])
+        row, left = ragged(away[:, 2] * away[:, 3])
         away = away[row]
         begin = away[:, 0] + left // away[:, 3] * away[:, 5] + left % away[:, 3] * away[:, 6]
-        row, left = _ragged(away[:, 4])
+        row, left = ragged(away[:, 4])
         self._marked = begin[row] + left
         self.foreign[self._marked] = 1
 
     def exchange(self, s: Setup, number: int, what: int) -> None:
         """Pass on what the own tiles give to nodes of others, and get what theirs give to own."""
-        nodes = _buffers(s)[number].nodes
-        sums, velocity, *rest = _summed(nodes)
+        nodes = buffers_of(s)[number].nodes
+        sums, velocity, *rest = summed(nodes)
         arrays = [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
         width = sum(array.shape[1] for array in arrays)
         given = {
@@ -225,7 +225,7 @@ def _hulls(box: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndar
 def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Rows of the buffers of all nodes from `lo` to `hi` (k, d), box after box."""
     shape = hi - lo + 1
-    box, left = _ragged(np.prod(shape, axis=1))
-    inner = _steps(shape)[box]
+    box, left = ragged(np.prod(shape, axis=1))
+    inner = steps_of(shape)[box]
     places = lo[box] + left[:, None] // inner % shape[box]
     return first[box] + (places * steps[box]).sum(axis=1)

@@ -73,13 +73,13 @@ class Tiles:
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
         self._cells = np.array([x.cells[:d] for x in lattices], np.int64)
         self._first_node = np.array([x.first for x in lattices], np.int64)
-        self._steps = _steps(self._nodes)
+        self._steps = steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = _numbered(self.shapes)
         self.count = int(self.first[-1])
         self._start = np.zeros(self.count + 1, np.int64)
         tiles = -(-self._nodes // NODES[d])
-        self._tile_steps = _steps(tiles)
+        self._tile_steps = steps_of(tiles)
         self._first_of_nodes = _numbered(tiles)
         # Of all buffers of a scene: count, first and parts.
         self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
@@ -125,13 +125,13 @@ class Tiles:
     def empty_nodes(self, s: Setup) -> None:
         """What points gave to the nodes in use becomes zero."""
         of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
-        arrays = [array for nodes in of for array in _summed(nodes)]
+        arrays = [array for nodes in of for array in summed(nodes)]
         nodes = numbers(s.spans)
         for array in arrays:
             array[nodes] = 0
         if not self.direct:
-            for one in _buffers(s):
-                for array in _summed(one.nodes):
+            for one in buffers_of(s):
+                for array in summed(one.nodes):
                     array[:] = 0
 
     def sort(self, s: Setup) -> None:
@@ -203,7 +203,7 @@ class Tiles:
         """Bytes of the boxes of all tiles."""
         if self.direct:
             return 0
-        return sum(array.nbytes for one in _buffers(s) for array in _summed(one.nodes))
+        return sum(array.nbytes for one in buffers_of(s) for array in summed(one.nodes))
 
     def lay_out(self, s: Setup) -> None:
         """Lay the boxes of all blocks one after another; find the tiles of nodes that they reach.
@@ -254,8 +254,8 @@ class Tiles:
         size = NODES[self.dimension]
         low = boxes.lo // size
         across = boxes.hi // size - low + 1
-        box, left = _ragged(np.prod(across, axis=1))
-        places = low[box] + left[:, None] // _steps(across)[box] % across[box]
+        box, left = ragged(np.prod(across, axis=1))
+        places = low[box] + left[:, None] // steps_of(across)[box] % across[box]
         grid = boxes.grid[box]
         tile = self._first_of_nodes[grid] + (places * self._tile_steps[grid]).sum(axis=1)
         begin = np.maximum(places * size, boxes.lo[box])
@@ -263,7 +263,7 @@ class Tiles:
 
     def _number(self, s: Setup, boxes: Boxes, *reached: np.ndarray) -> tuple[np.ndarray, ...]:
         """Give each box its rows of the buffers: its number of node 0, and steps (k, d)."""
-        steps = self._steps[boxes.grid] if self.direct else _steps(boxes.hi - boxes.lo + 1)
+        steps = self._steps[boxes.grid] if self.direct else steps_of(boxes.hi - boxes.lo + 1)
         ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
         begins = np.concatenate([[0], ends])[:-1]
         first = begins - (boxes.lo * steps).sum(axis=1)
@@ -283,8 +283,8 @@ class Tiles:
 
     def _make_room(self, s: Setup, rows: int) -> None:
         """Make the buffers as large as the boxes of all tiles need."""
-        for one in _buffers(s):
-            for array in _summed(one.nodes):
+        for one in buffers_of(s):
+            for array in summed(one.nodes):
                 grow(array, rows)
 
     def _own_nodes(self, tiles: np.ndarray, own: np.ndarray) -> None:
@@ -315,14 +315,14 @@ def _extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np
 
 def _spans(boxes: np.ndarray) -> np.ndarray:
     """(k, 2) the rows of boxes of nodes (see `Buffers`), joined where one ends at another."""
-    row, left = _ragged(boxes[:, 2] * boxes[:, 3])
+    row, left = ragged(boxes[:, 2] * boxes[:, 3])
     own = boxes[row]
     begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
     order = np.argsort(begin, kind="stable")
     begin, end = begin[order], (begin + own[:, 4])[order]
     apart = begin[1:] != end[:-1]
     begin, end = np.append(begin[:1], begin[1:][apart]), np.append(end[:-1][apart], end[-1:])
-    of, left = _ragged(-(-(end - begin) // SPAN))
+    of, left = ragged(-(-(end - begin) // SPAN))
     begin = begin[of] + left * SPAN
     return np.stack([begin, np.minimum(begin + SPAN, end[of])], axis=1)
 
@@ -357,21 +357,22 @@ def used(spans: np.ndarray) -> np.ndarray:
 def numbers(spans: np.ndarray) -> np.ndarray:
     """The numbers of the nodes in spans, of which the first row is the count."""
     spans = used(spans)[1:]
-    of, left = _ragged(spans[:, 1] - spans[:, 0])
+    of, left = ragged(spans[:, 1] - spans[:, 0])
     return spans[of, 0] + left
 
 
-def _ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """For each of so many items of each of k lists: its list, and its number in that."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
 
-def _buffers(s: Setup) -> list[Buffers]:
+def buffers_of(s: Setup) -> list[Buffers]:
+    """All buffers of a scene, in the order of their numbers."""
     return [s.buffers] + ([s.heat.buffers] if isinstance(s.heat, Conducting) else [])
 
 
-def _summed(nodes: Nodes) -> list[np.ndarray]:
+def summed(nodes: Nodes) -> list[np.ndarray]:
     """The arrays that points give to."""
     own = [one.array for one in nodes.fields if getattr(type(one), "summed", False)]
     return [nodes.sums, nodes.velocity, *own]
@@ -382,7 +383,7 @@ def _numbered(shapes: np.ndarray) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(np.prod(shapes, axis=1))])
 
 
-def _steps(shapes: np.ndarray) -> np.ndarray:
+def steps_of(shapes: np.ndarray) -> np.ndarray:
     """Steps (k, d) from a number to that of the neighbour in boxes of these shapes (k, d)."""
     after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
     return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
