@@ -6,6 +6,7 @@ which fields exist (`karamelo-py check` prints them) and, by their types, what i
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -52,6 +53,7 @@ from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table
+from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
@@ -167,8 +169,11 @@ def check_heat(hub: Hub) -> None:
         )
 
 
-def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
-    """Make the arrays of a run from the scene, taking over the state of points that exist."""
+def lower(hub: Hub, previous: State | None = None, *, points: bool = True) -> tuple[Setup, Tiles]:
+    """Make the arrays of a run from the scene, taking over the state of points that exist.
+
+    Without `points` there are none: what is there besides.
+    """
     check_scene(hub)
     method = hub.update.method
     real = PRECISIONS[hub.settings.precision]
@@ -176,8 +181,7 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
     lattices = method.lattices(hub)
     transfer = hub.update.transfer_tag(real)
     basis = type(method.basis)(*(real(x) for x in method.basis))
-    points = sum(len(solid.x0) for solid in hub.solids.values())
-    tiles = Tiles(lattices, basis, points)
+    tiles = Tiles(lattices, basis, sum(len(solid.x0) for solid in hub.solids.values()))
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
@@ -221,7 +225,13 @@ def lower(hub: Hub, previous: State | None = None) -> tuple[Setup, Tiles]:
         nodes=at_nodes,
         buffers=tiles.empty_buffers(at_nodes),
         blocks=lower_blocks(
-            hub, kin, fields.declared(owners, "point_fields"), tiles, real, previous
+            hub,
+            hub.solids.values() if points else map(without_points, hub.solids.values()),
+            kin,
+            fields.declared(owners, "point_fields"),
+            tiles,
+            real,
+            previous,
         ),
         spans=np.zeros((1, 2), np.int64),
         control=control,
@@ -264,13 +274,25 @@ def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) 
     )
 
 
-def lower_blocks(hub, kin, kinds: tuple, tiles: Tiles, real: type, previous: State | None) -> tuple:
+def without_points(solid: Solid) -> Solid:
+    """A solid like this one, without points."""
+    other = copy.copy(solid)
+    for name, value in vars(solid).items():
+        if isinstance(value, np.ndarray) and len(value) == len(solid.x0):
+            setattr(other, name, value[:0])
+    return other
+
+
+def lower_blocks(
+    hub, solids: Iterable[Solid], kin, kinds: tuple, tiles: Tiles, real: type,
+    previous: State | None,
+) -> tuple:  # fmt: skip
     """One block for each kind of law, in the order in which the solids use them."""
-    solids: dict[tuple, list] = {}
-    for solid in hub.solids.values():
-        solids.setdefault(law_kind(solid.material.law), []).append(solid)
+    alike: dict[tuple, list] = {}
+    for solid in solids:
+        alike.setdefault(law_kind(solid.material.law), []).append(solid)
     return tuple(
-        lower_block(hub, members, kin, kinds, tiles, real, previous) for members in solids.values()
+        lower_block(hub, members, kin, kinds, tiles, real, previous) for members in alike.values()
     )
 
 

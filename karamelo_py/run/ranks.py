@@ -25,10 +25,11 @@ from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import BOXES, CALL, HEAT, NUMBER, REPORTS, TOTALS, Linked
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.crew import Crew
+from karamelo_py.run.lowering import State, lower
 from karamelo_py.run.shares import SharedTiles, joined, sized
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.state import changing, of_nodes, remembered_at, take_points, take_tiling
-from karamelo_py.run.tiles import in_tiles, in_use, numbers, shares_of, used
+from karamelo_py.run.tiles import Tiles, in_tiles, in_use, numbers, shares_of, used
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
@@ -59,7 +60,10 @@ class Ranks(Simulation):
         self._at_work = False  # steps are taken
         self._kept: dict[str, np.ndarray] = {}
         self._prepared = False
+        self._bare = False
         super().__init__(hub, previous)
+        # Those that follow get their points from the first.
+        self._bare = self.follows and previous is None
         self._call = address_of_python(self._answer, CALL)
         self._parted = self._empty_part()
 
@@ -68,6 +72,11 @@ class Ranks(Simulation):
     @property
     def setup(self) -> Setup:
         """The whole scene. It is gathered first where steps were taken since."""
+        if self._bare:
+            # Before the first run a script asks for the points: of all processes alike.
+            self._bare = False
+            whole, self.tiles = lower(self.hub)
+            self._whole = whole._replace(control=self.control, contact=self._whole.contact)
         if not self._shown:
             if self._leading:
                 self._tell("gather")
@@ -99,6 +108,9 @@ class Ranks(Simulation):
         else:
             super().sort()
             self._handed_out = -1
+
+    def _lowered(self, state: State | None) -> tuple[Setup, Tiles]:
+        return lower(self.hub, state, points=self.crew.leads or state is not None)
 
     def _empty_part(self) -> SimpleNamespace:
         """The part of this process without points, with nodes and buffers of its own."""
@@ -221,6 +233,7 @@ class Ranks(Simulation):
         if not self.crew.leads:
             self.control.totals[WORK] = 0
             # From here on the whole is with the first alone.
+            self._bare = False
             self._whole = self._whole._replace(
                 blocks=tuple(b._replace(points=sized(b.points, 0)) for b in self._whole.blocks)
             )

@@ -59,7 +59,7 @@ from karamelo_py.run.lowering import (
 )
 from karamelo_py.run.stable import ruling_limit, shares_of_limits
 from karamelo_py.run.state import changing, take_tiling
-from karamelo_py.run.tiles import in_tiles, used
+from karamelo_py.run.tiles import Tiles, in_tiles, used
 from karamelo_py.run.trial import try_parts
 from karamelo_py.run.watch import internal_energy, unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
@@ -175,7 +175,7 @@ class Simulation:
         self.hub = hub
         self.key = scene_key(hub)
         state = previous.state() if previous else None
-        self.setup, self.tiles = lower(hub, state)
+        self.setup, self.tiles = self._lowered(state)
         self.control = self.setup.control
         try_parts(hub, self.setup)
         self.count = sum(len(s.x0) for s in hub.solids.values())
@@ -216,6 +216,10 @@ class Simulation:
     def stepped(self) -> Setup:
         """The arrays that steps work on."""
         return self.setup
+
+    def _lowered(self, state: State | None) -> tuple[Setup, Tiles]:
+        """The arrays of the whole scene, with the state of points that exist."""
+        return lower(self.hub, state)
 
     def fits(self, hub: Hub) -> bool:
         """Whether the arrays are still those of the scene."""

@@ -20,9 +20,10 @@ def initial_shape(basis: type, solid: Solid) -> np.ndarray:
     parts = [np.empty((n, 0))]
     for part in getattr(basis, "shape", ()):
         if part == "corners":
-            parts.append(_corners(basis.element, solid).reshape(n, -1))
+            corners = _corners(basis.element, solid)
+            parts.append(corners.reshape(n, corners.shape[1] * d))
         elif part == "half_edges":
-            parts.append((half[:, :, None] * unit).reshape(n, -1))
+            parts.append((half[:, :, None] * unit).reshape(n, d * d))
         elif part == "deformation":
             parts.append(np.tile(unit.ravel(), (n, 1)))
         else:
