@@ -55,7 +55,7 @@ def test_variables(run_script, option):
         ("in.a --treads=2", "did you mean --threads?"),
         ("sweep in.a -var n=1,2 --job 2", "did you mean -jobs?"),
         ("in.a -var n=10", "hint: -var n 10"),
-        ("in.a -var n ten", "-var n ten is a text, and the script has a number here"),
+        ("in.a -var n ten", "-var n ten is a text, and the script has a number"),
         ("in.a in.b", "one word too many: in.b"),
         ("check", "expected: karamelo-py check SCRIPT"),
         ("run", "expected: karamelo-py SCRIPT"),
@@ -72,7 +72,7 @@ def test_variables(run_script, option):
 def test_what_a_slip_of_the_pen_says(tmp_path, monkeypatch, capsys, words, says):
     """Options and names that are nearly right; pictures are no scripts."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "in.a").write_text("n = 3\nprint(n)\n")
+    (tmp_path / "in.a").write_text("n = 3\nprint(n + 1)\n")
     (tmp_path / "in.b").write_text("print(1)\n")
     (tmp_path / "in.aa.png").write_text("a picture")
     (tmp_path / "log.mpm").write_text("Step Time Ek Es\n0 0 1 2\n")

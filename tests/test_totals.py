@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from karamelo_py.compiler.compile import kernel
-from karamelo_py.kernels.totals import LIMBS, add_to, rounded
+from karamelo_py.kernels.totals import LIMBS, add_many, add_to, rounded
 
 numbers = some.lists(some.floats(-1e300, 1e300), max_size=30)
 
@@ -20,6 +20,12 @@ numbers = some.lists(some.floats(-1e300, 1e300), max_size=30)
 def add_all(totals, terms):
     for k in range(terms.size):
         add_to(totals, k % len(totals), terms[k])
+
+
+@kernel
+def add_blocks(totals, terms, size):
+    for k in range(0, terms.size, size):
+        add_many(totals, 0, terms[k:], min(size, terms.size - k))
 
 
 def total_of(terms, parts=1):
@@ -55,3 +61,12 @@ def test_what_cancels_leaves_what_is_small():
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
 def test_a_term_that_is_no_number_is_seen(wrong):
     assert np.isnan(total_of([1.0, wrong]))
+
+
+@given(
+    some.lists(some.floats(-1e6, 1e6) | some.floats(-1e-9, 1e-9), max_size=40), some.integers(1, 40)
+)
+def test_blocks_of_terms_make_the_same_sum(terms, size):
+    totals = np.zeros((1, LIMBS), np.int64)
+    add_blocks(totals, np.array(terms, float), size)
+    assert rounded(totals[0]) == total_of(terms)

@@ -53,7 +53,7 @@ from karamelo_py.kernels.arrays import (
     of_force,
     of_momentum,
 )
-from karamelo_py.kernels.totals import WORK, add_to, counts, number_of_all, publish
+from karamelo_py.kernels.totals import WORK, add_many, add_to, counts, number_of_all, publish
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.heat import face
@@ -265,11 +265,15 @@ def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, shar
                 nodes.update[n, of_change(kin) + c] = star - v
             else:
                 nodes.velocity[n, c] = v
-            if counts(control.ranks, n):
-                add_to(control.totals, WORK, work)
-                if slot >= 0:
-                    add_to(control.totals, slot + c, total)
-                    add_to(control.totals, slot + c, before)
+            # Formulas have been taken: their rows hold what is to be added up.
+            own = counts(control.ranks, n)
+            hooks.scratch[VALUE, q] = total if own else 0.0
+            hooks.scratch[BEFORE, q] = work if own else 0.0
+            if own and before != 0:
+                add_to(control.totals, slot + c, before)
+        add_many(control.totals, WORK, hooks.scratch[BEFORE], count)
+        if slot >= 0:
+            add_many(control.totals, slot + c, hooks.scratch[VALUE], count)
 
 
 @subkernel

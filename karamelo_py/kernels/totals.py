@@ -8,7 +8,7 @@ small and large superaccumulators").
 
 from __future__ import annotations
 
-from math import ldexp
+from math import frexp, ldexp
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ LIMBS = 68
 LOST = LIMBS - 1  # counts terms that are no numbers
 DIGIT = (1 << 32) - 1
 MANTISSA = (1 << 52) - 1
+COARSE, FINE = 1e-200, 1e200  # largest terms that are added up as whole numbers
 # Rows of the totals: those of the published values have their slots, of which time, timestep and dt
 # are no sums.
 KINETIC, STORED, WORK = 0, 1, 2
@@ -53,7 +54,39 @@ def add_to(totals, row, x):
 
 
 @subkernel
-def _carry(total):
+def add_many(totals, row, terms, count):
+    """Add the first `count` of `terms`, at most 2^10, without rounding.
+
+    They are sums of whole numbers of two sizes, but for terms 2^30 times smaller than the largest.
+    """
+    largest = 0.0
+    for q in range(count):
+        largest = max(largest, abs(terms[q]))
+    if largest == 0.0:
+        return
+    if not COARSE < largest < FINE:
+        for q in range(count):
+            add_to(totals, row, terms[q])
+        return
+    unit = ldexp(1.0, frexp(largest)[1] - 30)
+    per_unit, per_part = 1.0 / unit, 2.0**52 / unit
+    high = low = 0
+    for q in range(count):
+        x = terms[q]
+        if not abs(x) * per_unit >= 1.0:
+            add_to(totals, row, x)
+            continue
+        whole = int(x * per_unit)
+        high += whole
+        low += int((x - whole * unit) * per_part)
+    add_to(totals, row, high * unit)
+    above = low >> 32
+    add_to(totals, row, above * (2.0**32 / per_part))
+    add_to(totals, row, (low - (above << 32)) / per_part)
+
+
+@entered
+def carry(total):
     """Digits from 0 to 2^32 - 1, the last one signed."""
     for k in range(LOST - 1):
         carry = total[k] >> 32
@@ -66,14 +99,14 @@ def rounded(total):
     """The value of a total (LIMBS,), which is left in digits."""
     if total[LOST] > 0:
         return np.nan
-    _carry(total)
+    carry(total)
     sign = 1.0
     if total[LOST - 1] < 0:
         # So that the digits have one sign, and adding them up loses nothing.
         sign = -1.0
         for k in range(LOST):
             total[k] = -total[k]
-        _carry(total)
+        carry(total)
     value = 0.0
     for k in range(LOST):
         if total[k] != 0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -91,6 +92,9 @@ class Interpreter:
         self.files: list[Path] = []
         self._presets: dict[str, str] = {}
         self.frames: list[_Frame] = []
+        self._texts: dict[
+            str, str
+        ] = {}  # variables of the command line that may have to be numbers
         self.statement: Statement | None = None  # the last that was begun
         self.record = Record()
         self.replay: Replay | None = None
@@ -271,6 +275,7 @@ class Interpreter:
         except ScriptError as error:
             del self.record.statements[done:]
             error.place = error.place or statement.place
+            self._blame_text(statement, error)
             if not error.included:
                 error.included = self._including(depth - 1)
             error.complete = True
@@ -338,7 +343,7 @@ class Interpreter:
             if isinstance(self.variables.get(name), str):
                 self.variables[name] = self._preset_value(name)
             if isinstance(self.variables[name], str):
-                self._refuse_text(name, statement)
+                self._note_text(name, statement)
             return
         if name not in self.variables and (name in FUNCTIONS or registry.knows("command", name)):
             kind = "function" if name in FUNCTIONS else "command"
@@ -354,17 +359,23 @@ class Interpreter:
             )
         self.variables[name] = self._right_hand_side(statement.node, statement.right)
 
-    def _refuse_text(self, name: str, statement: Assignment) -> None:
-        """Refuse a text from the command line for what is a number in the script."""
-        try:
-            own = self.evaluate(statement.node, statement.right)
-        except ScriptError:
-            return
-        if isinstance(own, float):
-            raise ScriptError(
-                f"-var {name} {self._presets[name]} is a text, and the script has a number here",
-                expected=f"a number or a formula, as in -var {name} {statement.right.code.strip()}",
-            )
+    def _note_text(self, name: str, statement: Assignment) -> None:
+        """Remember a text from the command line for what is a number in the script.
+
+        A method may take either; where it is a mistake, a statement that uses it will tell.
+        """
+        with suppress(ScriptError):
+            if isinstance(self.evaluate(statement.node, statement.right), float):
+                self._texts[name] = statement.right.code.strip()
+
+    def _blame_text(self, statement: Statement, error: ScriptError) -> None:
+        """Say so where a mistake may come from a text of the command line."""
+        for name, own in self._texts.items():
+            if re.search(rf"\b{name}\b", spelled(statement)):
+                error.hint = (
+                    f"-var {name} {self._presets[name]} is a text, and the script has a number "
+                    f"there, as in -var {name} {own}"
+                )
 
     def _right_hand_side(self, node: Node, raw: Raw) -> Value:
         try:

@@ -9,7 +9,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
-from karamelo_py.kernels.totals import WORK
+from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.run.tiles import in_use, numbers, used
 from karamelo_py.script.errors import ScriptError
 
@@ -34,6 +34,7 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
 def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
     """Views and copies of them, and of what else a file holds; of nodes, the rows in use."""
     s = simulation.setup
+    carry(s.control.totals[WORK])  # so that a sum is always the same digits
     found = dict(changing(simulation)) | {
         "clock": s.control.clock.view(np.ndarray),
         "present": simulation.present,
