@@ -15,7 +15,7 @@ import numpy as np
 
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import read_log
-from karamelo_py.app.studies.frontier import Cell, explore
+from karamelo_py.app.studies.frontier import Cell, explore, unseen
 from karamelo_py.app.studies.options import (
     add_family,
     family,
@@ -33,7 +33,8 @@ from karamelo_py.script.errors import ScriptError, nearest
 DESCRIPTION = """\
 Maps where a script is stable over one or two of its variables: stable, growing (its energy exceeds
 a bound), or failed, with the reason. Edges are searched by halves: cells between like ones are not
-run. The table is written beside the picture (map.csv); -var with one value is passed on.
+run. The table is written beside the picture (map.csv), and says which cells were run; -var with one
+value is passed on.
 
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
 
@@ -98,6 +99,9 @@ def run(options: Any) -> int:
     records.write(table, rows)
     chart.draw(known, inferred, out, options.script.name)
     chart.tell(known, inferred)
+    width = unseen(chart.shape, options.stride)
+    if inferred and width:
+        print(f"islands and strips up to {width} cells wide between runs are not seen (-stride)")
     print(f"drawn: {out}; the table is {table}")
     return 0
 
