@@ -69,6 +69,13 @@ def test_the_table_tells_orders_and_front(table, capsys):
     assert re.search(r"cubic-spline +80 +8.96 .* front", out)
     assert not re.search(r"quadratic-spline +40 .*front", out)
     assert "failed: point 3 <leaves>" in out
+    # Over a variable, costs say nothing unless they are asked for.
+    words = ["chart", "sweep.csv", "-accuracy", "err", "-by", "basis", "-x", "N"]
+    assert main(words) == 0
+    out = capsys.readouterr().out
+    assert "err by N" in out and "seconds" not in out and "front" not in out
+    assert main([*words, "-cost", "seconds"]) == 0
+    assert "seconds by N" in capsys.readouterr().out
 
 
 @given(st.lists(st.tuples(st.floats(1e-3, 1e3), st.floats(1e-9, 1)), min_size=1, max_size=30))

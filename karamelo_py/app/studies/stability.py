@@ -281,6 +281,7 @@ class Map:
     ) -> None:
         """Draw the map."""
         from matplotlib.colors import ListedColormap
+        from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
 
         classes = {**inferred, **known}
@@ -299,11 +300,11 @@ class Map:
         reasons = Counter(row["why"] for row in self.found.values() if row["class"] == "failed")
         number_of = {reason: str(k) for k, (reason, _) in enumerate(reasons.most_common(), 1)}
         for (i, j), row in self.found.items():
-            failed = row["class"] == "failed"
-            axes.text(
-                x[i], y[j], number_of[row["why"]] if failed else "·", ha="center", va="center",
-                fontsize=7 if failed else 9, color="white" if failed else "black",
-            )  # fmt: skip
+            if row["class"] == "failed":
+                axes.text(x[i], y[j], number_of[row["why"]], ha="center", va="center",
+                          fontsize=7, color="white")  # fmt: skip
+            else:
+                axes.plot(x[i], y[j], "k.", markersize=4)
         handles = [
             Patch(facecolor=COLOURS[k], edgecolor="0.4", label=k)
             for k in CLASSES if k in classes.values()
@@ -322,7 +323,8 @@ class Map:
             said = "first step = the program's limit" + (f"\n({', '.join(names)})" if names else "")
             line = axes.plot(at, up, "k--", linewidth=1.4, label=said)
             handles += line
-        handles.append(Patch(facecolor="none", edgecolor="none", label="·  run; others inferred"))
+        said = "run; others inferred"
+        handles.append(Line2D([], [], color="k", marker=".", linestyle="", label=said))
         axes.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
             fontsize=8, borderaxespad=0,
