@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import look, pictures
 from karamelo_py.app.studies.curves import Family, order
+from karamelo_py.output.plot_style import tick_text
 
 ORDERS = {"linear": 1, "quadratic-spline": 2, "cubic-spline": 4}
 
@@ -161,8 +162,8 @@ def test_no_two_lines_look_alike():
 def test_round_ticks():
     assert look.log_ticks(0.9, 55) == [1, 2, 5, 10, 20, 50]
     assert look.log_ticks(1e-7, 1) == pytest.approx([10.0**k for k in range(-7, 1)])
-    assert look.tick_text(0.02) == "0.02" and look.tick_text(1e-7) == "$10^{-7}$"
-    assert look.tick_text(2e-7) == r"$2\cdot10^{-7}$"
+    assert tick_text(0.02) == "0.02" and tick_text(1e-7) == "$10^{-7}$"
+    assert tick_text(2e-7) == r"$2\cdot10^{-7}$"
 
 
 def test_a_page_needs_nothing_else(table):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from math import floor, log10
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +21,37 @@ def blank_figure(width: float, height: float) -> Figure:
     return figure
 
 
+def tick_text(a: float, _: Any = None) -> str:
+    """A number at an axis: 0.02, 500, 3·10^-7."""
+    if a == 0 or 1e-3 <= abs(a) < 1e5:
+        return f"{a:g}"
+    exponent = floor(log10(abs(a)) + 1e-9)
+    lead = a / 10**exponent
+    tens = f"10^{{{exponent}}}"
+    return f"${tens}$" if abs(lead - 1) < 1e-9 else rf"${lead:g}\cdot{tens}$"
+
+
+def real_ticks(axis: Any) -> None:
+    """Whole numbers at the ticks of a linear axis, not their shares of a power of ten beside it."""
+    from matplotlib.ticker import ScalarFormatter
+
+    class Whole(ScalarFormatter):
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            scaled = self.orderOfMagnitude and not self.offset
+            return (
+                tick_text(round(x, 15 - self.orderOfMagnitude)) if scaled else super().__call__(x)
+            )
+
+        def get_offset(self) -> str:
+            return super().get_offset() if self.offset else ""
+
+    if type(axis.get_major_formatter()) is ScalarFormatter:
+        axis.set_major_formatter(Whole())
+
+
 def tidy(axes: Axes) -> None:
-    """A light grid and no frame on the far sides."""
+    """A light grid, no frame on the far sides, and real numbers at the ticks."""
+    real_ticks(axes.xaxis)
+    real_ticks(axes.yaxis)
     axes.grid(True, color="0.9", linewidth=0.7)
     axes.spines[["top", "right"]].set_visible(False)
