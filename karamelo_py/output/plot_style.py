@@ -32,21 +32,21 @@ def tick_text(a: float, _: Any = None) -> str:
 
 
 def real_ticks(axis: Any) -> None:
-    """Whole numbers at the ticks of a linear axis, not their shares of a power of ten beside it."""
-    from matplotlib.ticker import ScalarFormatter
+    """Real numbers at the ticks of a linear axis, no power of ten and no sum beside it."""
+    from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
     class Whole(ScalarFormatter):
         def __call__(self, x: float, pos: int | None = None) -> str:
-            scaled = self.orderOfMagnitude and not self.offset
-            return (
-                tick_text(round(x, 15 - self.orderOfMagnitude)) if scaled else super().__call__(x)
-            )
-
-        def get_offset(self) -> str:
-            return super().get_offset() if self.offset else ""
+            largest = abs(self.axis.get_view_interval()).max()
+            if largest == 0 or 1e-3 <= largest < 1e5:
+                return super().__call__(x, pos)
+            return tick_text(float(f"{x / largest:.12f}") * largest)
 
     if type(axis.get_major_formatter()) is ScalarFormatter:
-        axis.set_major_formatter(Whole())
+        whole = Whole(useOffset=False)
+        whole.set_scientific(False)
+        axis.set_major_formatter(whole)
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))  # few digits
 
 
 def tidy(axes: Axes) -> None:
