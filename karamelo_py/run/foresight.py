@@ -192,11 +192,14 @@ def _strained_before(s: Foreseen) -> Iterator[Failure]:
 
 
 def _drift_noise(s: Foreseen) -> Iterator[Failure]:
+    """Of smooth functions; for others smaller steps are taken, and keep the energy."""
     smooth = s.moves and not getattr(s.basis, "gradient_jumps", False)
-    steps = s.duration / s.simulation.dt
-    if not (smooth and isinstance(s.transfer, FLIP) and isinstance(s.scheme, (MUSL, USF))):
+    feeds = isinstance(s.transfer, FLIP) and isinstance(s.scheme, (MUSL, USF))
+    if not (smooth and feeds and s.transfer.alpha > 0.9 and s.solids(*ELASTIC)):
         return
-    if DRIFT < s.speed < 1 and steps > LONG and s.transfer.alpha > 0.9 and s.solids(*ELASTIC):
+    dt = s.simulation.dt
+    if DRIFT < s.speed < 1 and s.duration > LONG * dt > 0:
+        steps = s.duration / dt
         yield Failure(
             "noise of a drift",
             f"points move at {s.speed:.2g} times the speed of waves for about {steps:.0f} steps, "
