@@ -24,6 +24,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 import comparisons
+from comparisons.pictures import STYLE, finish
 from comparisons.results import Result
 from comparisons.row import Row
 
@@ -31,7 +32,7 @@ HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"
 PICTURES = DOCS / "_static" / "comparison"
 INPUTS = HERE.parent / "inputs"
-TOOLS = ("__main__", "exact", "lines", "results", "row")
+TOOLS = ("__main__", "exact", "lines", "pictures", "results", "row")
 
 
 def scenes() -> list[str]:
@@ -71,13 +72,12 @@ def runner(name: str, folder: Path, size: dict[str, Any]) -> Callable[..., Resul
 def compare(name: str, folder: Path, full: bool) -> list[Row]:
     """Run a scene, save its picture, return its rows."""
     module = scene(name)
-    figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
     run = runner(name, folder, {} if full else module.SMALL or {})
-    rows = list(module.compare(run, axes, full))
-    axes.set_title(f"in.{name}", fontsize=9)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=7)
-    figure.savefig((PICTURES if full else folder) / f"{name}.png", dpi=110)
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+        rows = list(module.compare(run, axes, full))
+        finish(axes, f"in.{name}")
+        figure.savefig((PICTURES if full else folder) / f"{name}.png", dpi=110)
     plt.close(figure)
     return rows
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from comparisons.pictures import coloured
 from comparisons.row import Row
 
 SOURCE = "in.cold_spray_axisymmetric"
@@ -40,6 +41,7 @@ def compare(run, axes, full):
         total = (log.kinetic[-1] + log.spent[-1] + log.stored[-1]) / ENERGY
         yield Row(f"energy at the end over that at first, {what}", (0.85, 1), total, 0.0, "balance")
     r = np.hypot(b.x, b.y)
-    axes.scatter(1e6 * a.x, 1e6 * a.y, c=a["T"], s=0.5, vmin=298, vmax=500)
-    axes.scatter(-1e6 * r, 1e6 * b.z, c=b["T"], s=0.1, vmin=298, vmax=500)
+    x, y = np.append(a.x, -r), np.append(a.y, b.z)
+    heat, size = np.append(a["T"], b["T"]), np.repeat([1, 0.3], [len(a.x), len(r)])
+    coloured(axes, 1e6 * x, 1e6 * y, heat, "temperature (K)", s=size, vmin=298, vmax=500)
     axes.set(xlabel="in space | axisymmetric, radius (um)", ylabel="height (um)", aspect="equal")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from comparisons.pictures import coloured
 from comparisons.row import Row
 
 # The program limits the norm of the deviator in the plane to 300 MPa. Where plane plastic flow is
@@ -42,7 +43,7 @@ def compare(run, axes, full):
         yield Row("depth at 40 us, cells of half the size (mm)", FINE, fine.depth[-1], 0.03, SOURCE)
         axes.plot(1e6 * fine.Time, fine.depth, lw=1, label="cells of half the size")
     last = result.snapshots("disk_impact")[-1]
-    inset = axes.inset_axes([0.52, 0.08, 0.46, 0.6])
-    inset.scatter(1e3 * last.x, 1e3 * last.y, c=last.ep, s=0.3)
-    inset.set(aspect="equal", xticks=[], yticks=[], title="plastic strain")
+    inset = axes.inset_axes([0.44, 0.05, 0.46, 0.6])
+    coloured(inset, last.x, last.y, last.ep, "plastic strain", s=0.6)
+    inset.set(aspect="equal", xticks=[], yticks=[])
     axes.set(xlabel="time (us)", ylabel="depth of the foot of the disk (mm)")

@@ -49,6 +49,6 @@ def compare(run, axes, full):
     least = 1 - log.uy.max() / 1e3 * fall * log.Time[-1] / (0.1 * DEPTH)
     name = "water in the tank at 0.3 s over that at first"
     yield Row(name, (least, 1), water[-1] / water[0], 0.0, "Torricelli, gate open as widest")
-    axes.plot(log.Time, log.ux, label="end of the gate, sideways (mm)")
-    axes.plot(log.Time, log.uy, label="upwards (mm)")
+    axes.plot(log.Time, log.ux, label="end of the gate, sideways")
+    axes.plot(log.Time, log.uy, label="upwards")
     axes.set(xlabel="time (s)", ylabel="displacement (mm)")

@@ -25,5 +25,5 @@ def compare(run, axes, full):
         yield Row(f"load / c, {name}", load, log.load[late].mean(), within, source)
         axes.plot(log.Time, log.load, lw=1, label=name)
         if "bar" not in words:
-            axes.axhline(load, color="k", lw=1, ls="--")
+            axes.axhline(load, color="k", lw=1, ls="--", label=f"exact, {name}")
     axes.set(xlabel="time (s)", ylabel="load / c")

@@ -6,6 +6,7 @@ from math import atan, cos, pi, sin, sqrt
 
 import numpy as np
 
+from comparisons.pictures import coloured
 from comparisons.row import Row
 
 YIELD = 0.98  # GPa, at first
@@ -43,5 +44,5 @@ def compare(run, axes, full):
         below = last.y0 < 0.05e-3
         deep = np.average(last.damage[below] > 0.99, weights=last.mass[below])
         yield Row(f"broken share deep below the cut{cells}", 0.0, deep, 0.01, "the piece holds")
-    axes.scatter(1e3 * last.x, 1e3 * last.y, c=last.ep, s=1, vmax=2)
+    coloured(axes, 1e3 * last.x, 1e3 * last.y, last.ep, "plastic strain", s=2, vmax=2)
     axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal", xlim=(0, 1.2), ylim=(0, 0.6))

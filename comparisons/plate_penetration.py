@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from comparisons.pictures import coloured
 from comparisons.row import Row
 
 RHO, C0, S, V = 11350.0, 2030.0, 1.47, 6580.0
@@ -35,5 +36,6 @@ def compare(run, axes, full):
     yield Row("speed of the plug (m/s)", V, speed, 0.15, "twice that behind the shock")
     ahead = -last.z[last.type == 2].min() / (15e-6 * V)
     yield Row("place of the front over v t", (0.9, 1.1), ahead, 0.05, "twice that behind the shock")
-    axes.scatter(1e3 * last.x, 1e3 * last.z, c=-last.vz / 1e3, s=0.5)
+    speed = -last.vz / 1e3
+    coloured(axes, 1e3 * last.x, 1e3 * last.z, speed, "speed downwards (km/s)", s=1)
     axes.set(xlabel="x (mm)", ylabel="z (mm)", aspect="equal")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from comparisons.lines import distance, surface, unmoved
+from comparisons.pictures import coloured
 from comparisons.row import Row
 
 SOURCE = "Huang et al. 2015 (material point method)"
@@ -52,7 +53,7 @@ def compare(run, axes, full):
         name = "distance of the slip surfaces with it (m)"
         yield Row(name, 0.0, distance(FAILURE, line), 2.5, SOURCE)
         axes.plot(*line.T, "C2", lw=0.8, label="the same, softening")
-    axes.scatter(last.x, last.y, s=0.3, c=np.minimum(last.ep, 1), cmap="Greys")
+    coloured(axes, last.x, last.y, last.ep, "plastic strain", s=0.6, vmax=1, cmap="Greys")
     axes.plot(*top.T, "C0", label="computed surface")
     axes.plot(*still.T, "C1", label="computed: moved by less than 2 m")
     axes.plot(*SURFACE.T, "k.", ms=4, label="Huang et al.: surface")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from comparisons.pictures import coloured
 from comparisons.row import Row
 
 E, NU = 211e3, 0.33  # MPa
@@ -76,5 +77,5 @@ def compare(run, axes, full):
     axes.plot(strain, stress, lw=1, label="computed")
     axes.set(xlabel="engineering strain", ylabel="engineering stress (MPa)", ylim=(0, 700))
     inset = axes.inset_axes([0.05, 0.06, 0.33, 0.55])
-    inset.scatter(1e3 * last.x, 1e3 * last.y, c=last.damage, s=0.5)
-    inset.set(xlabel="", aspect="equal", xticks=[], yticks=[], title="damage")
+    coloured(inset, last.x, last.y, last.damage, "damage", s=1)
+    inset.set(aspect="equal", xticks=[], yticks=[])

@@ -76,6 +76,8 @@ def test_an_atlas_runs_its_commands_once_and_writes_a_page(folder, capsys):
     assert (folder / "_static/atlas/laws/power/power.png").read_bytes()[1:4] == b"PNG"
     assert main(words) == 0
     assert "laws/power known" in capsys.readouterr().out
+    assert main([*words[:3], "broken", *words[4:], "-o", "other"]) == 1
+    assert (folder / "page.md").read_text(encoding="utf-8") == page  # what was not made stays
     (folder / "in.law").write_text(SCRIPT + "# changed\n", encoding="utf-8")
     assert main(words) == 0
     assert "laws/power done" in capsys.readouterr().out

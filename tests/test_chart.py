@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import look, pictures
 from karamelo_py.app.studies.curves import Family, order
+from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
 
 ORDERS = {"linear": 1, "quadratic-spline": 2, "cubic-spline": 4}
 
@@ -69,6 +70,13 @@ def test_the_table_tells_orders_and_front(table, capsys):
     assert re.search(r"cubic-spline +80 +8.96 .* front", out)
     assert not re.search(r"quadratic-spline +40 .*front", out)
     assert "failed: point 3 <leaves>" in out
+    # Over a variable, costs say nothing unless they are asked for.
+    words = ["chart", "sweep.csv", "-accuracy", "err", "-by", "basis", "-x", "N"]
+    assert main(words) == 0
+    out = capsys.readouterr().out
+    assert "err by N" in out and "seconds" not in out and "front" not in out
+    assert main([*words, "-cost", "seconds"]) == 0
+    assert "seconds by N" in capsys.readouterr().out
 
 
 @given(st.lists(st.tuples(st.floats(1e-3, 1e3), st.floats(1e-9, 1)), min_size=1, max_size=30))
@@ -154,8 +162,17 @@ def test_no_two_lines_look_alike():
 def test_round_ticks():
     assert look.log_ticks(0.9, 55) == [1, 2, 5, 10, 20, 50]
     assert look.log_ticks(1e-7, 1) == pytest.approx([10.0**k for k in range(-7, 1)])
-    assert look.tick_text(0.02) == "0.02" and look.tick_text(1e-7) == "$10^{-7}$"
-    assert look.tick_text(2e-7) == r"$2\cdot10^{-7}$"
+    assert tick_text(0.02) == "0.02" and tick_text(1e-7) == "$10^{-7}$"
+    # Linear axes, too, say what is there.
+    for top, said in ((2e-5, r"$5\cdot10^{-6}$"), (4e8, "$10^{8}$"), (2, "0.5")):
+        figure = blank_figure(7.0, 4.0)
+        axes = figure.subplots()
+        axes.set_xlim(0, top)
+        tidy(axes)
+        figure.canvas.draw()
+        assert said in [label.get_text() for label in axes.get_xticklabels()]
+        assert not axes.xaxis.get_offset_text().get_text()
+    assert tick_text(2e-7) == r"$2\cdot10^{-7}$"
 
 
 def test_a_page_needs_nothing_else(table):

@@ -130,12 +130,12 @@ def thread_count(hub: Hub, points: int) -> int:
 
 def stable_courant(hub: Hub) -> float:
     """The stable step as a share of cell size over wave speed, by scheme, basis and points."""
-    scheme, basis = hub.update.scheme, hub.update.method.basis
+    scheme, method = hub.update.scheme, hub.update.method
     two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
     if min(two, one) == 1:
-        return 1.0
+        return 1.0 if method.frame.moves else getattr(method.basis, "courant_still", 1.0)
     # Nodes between the corners of cells make the highest frequency higher.
-    return (one if sparse(hub) else two) * (0.7 if basis.nodes_per_cell > 1 else 1)
+    return (one if sparse(hub) else two) * (0.7 if method.basis.nodes_per_cell > 1 else 1)
 
 
 def stable_conduction(hub: Hub) -> float:

@@ -247,36 +247,46 @@ def key_of(lines: list[str]) -> str:
 
 
 def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> None:
-    """Write a page of the entries that are done, with their pictures, commands and tables."""
+    """Write a page of the entries that are done, with their pictures, commands and tables.
+
+    What it says of others stays.
+    """
+    before = page.read_text(encoding="utf-8") if page.exists() else ""
+    kept = {
+        part.partition("\n")[0]: part.rstrip() for part in re.split("^##+ ", before, flags=re.M)
+    }
     shown = page.parent / "_static" / "atlas"
     parts = [
-        "# Atlas\n\nWritten by `karamelo-py atlas`, by the commands that stand below pictures.\n"
+        "# Atlas",
+        "Written by `karamelo-py atlas`, by the commands that stand below pictures.",
     ]
     group = ""
     for entry in entries:
-        place = folder / entry.name
-        if not (place / KEPT).exists():
-            continue
-        pictures = [path for path in sorted(place.iterdir()) if path.suffix in PICTURES]
-        for path in pictures:
-            target = shown / entry.name / path.name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(path, target)
-        if not entry.page:
+        done = (folder / entry.name / KEPT).exists()
+        part = part_of_page(entry, folder / entry.name, shown, inputs) if done else None
+        part = part or kept.get(entry.name)
+        if not part or not entry.page:
             continue
         head = entry.name.partition("/")[0]
         if head != group:
-            parts.append(f"## {head.replace('_', ' ').capitalize()}\n")
+            parts.append(f"## {head.replace('_', ' ').capitalize()}")
             group = head
-        parts.append(f"### {entry.name}\n\n{entry.text}\n")
-        for path in pictures:
-            title = re.split(r"[.:](?:\s|$)", " ".join(entry.text.split()))[0] or entry.name
-            parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})\n")
-        said = (place / SAID).read_text(encoding="utf-8").replace(str(inputs), "inputs")
-        parts.append(f"```text\n{abridged(said)}\n```\n")
-        parts.append(f"{made_with(place / KEPT)}\n")
-    page.write_text("\n".join(parts), encoding="utf-8")
+        parts.append(f"### {part}")
+    page.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
     print(f"written: {page}; pictures are in {shown}")
+
+
+def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
+    """What a page says of an entry; its pictures are copied to the folder `shown`."""
+    parts = [entry.name, entry.text]
+    title = re.split(r"[.:](?:\s|$)", " ".join(entry.text.split()))[0] or entry.name
+    for path in sorted(path for path in place.iterdir() if path.suffix in PICTURES):
+        target = shown / entry.name / path.name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, target)
+        parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})")
+    said = (place / SAID).read_text(encoding="utf-8").replace(str(inputs), "inputs")
+    return "\n\n".join([*parts, f"```text\n{abridged(said)}\n```", made_with(place / KEPT)])
 
 
 def made_with(record: Path) -> str:

@@ -48,7 +48,7 @@ def add_parser(subparsers: Any) -> None:
         help="a table of words: does a log column stay (keeps, damps, gains, breaks, refused)? "
         "Rows are -by, columns the other variables",
     )  # fmt: skip
-    parser.add_argument("-cost", default="seconds", metavar="COLUMN", help="the cost (seconds)")
+    parser.add_argument("-cost", metavar="COLUMN", help="the cost (seconds)")
     parser.add_argument("-by", default="", metavar="A,B", help="variables that tell lines apart")
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("-x", metavar="NAME", help="errors over this variable, not over cost")
@@ -67,6 +67,8 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
+    costs = bool(options.cost) or not options.x
+    options.cost = options.cost or "seconds"
     if options.versus:
         return side_by_side(options)
     if len(options.tables) > 1:
@@ -92,7 +94,7 @@ def run(options: Any) -> int:
         raise ScriptError(f"-heat {options.heat}", expected="two variables: -heat N,ppc")
     if not options.x and not axes and not any(line.shown(line.cost).any() for line in family.lines):
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
-    tell(family, made)
+    tell(family, made, costs=costs)
     if out is None:
         return 0
     if out.suffix.lower() == ".html":
@@ -202,46 +204,50 @@ def keeps(options: Any, rows: list, by: list[str], variables: list[str]) -> int:
     return 0
 
 
-def tell(family: Family, made: dict) -> None:
-    """Print the runs by cost with the Pareto front marked, and the order of each line."""
+def tell(family: Family, made: dict, *, costs: bool = True) -> None:
+    """Print the runs, by cost with the Pareto front marked, and the order of each line."""
     from rich.table import Table
 
-    front = {id(row) for row in family.front()}
+    front = {id(row) for row in family.front()} if costs else set()
     table = Table(box=None, pad_edge=False)
     for name in family.by:
         table.add_column(name, style="cyan", no_wrap=True)
-    for name in [family.along, family.cost, family.accuracy]:
+    for name in [family.along, family.cost if costs else None, family.accuracy]:
         if name:
             table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("Pareto", no_wrap=True)
+    table.add_column("Pareto" if costs else "", no_wrap=True)
     members = [
         (cost, x, error, line, row)
         for line in family.lines
         for cost, x, error, row in zip(line.cost, line.x, line.error, line.rows, strict=True)
     ]
-    for cost, x, error, line, row in sorted(members, key=lambda m: (np.isnan(m[0]), m[0])):
+    if costs:
+        members.sort(key=lambda m: (np.isnan(m[0]), m[0]))
+    for cost, x, error, line, row in members:
         numbers = [shown(float(x))] if family.along else []
-        numbers += [shown(float(a)) if np.isfinite(a) else "–" for a in (cost, error)]
+        measured = (cost, error) if costs else (error,)
+        numbers += [shown(float(a)) if np.isfinite(a) else "–" for a in measured]
         end = "front" if id(row) in front else ""
         if np.isnan(error):
             end = (row.get("status", "") + ": " + row.get("reason", ""))[:70]
         table.add_row(*line.choice.values(), *numbers, end)
     console = terminal()
     console.print(table)
+    pairs = {f"{family.accuracy} by {family.cost}": ("cost", "error")} if costs else {}
+    if family.along:
+        pairs[f"{family.accuracy} by {family.along}"] = ("x", "error")
+    if family.along and costs:
+        pairs[f"{family.cost} by {family.along}"] = ("x", "cost")
     orders = Table(box=None, pad_edge=False, title="\norders, of all and between neighbours",
                    title_justify="left")  # fmt: skip
     orders.add_column("", style="cyan", no_wrap=True)
-    orders.add_column(f"{family.accuracy} by {family.cost}", justify="right")
-    if family.along:
-        orders.add_column(f"{family.accuracy} by {family.along}", justify="right")
-        orders.add_column(f"{family.cost} by {family.along}", justify="right")
+    for heading in pairs:
+        orders.add_column(heading, justify="right")
     for line in family.lines:
-        cells = [str(order(line.cost, line.error))]
-        if family.along:
-            cells += [str(order(line.x, line.error)), str(order(line.x, line.cost))]
-        orders.add_row(line.label, *cells)
+        fits = (order(getattr(line, x), getattr(line, y)) for x, y in pairs.values())
+        orders.add_row(line.label, *map(str, fits))
     console.print(orders)
-    if family.cost == "seconds" and made.get("timed") is False:
+    if costs and family.cost == "seconds" and made.get("timed") is False:
         print(
             "note: these runs went side by side, their times disturb each other; "
             "sweep -time measures"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.studies.variables import number
+from karamelo_py.output.plot_style import tick_text
 
 # After Okabe & Ito, for eyes that see colours differently; each has a marker of its own, so that a
 # chart printed in grey can still be read.
@@ -99,16 +100,6 @@ def _in_order(value: str, values: Sequence[str]) -> str:
 def label(name: str) -> str:
     """The title of an axis."""
     return LABELS.get(name, name)
-
-
-def tick_text(a: float, _: Any = None) -> str:
-    """A number at an axis: 0.02, 500, 3·10^-7."""
-    if a == 0 or 1e-3 <= abs(a) < 1e5:
-        return f"{a:g}"
-    exponent = floor(log10(abs(a)) + 1e-9)
-    lead = a / 10**exponent
-    tens = f"10^{{{exponent}}}"
-    return f"${tens}$" if abs(lead - 1) < 1e-9 else rf"${lead:g}\cdot{tens}$"
 
 
 def log_ticks(low: float, high: float) -> list[float]:

@@ -12,7 +12,7 @@ from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import Family, column, usable
 from karamelo_py.app.studies.variables import number
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plot_style import blank_figure, tidy
+from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
 
 
 def lines(family: Family, path: Path, *, convergence: bool, title: str = "") -> None:
@@ -137,7 +137,7 @@ def heat(family: Family, rows: Sequence[Any], x: str, y: str, path: Path, title:
     figure.supylabel(y, fontsize=10)
     ticks = look.log_ticks(*norm_ends(norm))
     bar = figure.colorbar(mesh, ax=list(all_axes), label=family.error_label)
-    bar.set_ticks(ticks, labels=[look.tick_text(tick) for tick in ticks])
+    bar.set_ticks(ticks, labels=[tick_text(tick) for tick in ticks])
     bar.minorticks_off()
     figure.suptitle(title, fontsize=10, x=0.02, ha="left")
     savefig(figure, path)

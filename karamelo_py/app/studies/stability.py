@@ -15,7 +15,7 @@ import numpy as np
 
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import read_log
-from karamelo_py.app.studies.frontier import Cell, explore
+from karamelo_py.app.studies.frontier import Cell, explore, unseen
 from karamelo_py.app.studies.options import (
     add_family,
     family,
@@ -33,7 +33,8 @@ from karamelo_py.script.errors import ScriptError, nearest
 DESCRIPTION = """\
 Maps where a script is stable over one or two of its variables: stable, growing (its energy exceeds
 a bound), or failed, with the reason. Edges are searched by halves: cells between like ones are not
-run. The table is written beside the picture (map.csv); -var with one value is passed on.
+run. The table is written beside the picture (map.csv), and says which cells were run; -var with one
+value is passed on.
 
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
 
@@ -98,6 +99,9 @@ def run(options: Any) -> int:
     records.write(table, rows)
     chart.draw(known, inferred, out, options.script.name)
     chart.tell(known, inferred)
+    width = unseen(chart.shape, options.stride)
+    if inferred and width:
+        print(f"islands and strips up to {width} cells wide between runs are not seen (-stride)")
     print(f"drawn: {out}; the table is {table}")
     return 0
 
@@ -277,6 +281,7 @@ class Map:
     ) -> None:
         """Draw the map."""
         from matplotlib.colors import ListedColormap
+        from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
 
         classes = {**inferred, **known}
@@ -295,11 +300,11 @@ class Map:
         reasons = Counter(row["why"] for row in self.found.values() if row["class"] == "failed")
         number_of = {reason: str(k) for k, (reason, _) in enumerate(reasons.most_common(), 1)}
         for (i, j), row in self.found.items():
-            failed = row["class"] == "failed"
-            axes.text(
-                x[i], y[j], number_of[row["why"]] if failed else "·", ha="center", va="center",
-                fontsize=7 if failed else 9, color="white" if failed else "black",
-            )  # fmt: skip
+            if row["class"] == "failed":
+                axes.text(x[i], y[j], number_of[row["why"]], ha="center", va="center",
+                          fontsize=7, color="white")  # fmt: skip
+            else:
+                axes.plot(x[i], y[j], "k.", markersize=4)
         handles = [
             Patch(facecolor=COLOURS[k], edgecolor="0.4", label=k)
             for k in CLASSES if k in classes.values()
@@ -318,7 +323,8 @@ class Map:
             said = "first step = the program's limit" + (f"\n({', '.join(names)})" if names else "")
             line = axes.plot(at, up, "k--", linewidth=1.4, label=said)
             handles += line
-        handles.append(Patch(facecolor="none", edgecolor="none", label="·  run; others inferred"))
+        said = "run; others inferred"
+        handles.append(Line2D([], [], color="k", marker=".", linestyle="", label=said))
         axes.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
             fontsize=8, borderaxespad=0,
