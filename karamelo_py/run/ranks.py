@@ -36,9 +36,7 @@ from karamelo_py.script.errors import Quit, ScriptError
 OVER = "over"
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 # The first hears of Ctrl-C, and of batch systems.
-ENDING = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-]
+ENDING = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
 ROWS = ("number", "range", "grid", "box")  # of a tiling
 
 
@@ -52,7 +50,6 @@ class Ranks(Simulation):
     def __init__(self, hub: Hub, previous: Ranks | None = None):
         self.crew: Crew = hub.settings.crew
         self._whole: Setup | None = None
-        self._part: Setup | None = None
         self._shown = True  # the whole has the present state
         self._handed_out = -1  # the version of the whole that the parts have
         self._leading = False
@@ -97,7 +94,6 @@ class Ranks(Simulation):
         """Sort the points by tile."""
         if self._stepping:
             self._part = self._parted.tiles.migrate(self._part)
-            self._parted.setup = self._part
             self._parted.tiles.sort(self._part)
         elif self._at_work:
             raise ScriptError(
@@ -126,13 +122,22 @@ class Ranks(Simulation):
             at_nodes = _like(heat.nodes)
             heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes))
         control = s.control._replace(ranks=Linked(self._call, tiles.foreign))
-        self._part = s._replace(
+        part = s._replace(
             blocks=tuple(block._replace(tiling=tiles.empty_tiling()) for block in s.blocks),
             nodes=nodes, heat=heat, buffers=buffers, spans=np.zeros((1, 2), np.int64),
             control=control,
         )  # fmt: skip
         # As much of a simulation as its state asks for.
-        return SimpleNamespace(setup=self._part, tiles=tiles, hub=hub)
+        return SimpleNamespace(setup=part, tiles=tiles, hub=hub)
+
+    @property
+    def _part(self) -> Setup:
+        """The arrays of this process."""
+        return self._parted.setup
+
+    @_part.setter
+    def _part(self, s: Setup) -> None:
+        self._parted.setup = s
 
     # --- leading and following --------------------------------------------------------------------
 
@@ -250,7 +255,7 @@ class Ranks(Simulation):
             )
             for k, block in enumerate(s.blocks)
         )
-        self._part = self._parted.setup = s._replace(blocks=blocks)
+        self._part = s._replace(blocks=blocks)
         tiles.lay_out(self._part)
 
     def _memory(self) -> list[np.ndarray]:
