@@ -137,8 +137,18 @@ def test_solids_as_in_2020(run_interpreted):
         ("solid(s, cylinder, 0.5, 0, 0.1, 2, rubber, 0.1)", "region(box, cylinder, 0.5, 0, 0.1), "),
         ("solid(s, rectangle, 0, 1, 0, 1, 2, m, 0.1)", "and solid(s, region, box, 2, m, 0.1)"),
         ("solid(s, sphere)", "solid(ID, region, box, ppc"),
-        ("strength(s, JC, 1, 1, 1, 1, 1, 1)", "the style johnson_cook"),
+        (
+            "strength(s, JC, 1, 2, 3, 4, 5, 6)",
+            "strength(s, johnson_cook, 1, 2, 3, 4, 5, 6, 0, 0, 1)",
+        ),
+        (
+            "fix(f, indent, all, sphere, 9, 0, 1, 2, 3)",
+            "fix(f, indent, all, sphere, 9, 3, 0, 1, 2)",
+        ),
+        ("damage(d, damage_johnson_cook, 1, 2, 3, 4, 5, 6, 7)", "1, 2, 3, 4, 0, 5, 6, 7)"),
         ("region(r, block, INF, INF, 0.5, INF, INF, INF)", "too many in 2D"),
+        ("region(r, block, 0, H, INF, INF, op)", "hint: region(r, block, 0, H, INF, INF)"),
+        ("region(r, block, 0, 1, 0, 1, 0, 1)", "3D; here region(r, block, 0, 1, 0, 1)"),
         ("partition_domain(nodes)", "method(ulmpm, FLIP, linear, 1), in the place"),
         ("eos(e, shock, 2, 100, 10, 1.5, 2, 1)", "eos(ID, shock, rho0, K, c0, S, Gamma, cv, Tr"),
         ("strength(s, johnson_cook, 1, 1, 1, 1, 1, 1)", "johnson_cook, G, A, B, n, epsdot0, C, m"),
@@ -154,8 +164,15 @@ def test_a_domain_without_a_size_is_told_with_that_of_the_block(run_interpreted)
     script = "L = 1\ndimension(3)\nregion(b, block, 0, L, 0, 2*L, 0, 1)\n"
     err = run_interpreted(script + "method_modify(FLIP, cubic-spline)\n", status=1).err
     assert "dimension(3, 0, L, 0, 2*L, 0, 1, h) is as large as this block" in err
+    script = "dimension(3)\nregion(b, cylinder, y, 1, 2, R, -L, L)\n"
+    err = run_interpreted(script, status=1).err
+    assert "dimension(3, 1 - R, 1 + R, -L, L, 2 - R, 2 + R, h) is as large as this cyl" in err
+    err = run_interpreted("dimension(2, 0, L, 0, 1)\n", status=1).err
+    assert "hint: dimension(2, 0, L, 0, 1, h)" in err
 
 
 def test_one_method_where_the_script_has_none(run_interpreted):
-    err = run_interpreted("method_modify(FLIP, cubic-spline)\n", status=1).err
-    assert "method(tlmpm, FLIP, cubic-spline, 0.99), at the top of the script" in err
+    script = "dimension(1, 0, 1, 0.1)\nsolid(s, r, 1, m, 0.1)\nmethod_modify(FLIP, cubic-spline)\n"
+    for text in (script, script.split("\n")[2]):
+        err = run_interpreted(text, status=1).err
+        assert "method(tlmpm, FLIP, cubic-spline, 0.99), before the first solid" in err

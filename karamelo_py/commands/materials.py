@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
+from karamelo_py.language.own_words import longer
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.guests import check_columns
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.material import Material, Part
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse_text
 
 
@@ -83,6 +85,13 @@ def strength(hub: Hub, ID: str, style: StyleOf("strength"), *arguments: Argument
     --------
     eos, damage, temperature, material, material eos-strength
     """
+    if style == "JC" and not registry.knows("strength", style):
+        raise ScriptError(
+            "unknown strength style 'JC'",
+            argument="style",
+            expected="the style johnson_cook, with G, A, B, n, epsdot0, C, m, Tr, Tm",
+            hint=longer("strength johnson_cook", arguments),
+        )
     define(hub, hub.parts["strength"], ID, style, arguments)
 
 

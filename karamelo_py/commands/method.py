@@ -276,7 +276,7 @@ class _Call:
     ) -> str:
         """The same call with another kind or basis, what it lacks, and `option` at the end."""
         asked = [p for f in FAMILIES if f in self.styles for p in _numbers(self.styles[f])]
-        typed = [argument.text for argument in self.options if argument.word() is None]
+        typed = [argument.text for argument in self.options if self._is_number(argument)]
         lacking = [p for p in asked[len(typed) :] if not p.optional]
         known = self._words("method", "transfer")
         words = [
@@ -285,6 +285,10 @@ class _Call:
             *(argument.text for argument in self.options if _word(argument, known)),
         ]  # fmt: skip
         return f"method({', '.join(words if option in (None, *words) else [*words, option])})"
+
+    def _is_number(self, argument: Argument) -> bool:
+        word = argument.word()
+        return word is None or isinstance(self.hub.interpreter.variables.get(word), float)
 
     def _words(self, *families: str) -> list[str]:
         """Words that some of the styles know."""
@@ -297,7 +301,7 @@ class _Call:
     def _unknown(self, argument: Argument, slots: list[tuple[str, Parameter]]) -> ScriptError:
         """What is wrong with an option that nothing asks for."""
         word = argument.word()
-        if word is None or isinstance(self.hub.interpreter.variables.get(word), float):
+        if self._is_number(argument):
             asking = {p.name: self.names[f] for f, p in slots if not p.kind.words}
             who = " with ".join(dict.fromkeys(asking.values())) or self.names["transfer"]
             takes = f"{', '.join(asking)} and no further number" if asking else "no number"

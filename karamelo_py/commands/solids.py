@@ -7,7 +7,7 @@ from typing import Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.own_words import SHAPES, filled
+from karamelo_py.language.own_words import SHAPES, filled, in_own_words
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
@@ -49,6 +49,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
         raise ScriptError(
             "there is no method yet",
             expected="method(...) before the first solid, such as method(ulmpm, FLIP, linear, 1)",
+            hint=in_own_words(hub.interpreter, "method_modify"),
         )
     require_domain(hub)
     hub.solids.refuse(ID)

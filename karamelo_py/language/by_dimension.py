@@ -7,10 +7,12 @@ is said here once, and every error shows the form for the dimension in use.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from karamelo_py.language.arguments import with_gap
+from karamelo_py.language.own_words import words_of
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import ScriptError, meant
 
@@ -84,17 +86,26 @@ class Forms:
             f"in {dimension}D"
         )
         gap = with_gap(arguments)
-        fitting = [d for d, other in self.names.items() if len(other) == got and d != dimension]
+        fitting = [d for d, names in self.names.items() if len(names) == got and d != dimension]
+        hint = self._own_line(arguments, dimension) if got else None
+        if fitting and got:
+            other = f"{got} arguments are the form for {fitting[0]}D"
+            hint = other if missing else f"{other}; here {hint}"
         raise ScriptError(
             message,
             place=gap.place if gap else None if missing else arguments[len(names)].place,
             expected=self.line(dimension),
-            hint=f"is a comma missing in '{gap.text}'?"
-            if gap
-            else f"{got} arguments are the form for {fitting[0]}D"
-            if fitting and got
-            else None,
+            hint=f"is a comma missing in '{gap.text}'?" if gap else hint,
         )
+
+    def _own_line(self, arguments: Sequence[Any], dimension: int) -> str:
+        """The call in the words of the script: what is missing by its name, no more than needed."""
+        names = self.names[dimension]
+        words = [argument.text for argument in arguments][: len(names)]
+        line = re.sub(r"\[.*?\]", "", self.pattern)
+        line = line.format(dimension=dimension, names=", ".join([*words, *names[len(words) :]]))
+        ID = (words_of(arguments[0].statement) or ["ID"])[0]
+        return line.replace("(ID,", f"({ID},")
 
     def _convert(self, hub: Scene, argument: Any, name: str, dimension: int) -> float | str:
         if name in self.words:

@@ -32,12 +32,13 @@ def in_own_words(script: Any, name: str) -> str | None:
     Parameters
     ----------
     script
-        The interpreter, at a call of the command.
+        The interpreter of a script that has a call of the command.
     """
-    calls = (s for frame in script.frames for s in frame.statements if isinstance(s, Call))
+    calls = [s for frame in script.frames for s in frame.statements if isinstance(s, Call)]
     own = next((call for call in calls if call.name == "method"), None)
-    before, rest = words_of(own), words_of(script.statement)
-    where = f"in the place of line {own.place.line}" if own else "at the top of the script"
+    asked = [c for c in (script.statement, *calls) if isinstance(c, Call) and c.name == name]
+    before, rest = words_of(own), words_of(asked[0] if asked else None)
+    where = f"in the place of line {own.place.line}" if own else "before the first solid"
     if name == "method_modify" and rest:
         if len(rest) == 1 or not registry.knows("basis", rest[1]):
             rest.insert(1, before[2] if len(before) > 2 else "linear")

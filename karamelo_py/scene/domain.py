@@ -84,14 +84,21 @@ class Domain:
 
 
 def _around(hub: Scene, dimension: int) -> str | None:
-    """A domain as large as the block that the statement in progress would make."""
-    words = words_of(hub.interpreter.statement)
-    if words[1:2] != ["block"] or len(words) < 2 + 2 * dimension or "INF" in " ".join(words):
+    """A domain as large as the block or cylinder that the statement in progress would make."""
+    _, *words = words_of(hub.interpreter.statement) or [""]
+    if words[:1] == ["block"]:
+        ends = words[1 : 1 + 2 * dimension]
+    elif words[:1] == ["cylinder"] and dimension == 3 and len(words) > 6:
+        along, a, b, R, *ends = words[1:7]
+        across = [f"{a} - {R}", f"{a} + {R}", f"{b} - {R}", f"{b} + {R}"]
+        k = 2 * "xyz".find(along)
+        ends = [*across[:k], *ends, *across[k:]]
+    else:
         return None
-    ends = ", ".join(words[2 : 2 + 2 * dimension])
-    return (
-        f"dimension({dimension}, {ends}, h) is as large as this block; what moves needs more room"
-    )
+    if len(ends) < 2 * dimension or "INF" in ends:
+        return None
+    line = f"dimension({dimension}, {', '.join(ends)}, h)"
+    return f"{line} is as large as this {words[0]}; what moves needs more room"
 
 
 def require_domain(hub: Scene) -> Domain:

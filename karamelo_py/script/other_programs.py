@@ -24,7 +24,7 @@ KARAMELO_COMMANDS = frozenset((
 # By family and name.
 INSTEAD = {
     "command": {
-        "method_modify": "method(tlmpm, FLIP, linear, 0.99), at the top of the script: behind the "
+        "method_modify": "method(tlmpm, FLIP, linear, 0.99), before the first solid: behind the "
         "first word stand those of method_modify",
         "partition_domain": "method(ulmpm, FLIP, linear, 1): with linear weights no point acts "
         "across a line of nodes",
@@ -143,6 +143,7 @@ SHORTER: dict[str, dict[int | None, tuple[str, tuple[str, ...]]]] = {
         None: (_NO_TEMPERATURE, ("d1", "d2", "d3", "d4", "0", "epsdot0", "0", "1")),
         5: (_NO_TEMPERATURE, ("{0}", "{1}", "{2}", "{3}", "0", "{4}", "0", "1")),
         6: (_NO_TEMPERATURE, (*(f"{{{k}}}" for k in range(6)), "0", "1")),
+        7: ("without d5: ", ("{0}", "{1}", "{2}", "{3}", "0", "{4}", "{5}", "{6}")),
     },
 }
 

@@ -6,11 +6,34 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from karamelo_py.language.signature import NonNegative
+from karamelo_py.language.own_words import words_of
+from karamelo_py.language.signature import Argument, NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.tools import Bodies, PointForceFix, place
+
+
+class Radius(Expression):
+    """For signatures: a radius above 0, which Karamelo had behind the centre in 2020."""
+
+    script_kind = "a number or a formula above 0"
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Expression:
+        """The radius that a script's argument stands for."""
+        radius = super().from_script(hub, argument)
+        if radius.is_constant and not radius.constant > 0:
+            ID, style, group, kind, K, *centre, R = words_of(argument.statement)
+            line = ", ".join([ID, style, group, kind, K, R, *centre])
+            raise ScriptError(
+                f"the radius is {radius.constant:g}",
+                place=argument.place,
+                expected="a number above 0",
+                hint=f"with the radius in front of the centre: fix({line})",
+            )
+        return radius
 
 
 class Indent(PointForceFix):
@@ -50,7 +73,7 @@ class Indent(PointForceFix):
         group: ParticleGroup,
         kind: Literal["sphere"],
         K: Annotated[Expression, NonNegative],
-        R: Annotated[Expression, NonNegative],
+        R: Radius,
         x: Expression,
         y: Expression,
         z: Expression,
