@@ -55,18 +55,33 @@ KINDS = {
 }
 
 
+IN_SPACE = {
+    "dimension(2, 0, 2, 0, 1": "dimension(3, 0, 2, 0, 1, 0, 4",
+    "0.2, 0.4)": "0.2, 0.4, 3, 3.4)",
+    "0.5, 0.7)": "0.5, 0.7, 3, 3.4)",
+    "left, 2, a": "left, 1, a",
+    "right, 2, b": "right, 1, b",
+    "y0), 20)": "y0), 20, 9*cos(30*z0))",
+    "x0, -20)": "x0, -20, 5)",
+}
+
+
 def passing(method="ulmpm, FLIP, linear, 1", scheme="musl", law="linear, 2, 100, 0.3", **words):
     words = {"more": "", "T": 0, "other": law} | words
     return PASSING.format(method=method, scheme=scheme, law=law, **words)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*KINDS, "space"])
 def test_fast_points_give_to_their_boxes(state_interpreted, kind):
     """What would be given outside a box would be missing, or at a node of another.
 
     Sums are grouped by boxes: the same to round-off, which grows by the steps.
     """
-    script = passing(**KINDS[kind])
+    script = passing(**KINDS.get(kind, {}))
+    if kind == "space":  # one point a cell, in long tiles
+        for line, other in IN_SPACE.items():
+            assert line in script
+            script = script.replace(line, other)
     straight, by_boxes = (state_interpreted(script, boxes=boxes) for boxes in (False, True))
     share = 1e-3 if kind == "single" else 1e-11  # of 1, the size of the domain
     assert straight["x"][:, 0].min() > 0.5  # the left one began at 0.2

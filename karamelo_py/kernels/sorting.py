@@ -23,7 +23,7 @@ def cell_of(grid, direction, at):
 def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
     """Stable counting sort of places `x` (w, n) by tile.
 
-    Tiles have `size` cells a direction; grid g has ``tiles[g]`` of them (g, 3), numbered from
+    Tiles have `size` (d,) cells; grid g has ``tiles[g]`` of them (g, 3), numbered from
     ``first[g]``. `of` (n,) is the grid of each point. `tile` (n,) takes the tile of each point,
     `order` (n,) the points by tile, and ``start[t]`` ends as the end of tile t, which is the start
     of tile t + 1.
@@ -34,7 +34,7 @@ def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
         grid = record(grids, g)
         number = 0
         for k in range(dimension(kin)):
-            number = number * tiles[g, k] + cell_of(grid, k, in_cells(grid, k, x[k, p])) // size
+            number = number * tiles[g, k] + cell_of(grid, k, in_cells(grid, k, x[k, p])) // size[k]
         number += first[g]
         tile[p] = number
         start[number + 1] += 1
@@ -66,7 +66,8 @@ def order_in_tiles(kin, grids, basis, size, points, x, ranges, width, boxes, bin
             number = 0
             for k in range(d):
                 at = in_cells(grid, k, x[k, p])
-                number = number * size + max(int(at + first_node(basis, grid.h)), 0) % size
+                first = max(int(at + first_node(basis, grid.h)), 0)
+                number = number * size[k] + first % size[k]
                 at = at if at > 0 else real(0, at)  # so written, NaN is 0 too
                 boxes[0, t, k] = at if q == begin else min(boxes[0, t, k], at)
                 boxes[1, t, k] = at if q == begin else max(boxes[1, t, k], at)

@@ -181,7 +181,8 @@ def lower(hub: Hub, previous: State | None = None, *, points: bool = True) -> tu
     lattices = method.lattices(hub)
     transfer = hub.update.transfer_tag(real)
     basis = type(method.basis)(*(real(x) for x in method.basis))
-    tiles = Tiles(lattices, basis, sum(len(solid.x0) for solid in hub.solids.values()))
+    count = sum(len(solid.x0) for solid in hub.solids.values())
+    tiles = Tiles(lattices, basis, count, sparse(hub))
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)

@@ -28,6 +28,7 @@ from karamelo_py.run.crew import Crew
 from karamelo_py.run.lowering import State, lower
 from karamelo_py.run.shares import SharedTiles, joined, sized
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.stable import sparse
 from karamelo_py.run.state import changing, of_nodes, remembered_at, take_points, take_tiling
 from karamelo_py.run.tiles import Tiles, in_tiles, in_use, numbers, shares_of, used
 from karamelo_py.scene.hub import Hub
@@ -114,7 +115,7 @@ class Ranks(Simulation):
         method = hub.update.method
         one_place = method.fields_per_solid
         tiles = SharedTiles(
-            self.crew, method.lattices(hub), s.basis, self.count, one_place=one_place
+            self.crew, method.lattices(hub), s.basis, self.count, sparse(hub), one_place=one_place
         )
         nodes, heat = _like(s.nodes), s.heat
         buffers = tiles.empty_buffers(nodes)

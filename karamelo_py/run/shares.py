@@ -38,10 +38,11 @@ class SharedTiles(Tiles):
         lattices: Sequence[Lattice],
         basis: Any,
         points: int,
+        sparse: bool,
         *,
         one_place: bool,
     ):
-        super().__init__(lattices, basis, points)
+        super().__init__(lattices, basis, points, sparse)
         self.crew = crew
         self.one_place = one_place
         self.cuts = np.full(crew.size + 1, self.count)

@@ -28,6 +28,8 @@ from karamelo_py.scene.lattice import Lattice
 # stay in caches, large ones share less of their nodes with others.
 TILES = {1: 64, 2: 24, 3: 8}
 NODES = {1: 64, 2: 8, 3: 8}
+LONGER = 16  # times, along the rows of nodes in space, where cells have one point: boxes have more
+#             nodes than points then, and few tiles would have few points
 SHARES = 64  # of the points of a block, nearly equal: threads share them out
 SPAN = 256  # nodes of a span at most: threads share out spans
 DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
@@ -49,7 +51,7 @@ class Tiles:
     Attributes
     ----------
     size
-        Cells of a tile per direction.
+        (d,) cells of a tile.
     count
         Number of tiles, of all grids.
     occupied
@@ -60,10 +62,11 @@ class Tiles:
         How often points were sorted.
     """
 
-    def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int):
+    def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int, sparse: bool):
         self.direct = points <= DIRECT_UP_TO
         self.dimension = d = lattices[0].dimension
-        self.size = TILES[d]
+        rows = np.array([1] * (d - 1) + [LONGER if sparse and d == 3 else 1])
+        self.size, self.node_size = TILES[d] * rows, NODES[d] * rows
         self.per_cell = type(basis).nodes_per_cell
         self.least_nodes = type(basis).least_nodes
         self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
@@ -78,7 +81,7 @@ class Tiles:
         self.first = _numbered(self.shapes)
         self.count = int(self.first[-1])
         self._start = np.zeros(self.count + 1, np.int64)
-        tiles = -(-self._nodes // NODES[d])
+        tiles = -(-self._nodes // self.node_size)
         self._tile_steps = steps_of(tiles)
         self._first_of_nodes = _numbered(tiles)
         # Of all buffers of a scene: count, first and parts.
@@ -176,7 +179,7 @@ class Tiles:
         tiling.grid[:count] = grid
         width = lanes_for(8 * x.itemsize).width
         scratch = np.empty((2, x.shape[1]), np.int64)
-        bins = np.empty((2, self.size**self.dimension), np.int64)
+        bins = np.empty((2, self.size.prod()), np.int64)
         boxes = np.empty((2, count, self.dimension))
         order_in_tiles(
             s.kin, s.grids, s.basis, self.size, points, x, tiling.range[:count], width, boxes, bins,
@@ -251,7 +254,7 @@ class Tiles:
 
     def _reached(self, boxes: Boxes) -> tuple[np.ndarray, ...]:
         """Pairs of a box and a tile of nodes that it reaches; the first and last such nodes."""
-        size = NODES[self.dimension]
+        size = self.node_size
         low = boxes.lo // size
         across = boxes.hi // size - low + 1
         box, left = ragged(np.prod(across, axis=1))

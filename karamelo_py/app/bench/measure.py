@@ -223,6 +223,10 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
     while count < 3 or (time.perf_counter() - begun < seconds and count < MOST_STEPS):
         _take_step(simulation, timed)
         count += 1
+        clock = s.control.clock[0]
+        if clock.drift > clock.drift_limit:  # points would give nothing any more
+            simulation.sort()
+            begin(scheme, Fused(), simulation.mode, s)
     of_points, of_nodes = (
         {name: _per_step(taken, count) for name, taken in kind.items()} for kind in timed[1:]
     )

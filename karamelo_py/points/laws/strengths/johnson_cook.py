@@ -109,7 +109,7 @@ def power_law(factor, exponent, strain):
     some = strain > 0
     base = choose(some, strain, real(1, strain))
     value = choose(some, factor * power(base, exponent), real(0, strain))
-    return value, exponent * value / base
+    return value, value * (exponent / base)
 
 
 @point_function(tags=2)
