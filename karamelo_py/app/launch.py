@@ -113,7 +113,10 @@ class Launcher:
             for one in self.links.values():  # mpiexec was ended, and not they
                 with suppress(ProcessLookupError):
                     os.kill(one["pid"], signal.SIGKILL)
-        return self._outcome()
+        status = self._outcome()
+        if "--debug" in self.command and (words := self._words()):
+            self._say(words)
+        return status
 
     # --- while they run ---------------------------------------------------------------------------
 
@@ -163,7 +166,7 @@ class Launcher:
         self.unknown.remove(link)
         self.links[link] = message
         if message["rank"] == 0:
-            socket.send_fds(link, [b"0"], [0, 1, 2])
+            socket.send_fds(link, [b"0"], [1, 2])
 
     # --- when they have ended ---------------------------------------------------------------------
 
@@ -180,11 +183,12 @@ class Launcher:
         if first is not None:
             return 0
         if self.signals:
-            if self.signals[0] == signal.SIGINT and not self.lost:
+            if self.signals[0] == signal.SIGINT:
                 self._say(render_message("error", "interrupted"))
             return SIGNALLED + self.signals[0]
         self._say(self._loss() if self.lost else self._no_start())
-        return self.process.returncode or 1
+        status = self.process.returncode
+        return SIGNALLED - status if status < 0 else status or 1
 
     def _loss(self) -> str:
         one = self.lost[0]
@@ -196,10 +200,13 @@ class Launcher:
         )
 
     def _no_start(self) -> str:
+        text = f"{self.command[0]} has not started {self.ranks} processes"
+        return "\n".join([render_message("error", text), self._words()]).rstrip()
+
+    def _words(self) -> str:
+        """What mpiexec said, and libraries of C through it."""
         self.said.seek(0)
-        words = self.said.read().decode(errors="replace").strip()
-        return render_message("error", f"{self.command[0]} has not started {self.ranks} processes",
-                              expected="what it says:\n" + words if words else None)  # fmt: skip
+        return self.said.read().decode(errors="replace").strip()
 
     def _say(self, text: str) -> None:
         with suppress(OSError):

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from math import inf
-from typing import NamedTuple
+from typing import NamedTuple, TextIO
 
 from karamelo_py.app.launch import SOCKET
 from karamelo_py.app.start import INTERRUPTED
@@ -47,9 +47,10 @@ class Link:
             link.connect(name)
             link.sendall(_line({"rank": rank, "pid": os.getpid()}))
             if rank == 0:
-                for k, mine in enumerate(socket.recv_fds(link, 1, 3)[1]):
-                    os.dup2(mine, k)
-                    os.close(mine)
+                # What libraries write to the usual ones is left to mpiexec.
+                out, err = (_stream(fd) for fd in socket.recv_fds(link, 1, 2)[1])
+                sys.stdout = sys.__stdout__ = out
+                sys.stderr = sys.__stderr__ = err
         except OSError:  # it is on another machine
             return
         self.socket = link
@@ -60,6 +61,11 @@ class Link:
         """Tell the launcher how this process ends."""
         with suppress(OSError):
             self.socket.sendall(_line({"status": status, "text": text}))
+
+
+def _stream(fd: int) -> TextIO:
+    usual = sys.__stderr__  # shows what it cannot encode
+    return open(fd, "w", buffering=1, encoding=usual.encoding, errors=usual.errors)  # noqa: SIM115
 
 
 def _line(message: dict) -> bytes:
