@@ -29,10 +29,11 @@ from karamelo_py.script.errors import ScriptError, render_message
 # Where the launcher of this program waits for the processes to report.
 SOCKET = "KARAMELO_PY_LAUNCHER"
 # What Open MPI is told: more processes than cores are the user's choice, each has threads of its
-# own, and a container's root may start it.
+# own, one that waits lets others work, and a container's root may start it.
 OPEN_MPI = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
+    "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }

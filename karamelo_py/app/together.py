@@ -21,7 +21,7 @@ from karamelo_py.script.errors import ScriptError
 
 # Seconds that one that has failed waits for the others, before it ends them. The first tells what
 # is wrong; others do where it does not know.
-PATIENCE, LONGER = 3.0, 10.0
+PATIENCE, LONGER = 2.0, 6.0
 
 
 class Outcome(NamedTuple):
@@ -65,7 +65,7 @@ class Link:
 
 def _stream(fd: int) -> TextIO:
     usual = sys.__stderr__  # shows what it cannot encode
-    return open(fd, "w", buffering=1, encoding=usual.encoding, errors=usual.errors)  # noqa: SIM115
+    return open(fd, "w", buffering=1, encoding=usual.encoding, errors=usual.errors)
 
 
 def _line(message: dict) -> bytes:
@@ -144,7 +144,9 @@ def together(
         return end(status, text, tells=True, stays=True)
     patience = inf
     if status:
-        patience = 0.0 if status == INTERRUPTED else LONGER if rank else PATIENCE
+        patience = LONGER if rank else PATIENCE
+        if status == INTERRUPTED or crew.amid:
+            patience = 0.0
     words = crew.meet(FAILED if status else WELL, patience)
     alone = words is None
     return end(status, text, tells=alone or rank == int(words.argmin()), stays=not alone)

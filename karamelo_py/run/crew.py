@@ -50,6 +50,8 @@ class Crew:
         How many of them have the same cores as this one, itself among them.
     waited
         Seconds in which this process waited for others, or for what they sent, in steps.
+    amid
+        Whether this process has failed in the midst of what all do together.
     parted
         Whether the processes do not go on together: one has failed, or has another script.
 
@@ -61,7 +63,7 @@ class Crew:
 
     beside = 1
     waited = 0.0
-    parted = False
+    amid = parted = False
 
     def __init__(self, world: Any = None):
         if world is None:

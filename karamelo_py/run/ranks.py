@@ -197,8 +197,12 @@ class Ranks(Simulation):
                 if stepped and more:
                     self.gather(everywhere=True)
                 return
-            with suppress(Abandoned):
-                getattr(self, what)(*arguments)
+            try:
+                with suppress(Abandoned):
+                    getattr(self, what)(*arguments)
+            except BaseException:
+                self.crew.amid = True
+                raise
 
     def _tell(self, what: str, *arguments: Any) -> None:
         self.crew.told((what, *arguments))
