@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -156,6 +157,7 @@ def _pids(launcher: int) -> list[int]:
 
 BREAKS = """
 import os
+import re
 from karamelo_py.run import ranks, shares, tiles
 tiles.DIRECT_UP_TO = 0
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
@@ -211,3 +213,39 @@ def test_what_several_processes_cannot_do(monkeypatch, capsys):
 
 def test_one_rank_is_no_other_run(tmp_path, run_interpreted):
     assert run_interpreted(block(2, "run(2)"), "--ranks", "1").log.Step[-1] == 2
+
+
+# --- check ----------------------------------------------------------------------------------------
+
+COUNTS = """
+from karamelo_py.run import tiles
+from karamelo_py.run.crew import Crew
+tiles.DIRECT_UP_TO, tiles.TILES = 0, {2: 2}
+passed = Crew.passed
+def counting(self, given, taken):
+    with open(f"passed.{self.rank}", "a") as file:
+        print(sum(array.nbytes for array in given.values()), file=file)
+    passed(self, given, taken)
+Crew.passed = counting
+"""
+
+
+@needs_mpi
+def test_what_is_passed_on_is_foretold(tmp_path):
+    """`check` makes the plan of all processes in one; the bytes are those of real ones."""
+    (tmp_path / "sitecustomize.py").write_text(COUNTS, encoding="utf-8")
+    path = moving(tmp_path, "run(4)", size=0.5)
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    assert by_ranks(tmp_path / "run", path, 2, PYTHONPATH=folders)[0] == 0
+    check = started(tmp_path, *PROGRAM, "check", str(path), "--ranks", "2", PYTHONPATH=folders)
+    out, err = check.communicate(timeout=100)
+    assert check.returncode == 0, err
+    found = [
+        # The first step has the forces of the state that it begins with, too.
+        sum(map(int, (tmp_path / "run" / f"passed.{rank}").read_text().split()[-2:]))
+        for rank in (0, 1)
+    ]
+    low, high = re.search(r"bytes given in a step +(\d+) +(\d+)", out).groups()
+    assert sorted(found) == [int(low), int(high)] and int(low) > 0
+    points = re.search(r"  points +(\d+) +(\d+)", out).groups()
+    assert sum(map(int, points)) == 100

@@ -125,14 +125,14 @@ def _dispatch(arguments: list[str]) -> int:
     if surplus:
         raise _surplus(surplus, arguments[0], commands.choices.get(arguments[0], parser))
     size, rank = launched()
-    if size > 1 and arguments[0] != "run":
+    if size > 1 and arguments[0] != "run" and (rank or arguments[0] != "check"):
         if rank == 0:
             raise ScriptError(
                 f"karamelo-py {arguments[0]} is of one process, and {size} were started",
                 hint=f"without mpiexec: karamelo-py {arguments[0]} ...",
             )
         return ERROR
-    options.words = arguments
+    options.command_line = arguments
     return options.act(options)
 
 
@@ -295,7 +295,7 @@ def _run(options: argparse.Namespace) -> int:
             lambda act: _outcome(act, debugging=debugging),
         )
     if (options.ranks or 1) > 1:
-        return launch(options.ranks, options.words)
+        return launch(options.ranks, options.command_line)
     return _carry_out(options, script)
 
 
@@ -309,6 +309,7 @@ def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = Non
 
     hub = Hub(Console(quiet=options.quiet, terminal=has_terminal()))
     hub.settings.threads = options.threads
+    hub.settings.ranks = options.ranks or launched()[0]
     if crew is not None:
         share(hub, crew)
     hub.settings.debug = options.debug
