@@ -28,6 +28,9 @@ class Threads(Crew):
         self._barrier.wait(PATIENCE)
         return found
 
+    def meet(self, word: int, patience: float = PATIENCE) -> np.ndarray:
+        return np.array(self.everyone(word))
+
     def told(self, thing: Any = None) -> Any:
         return self.everyone(thing)[0]
 
@@ -58,7 +61,7 @@ class Threads(Crew):
         for rank, array in taken.items():
             array[...] = of_all[rank][self.rank]
 
-    def abandon(self) -> None:
+    def abandon(self, status: int = 1) -> None:
         self._barrier.abort()
 
 

@@ -9,7 +9,7 @@ from tempfile import mkdtemp
 import numpy as np
 from crews import together
 
-from karamelo_py.app.launch import share
+from karamelo_py.app.together import share
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.crew import Crew

@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from karamelo_py import __version__
+from karamelo_py.app.launch import launch
 from karamelo_py.app.outputs import add_output_options, direct
 from karamelo_py.app.start import INTERRUPTED, leaving_at_once
-from karamelo_py.run.crew import launched
+from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
+from karamelo_py.run.crew import Crew, launched
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, nearest, render_message
 
@@ -44,22 +46,29 @@ RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
+    keep_to_oneself()
+    status, text = _outcome(lambda: _dispatch(arguments), debugging="--debug" in arguments)
+    if text:
+        _complain(text)
+    return status
+
+
+def _outcome(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
+    """How something ends, with what is left to be said."""
     try:
-        return _dispatch(arguments)
+        return Outcome(act())
     except SystemExit as done:  # argparse has shown what was asked for
-        return int(done.code or 0)
+        return Outcome(int(done.code or 0))
     except KeyboardInterrupt:
-        _complain(render_message("error", "interrupted"))
-        return INTERRUPTED
+        return Outcome(INTERRUPTED, render_message("error", "interrupted"))
     except BrokenPipeError:
         # Whoever read our output has gone; what was written stays.
         sys.stderr.close()
-        return ERROR
+        return Outcome(ERROR)
     except Exception as error:
-        if "--debug" in arguments:
+        if debugging:
             traceback.print_exc()
-        _complain(_rendered(error))
-    return ERROR
+        return Outcome(ERROR, _rendered(error))
 
 
 def _rendered(error: Exception) -> str:
@@ -115,6 +124,15 @@ def _dispatch(arguments: list[str]) -> int:
     options, surplus = parser.parse_known_args(arguments)
     if surplus:
         raise _surplus(surplus, arguments[0], commands.choices.get(arguments[0], parser))
+    size, rank = launched()
+    if size > 1 and arguments[0] != "run" and (rank or arguments[0] != "check"):
+        if rank == 0:
+            raise ScriptError(
+                f"karamelo-py {arguments[0]} is of one process, and {size} were started",
+                hint=f"without mpiexec: karamelo-py {arguments[0]} ...",
+            )
+        return ERROR
+    options.command_line = arguments
     return options.act(options)
 
 
@@ -152,6 +170,11 @@ def _numbers(name: str) -> list[int]:
 def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError:
     """The error for words that a command line has no use for."""
     option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
+    if option == "--ranks":
+        return ScriptError(
+            f"karamelo-py {command} is of one process",
+            expected="--ranks for a script (karamelo-py SCRIPT --ranks N), check or bench",
+        )
     close = nearest(option, parser.options()) if option else None
     usage = USAGE if command == "run" else parser.format_usage().removeprefix("usage: ").rstrip()
     return ScriptError(
@@ -262,24 +285,32 @@ def _run(options: argparse.Namespace) -> int:
     if script is None:
         command = "karamelo-py check" if options.checking else "karamelo-py"
         raise ScriptError("no script is named", expected=f"{command} SCRIPT")
-    crew = None
-    if (options.ranks or launched()[0]) > 1:
-        from karamelo_py.app.launch import join, launch
+    if options.checking:
+        return _carry_out(options, script)
+    if launched()[0] > 1:
+        debugging = options.debug
+        return together(
+            options.ranks,
+            lambda crew: _carry_out(options, script, crew),
+            lambda act: _outcome(act, debugging=debugging),
+        )
+    if (options.ranks or 1) > 1:
+        return launch(options.ranks, options.command_line)
+    return _carry_out(options, script)
 
-        if launched()[0] == 1:
-            return launch(options.ranks)
-        crew = join(options.ranks)
+
+def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = None) -> int:
+    """Carry out a script; returns the exit status."""
     with leaving_at_once():
         from karamelo_py.language.interpreter import Interpreter
         from karamelo_py.output.console import Console
         from karamelo_py.run.runner import Interrupted
         from karamelo_py.scene.hub import Hub
 
-    hub = Hub(Console(quiet=options.quiet))
+    hub = Hub(Console(quiet=options.quiet, terminal=has_terminal()))
     hub.settings.threads = options.threads
+    hub.settings.ranks = options.ranks or launched()[0]
     if crew is not None:
-        from karamelo_py.app.launch import share
-
         share(hub, crew)
     hub.settings.debug = options.debug
     hub.settings.trusts = options.trust_geometries

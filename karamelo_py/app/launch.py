@@ -1,29 +1,54 @@
-"""One scene on several processes: how they are started, and what each may say."""
+"""karamelo-py --ranks N: mpiexec starts the processes, and this one stands for them all.
+
+Each process reports to this one through a socket (:mod:`karamelo_py.app.together`). The first gets
+the terminal, or whatever output and errors go to, and the signals that come; the others say what
+they know that it does not. What mpiexec says is shown only where no process was started.
+"""
 
 from __future__ import annotations
 
+import json
 import os
+import select
 import shutil
+import signal
+import socket
 import subprocess
 import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any, BinaryIO
 
-from karamelo_py.run.crew import INSTALL, Crew, launched
-from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.run.crew import INSTALL
+from karamelo_py.script.errors import ScriptError, render_message
 
+# Where the launcher of this program waits for the processes to report.
+SOCKET = "KARAMELO_PY_LAUNCHER"
 # What Open MPI is told: more processes than cores are the user's choice, each has threads of its
-# own, and a container's root may start it.
+# own, one that waits lets others work, and a container's root may start it.
 OPEN_MPI = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
+    "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
+ENDING = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
+SIGNALLED = 128
+PAUSE = 0.05  # seconds between two looks at mpiexec
+GRACE = 2.0  # seconds that processes have to end after it
+AT_ONCE = 3  # so many signals end all without waiting for the step
+LONGEST_NAME = 90  # of a socket
 
 
-def launch(ranks: int) -> int:
-    """Run this command line on so many processes of this machine; returns the exit status.
+def launch(ranks: int, arguments: Sequence[str]) -> int:
+    """Run a command line on so many processes of this machine; returns the exit status.
 
     Raises
     ------
@@ -32,42 +57,170 @@ def launch(ranks: int) -> int:
     """
     beside = Path(sys.executable).parent / "mpiexec"
     mpiexec = str(beside) if beside.exists() else shutil.which("mpiexec")
+    if not hasattr(socket, "send_fds"):
+        raise ScriptError(
+            f"--ranks {ranks}: here, mpiexec has to be started by hand",
+            hint=f"mpiexec -n {ranks} karamelo-py SCRIPT",
+        )
     if mpiexec is None:
         raise ScriptError(f"--ranks {ranks}: there is no mpiexec here", hint=INSTALL)
     try:
         import mpi4py  # noqa: F401
     except ImportError:
         raise ScriptError(f"--ranks {ranks} needs mpi4py", hint=INSTALL) from None
-    command = [mpiexec, "-n", str(ranks), sys.executable, "-m", "karamelo_py.app.cli"]
-    environment = {**OPEN_MPI, **os.environ}
-    return subprocess.run([*command, *sys.argv[1:]], env=environment, check=False).returncode
+    command = [mpiexec, "-n", str(ranks), sys.executable, "-m", "karamelo_py.app.start"]
+    with tempfile.TemporaryFile() as said, _folder() as folder:
+        return Launcher(ranks, [*command, *arguments], f"{folder}/s", said).run()
 
 
-def join(asked: int | None) -> Crew:
-    """Join the processes that mpiexec has started; all but the first keep silent.
+@contextmanager
+def _folder() -> Iterator[str]:
+    """A folder for a socket, whose name may not be long."""
+    usual = tempfile.gettempdir()
+    place = usual if len(usual) < LONGEST_NAME - 20 else "/tmp"
+    with tempfile.TemporaryDirectory(prefix="karamelo-", dir=place) as folder:
+        yield folder
 
-    Raises
-    ------
-    ScriptError
-        If there are not as many as asked for, or mpi4py is missing.
-    """
-    size, rank = launched()
-    if rank > 0:
-        sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
-    if asked is not None and asked != size:
-        raise ScriptError(
-            f"--ranks {asked}: mpiexec has started {size} processes",
-            expected="one of the two: mpiexec -n N, or --ranks N",
+
+class Launcher:
+    """The processes of a run as one: its signals, its exit status, its last word."""
+
+    def __init__(self, ranks: int, command: list[str], name: str, said: BinaryIO):
+        self.ranks, self.command, self.name, self.said = ranks, command, name, said
+        self.unknown: list[socket.socket] = []  # have not said yet who they are
+        self.links: dict[socket.socket, dict[str, Any]] = {}
+        self.reports: dict[int, dict[str, Any]] = {}
+        self.lost: list[dict[str, Any]] = []  # ended without a report, in this order
+        self.signals: list[int] = []
+        self.heeded: list[int] = []
+        self.process: Any = None
+
+    def run(self) -> int:
+        """Start them and see them end; returns the exit status."""
+        with socket.socket(socket.AF_UNIX) as self.door, self._hearing():
+            self.door.bind(self.name)
+            self.door.listen(self.ranks)
+            environment = {**OPEN_MPI, **os.environ, SOCKET: self.name}
+            # A session of its own: Ctrl-C comes to this process alone.
+            self.process = subprocess.Popen(
+                self.command, env=environment, stdin=subprocess.DEVNULL, stdout=self.said,
+                stderr=self.said, start_new_session=True,
+            )  # fmt: skip
+            while self.process.poll() is None:
+                self._listen()
+            end = time.monotonic() + GRACE
+            while self.links and time.monotonic() < end:
+                self._listen()
+            for one in self.links.values():  # mpiexec was ended, and not they
+                with suppress(ProcessLookupError):
+                    os.kill(one["pid"], signal.SIGKILL)
+        status = self._outcome()
+        if "--debug" in self.command and (words := self._words()):
+            self._say(words)
+        return status
+
+    # --- while they run ---------------------------------------------------------------------------
+
+    @contextmanager
+    def _hearing(self) -> Iterator[None]:
+        """Signals go to the first process, except what this one was told to ignore."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = {number: signal.getsignal(number) for number in ENDING}
+        self.heeded = [n for n, handler in before.items() if handler != signal.SIG_IGN]
+        for number in self.heeded:
+            signal.signal(number, self._pass_on)
+        try:
+            yield
+        finally:
+            for number in self.heeded:
+                signal.signal(number, before[number])
+
+    def _pass_on(self, number: int, _: Any) -> None:
+        self.signals.append(number)
+        first = next((link for link, one in self.links.items() if one["rank"] == 0), None)
+        if first is not None and len(self.signals) < AT_ONCE:
+            with suppress(OSError):
+                first.sendall(bytes([number]))
+        elif self.process is not None:
+            self.process.terminate()
+
+    def _listen(self) -> None:
+        ready, *_ = select.select([self.door, *self.unknown, *self.links], [], [], PAUSE)
+        for link in ready:
+            if link is self.door:
+                self.unknown.append(link.accept()[0])
+                continue
+            for line in _received(link).splitlines():
+                self._heard(link, json.loads(line))
+            if link.fileno() < 0:
+                self.unknown = [one for one in self.unknown if one is not link]
+                one = self.links.pop(link, None)
+                if one is not None and one["rank"] not in self.reports:
+                    self.lost.append(one)
+
+    def _heard(self, link: socket.socket, message: dict[str, Any]) -> None:
+        if link in self.links:
+            self.reports[self.links[link]["rank"]] = message
+            return
+        self.unknown.remove(link)
+        self.links[link] = message
+        if message["rank"] == 0:
+            socket.send_fds(link, [b"0"], [1, 2])
+
+    # --- when they have ended ---------------------------------------------------------------------
+
+    def _outcome(self) -> int:
+        """The exit status; what no process could say is said."""
+        first = self.reports.get(0)
+        failed = [one for _, one in sorted(self.reports.items()) if one["status"]]
+        if first is not None and first["status"]:
+            return first["status"]
+        if failed:
+            if text := next((one["text"] for one in failed if one["text"]), None):
+                self._say(text)
+            return failed[0]["status"]
+        if first is not None:
+            return 0
+        if self.signals:
+            if self.signals[0] == signal.SIGINT:
+                self._say(render_message("error", "interrupted"))
+            return SIGNALLED + self.signals[0]
+        self._say(self._loss() if self.lost else self._no_start())
+        status = self.process.returncode
+        return SIGNALLED - status if status < 0 else status or 1
+
+    def _loss(self) -> str:
+        one = self.lost[0]
+        return render_message(
+            "error",
+            f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended, and the "
+            "run with it: files are complete up to there",
+            hint="the system ends processes that take too much memory",
         )
-    return Crew()
+
+    def _no_start(self) -> str:
+        text = f"{self.command[0]} has not started {self.ranks} processes"
+        return "\n".join([render_message("error", text), self._words()]).rstrip()
+
+    def _words(self) -> str:
+        """What mpiexec said, and libraries of C through it."""
+        self.said.seek(0)
+        return self.said.read().decode(errors="replace").strip()
+
+    def _say(self, text: str) -> None:
+        with suppress(OSError):
+            print(text, file=sys.stderr, flush=True)
 
 
-def share(hub: Hub, crew: Crew) -> None:
-    """Let a scene be stepped by all processes of the crew; the first writes."""
-    settings = hub.settings
-    settings.crew, settings.engine = crew, "ranks"
-    if settings.threads is None:
-        settings.threads = max(1, (os.cpu_count() or 1) // crew.size)
-    if not crew.leads:
-        hub.output.writes = False
-        hub.output.log.rows = []
+def _received(link: socket.socket) -> bytes:
+    """What has come; the link is closed where its other end is."""
+    found = b""
+    with suppress(OSError):
+        while part := link.recv(1 << 16):
+            found += part
+            if found.endswith(b"\n"):
+                return found
+    link.close()
+    return found

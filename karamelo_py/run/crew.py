@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import socket
+import time
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -16,13 +21,17 @@ LAUNCHED = (
     ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
     ("PMI_SIZE", "PMI_RANK"),
     ("MPI_LOCALNRANKS", "MPI_LOCALRANKID"),
+    ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
 )
+# Words at a meeting beside those of runs, which are above zero.
+WELL, FAILED = 0, -1
+PAUSE = 0.005  # seconds between two looks whether the others have come
 
 
 def launched() -> tuple[int, int]:
     """How many processes a launcher of MPI has started, and which of them this is."""
     for size, rank in LAUNCHED:
-        if size in os.environ:
+        if os.environ.get(size, "").isdigit():
             return int(os.environ[size]), int(os.environ.get(rank, 0))
     return 1, 0
 
@@ -35,11 +44,26 @@ class Crew:
     world
         A communicator of mpi4py; that of all processes by default.
 
+    Attributes
+    ----------
+    beside
+        How many of them have the same cores as this one, itself among them.
+    waited
+        Seconds in which this process waited for others, or for what they sent, in steps.
+    amid
+        Whether this process has failed in the midst of what all do together.
+    parted
+        Whether the processes do not go on together: one has failed, or has another script.
+
     Raises
     ------
     ScriptError
         If mpi4py is not there, or finds no MPI.
     """
+
+    beside = 1
+    waited = 0.0
+    amid = parted = False
 
     def __init__(self, world: Any = None):
         if world is None:
@@ -53,11 +77,35 @@ class Crew:
             world = MPI.COMM_WORLD
         self.world = world
         self.rank, self.size = world.Get_rank(), world.Get_size()
+        self._aside = world.Dup()  # where they meet, whatever is under way elsewhere
+        cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+        mine = socket.gethostname(), cores
+        self.beside = self.everyone(mine).count(mine)
 
     @property
     def leads(self) -> bool:
         """Whether this is the first."""
         return self.rank == 0
+
+    def meet(self, word: int, patience: float = inf) -> np.ndarray | None:
+        """Wait for all to come to such a point; the word of each (size,).
+
+        The word of a run is above zero. None where somebody has not come in `patience` seconds.
+        """
+        own, found = np.array([word], np.int64), np.empty(self.size, np.int64)
+        request = self._aside.Iallgather(own, found)
+        end = time.monotonic() + patience
+        while not request.Test():
+            if time.monotonic() > end:
+                return None
+            time.sleep(PAUSE)
+        return found
+
+    @contextmanager
+    def _waiting(self) -> Iterator[None]:
+        begun = time.perf_counter()
+        yield
+        self.waited += time.perf_counter() - begun
 
     def told(self, thing: Any = None) -> Any:
         """What the first says to all."""
@@ -86,7 +134,8 @@ class Crew:
     def added(self, array: np.ndarray) -> np.ndarray:
         """The sum of whole numbers over all: for such, order does not matter."""
         out = np.empty_like(array)
-        self.world.Allreduce(array, out)
+        with self._waiting():
+            self.world.Allreduce(array, out)
         return out
 
     def largest(self, array: np.ndarray) -> np.ndarray:
@@ -94,7 +143,8 @@ class Crew:
         from mpi4py import MPI
 
         out = np.empty_like(array)
-        self.world.Allreduce(array, out, op=MPI.MAX)
+        with self._waiting():
+            self.world.Allreduce(array, out, op=MPI.MAX)
         return out
 
     def passed(self, given: dict[int, np.ndarray], taken: dict[int, np.ndarray]) -> None:
@@ -103,8 +153,14 @@ class Crew:
 
         waiting = [self.world.Irecv(array, rank) for rank, array in taken.items()]
         waiting += [self.world.Isend(array, rank) for rank, array in given.items()]
-        MPI.Request.Waitall(waiting)
+        with self._waiting():
+            MPI.Request.Waitall(waiting)
 
-    def abandon(self) -> None:
+    def fail(self, error: BaseException) -> None:
+        """End all processes because of an error that cannot be raised here."""
+        traceback.print_exception(error)
+        self.abandon()
+
+    def abandon(self, status: int = 1) -> None:
         """End all processes at once."""
-        self.world.Abort(1)
+        self.world.Abort(status)

@@ -125,6 +125,8 @@ def thread_count(hub: Hub, points: int) -> int:
             hub.warn(f"only {available} of {hub.settings.threads} threads can be had here")
         return max(1, min(hub.settings.threads, available))
     usable = min(available, os.cpu_count() or 1)
+    if (crew := hub.settings.crew) is not None:
+        usable, points = max(1, usable // crew.beside), points // crew.size
     return usable if points > SERIAL_UP_TO else 1
 
 

@@ -9,13 +9,12 @@ of a whole scene, and hands out anew where something has changed them.
 from __future__ import annotations
 
 import signal
-import sys
 import threading
-import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import SimpleNamespace
 from typing import Any, ClassVar
+from zlib import crc32
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from karamelo_py.kernels.arrays import Block, Nodes, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import BOXES, CALL, HEAT, NUMBER, REPORTS, TOTALS, Linked
 from karamelo_py.kernels.totals import WORK, rounded
-from karamelo_py.run.crew import Crew
+from karamelo_py.run.crew import FAILED, Crew
 from karamelo_py.run.lowering import State, lower
 from karamelo_py.run.shares import SharedTiles, joined, sized
 from karamelo_py.run.simulation import Simulation
@@ -150,6 +149,7 @@ class Ranks(Simulation):
     @contextmanager
     def leading(self) -> Iterator[None]:
         """While a run goes on: the others follow."""
+        self._meet()
         self._leading, self._prepared = True, False
         well = False
         try:
@@ -163,11 +163,29 @@ class Ranks(Simulation):
                 self._shown = False
                 self.gather(everywhere=True)
 
+    def _meet(self) -> None:
+        """See that all processes are about to do the same run."""
+        hub, crew = self.hub, self.crew
+        present = [hub.place and (hub.place.file, hub.place.line), len(hub.runs), self.count]
+        words = crew.meet(1 + crc32(repr((present, hub.interpreter.presets)).encode()))
+        if (words == words[0]).all():
+            return
+        crew.parted = True
+        # One that has failed tells of it.
+        if (words == FAILED).any() or crew.rank != int((words > 0).argmax()):
+            raise Quit
+        raise ScriptError(
+            "the processes do not come to the same run",
+            place=hub.place,
+            expected="the same script, files and variables for all of them",
+        )
+
     def follow(self) -> None:
         """Do what the first process says, until its run is over."""
         if threading.current_thread() is threading.main_thread():
             for number in ENDING:
                 signal.signal(number, signal.SIG_IGN)
+        self._meet()
         hub = self.hub
         hub.restart = hub.interpreter.replay = None
         while True:
@@ -180,8 +198,12 @@ class Ranks(Simulation):
                 if stepped and more:
                     self.gather(everywhere=True)
                 return
-            with suppress(Abandoned):
-                getattr(self, what)(*arguments)
+            try:
+                with suppress(Abandoned):
+                    getattr(self, what)(*arguments)
+            except BaseException:
+                self.crew.amid = True
+                raise
 
     def _tell(self, what: str, *arguments: Any) -> None:
         self.crew.told((what, *arguments))
@@ -352,8 +374,8 @@ class Ranks(Simulation):
     def compile(self) -> None:
         """Have the loop over the steps compiled now, by all processes."""
         self._see_parts()
-        self._tell("compile_part")
         self.compile_part()
+        self._tell("compile_part")  # and find on disk what has been compiled
 
     def compile_part(self) -> None:
         """Compile the loop of this process."""
@@ -416,11 +438,9 @@ class Ranks(Simulation):
         """What kernels ask of the other processes (karamelo_py.kernels.ranks)."""
         try:
             return self._answers[what](self, a, b) or 0
-        except BaseException:
+        except BaseException as error:
             # Nothing can be raised through a kernel, and the others wait.
-            traceback.print_exc()
-            sys.stderr.flush()
-            self.crew.abandon()
+            self.crew.fail(error)
             raise
 
     def _boxes(self, number: int, arrays: int) -> None:

@@ -15,6 +15,7 @@ from karamelo_py.kernels.step import Fused, Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
+from karamelo_py.run.plan import told
 from karamelo_py.run.savings import savings
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import ruling_limit, words_of_share
@@ -71,6 +72,10 @@ def report(hub: Hub, end_time: float = inf) -> None:
     touched = total + ALONE * simulation.count + per_node * nodes + boxes
     say(f"memory         {touched / 2**20:.3g} MiB touched, and in a run")
     say(f"               {total / 2**20:.3g} MiB for a copy of the last good state")
+    if hub.settings.ranks > 1:
+        say("")
+        for line in told(simulation, hub.settings.ranks):
+            say(line)
     say("")
     say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")
     for stage in stages(hub, simulation):

@@ -49,7 +49,7 @@ class SharedTiles(Tiles):
         self.cuts[0] = 0
         self.foreign = np.zeros(int(self._first_node[-1] + self._nodes[-1].prod()), np.uint8)
         self._marked = np.empty(0, np.int64)
-        self._given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
+        self.given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
         self._taken: dict[int, slice] = {}
 
     # --- points -----------------------------------------------------------------------------------
@@ -155,7 +155,7 @@ class SharedTiles(Tiles):
         for rank in np.unique(self._of[found]):
             has = np.flatnonzero(self._of == rank)
             self._taken[int(rank)] = slice(int(ends[has[0]]), int(ends[has[-1] + 1]))
-        self._given = {
+        self.given = {
             rank: _rows(low, high, first[which], steps[which])
             for rank, (which, low, high) in self._rows_for.items()
         }
@@ -179,7 +179,7 @@ class SharedTiles(Tiles):
         width = sum(array.shape[1] for array in arrays)
         given = {
             rank: np.concatenate([array[rows] for array in arrays], axis=1)
-            for rank, rows in self._given.items()
+            for rank, rows in self.given.items()
         }
         taken = {
             rank: np.empty((rows.stop - rows.start, width), sums.dtype)

@@ -90,6 +90,7 @@ class Settings:
         self.threads: int | None = None
         self.precision = "double"
         self.engine = "processor"
+        self.ranks = 1  # processes that are asked for
         self.crew: Any = None  # the processes that share the scene, where there are several
         self.debug = False
         self.trusts = False  # .geo files, which may run programs

@@ -1,0 +1,251 @@
+"""Processes of MPI that carry out a script together: the bytes of one, and one end for all."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from conftest import INPUTS
+from scenes import block
+from test_restart import same_files
+
+from karamelo_py.app.cli import main
+from karamelo_py.app.launch import OPEN_MPI
+
+MPIEXEC = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or shutil.which("mpiexec")
+needs_mpi = pytest.mark.skipif(
+    MPIEXEC is None or find_spec("mpi4py") is None or sys.platform == "win32",
+    reason="needs mpi4py and mpiexec: pip install 'karamelo-py[mpi]'",
+)
+PROGRAM = [sys.executable, "-m", "karamelo_py.app.start"]
+FILES = (
+    "dump(d, all, particle, 10, d.txt, x, y, vx, s11)", "dump(n, all, grid/hdf5, 20, n.h5, mass)",
+    "compute(E, energy_balance, all)", "log_modify(custom, step, time, E, E_drift)",
+    "set_output(5)", "restart(10, r.*.h5)",
+)  # fmt: skip
+
+
+def started(folder: Path, *words: str, compiled: bool = False, **more: str) -> subprocess.Popen:
+    """A command in a folder; its scenes are interpreted unless they are to be compiled."""
+    folder.mkdir(exist_ok=True)
+    environment = {**os.environ, **({} if compiled else {"NUMBA_DISABLE_JIT": "1"}), **more}
+    return subprocess.Popen(
+        words, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL, text=True, encoding="utf-8",
+    )  # fmt: skip
+
+
+def by_ranks(folder: Path, script: str | Path, ranks: int, *words: str, **more) -> tuple:
+    """Exit status, output and errors of a script of so many processes."""
+    process = started(folder, *PROGRAM, str(script), "--ranks", str(ranks), *words, **more)
+    out, err = process.communicate(timeout=300)
+    assert "Traceback" not in out + err
+    return process.returncode, out, err
+
+
+def script(folder: Path, *lines: str, **scene) -> Path:
+    path = folder / "in.script"
+    path.write_text(block(scene.pop("dimension", 2), *lines, **scene), encoding="utf-8")
+    return path
+
+
+def moving(folder: Path, *lines: str, size: float = 0.2) -> Path:
+    start = "fix(v, initial_velocity_particles, all, 0.5*sin(9*x0), 0.2*cos(8*y0))"
+    return script(folder, start, *lines, size=(size, size))
+
+
+# --- the same bytes -----------------------------------------------------------------------------
+
+
+@needs_mpi
+@pytest.mark.xdist_group("disks")
+def test_compiled_in_the_plane(tmp_path):
+    """Three processes; two go on from their file."""
+    disks = INPUTS / "in.two_disks"
+    text = disks.read_text(encoding="utf-8").split("run")[0]
+    path = tmp_path / "in.script"
+    path.write_text(text + "\n".join(FILES) + "\nrun(20)\n", encoding="utf-8")
+    words = (str(path), "-var", "N", "60", "--threads", "1")
+    one, three, two = (tmp_path / name for name in ("one", "three", "two"))
+    one.mkdir()
+    assert main([*words, "-out", str(one)]) == 0
+    assert by_ranks(three, *words[:1], 3, *words[1:], compiled=True)[0] == 0
+    same_files(one, three)
+    shutil.copytree(three, two)
+    assert by_ranks(two, words[0], 2, *words[1:], "-restart", "r.10.h5", compiled=True)[0] == 0
+    same_files(one, two)
+
+
+# --- one end for all ----------------------------------------------------------------------------
+
+
+@needs_mpi
+def test_a_wrong_script(tmp_path):
+    path = script(tmp_path, "fix(g, gravitate, all)")
+    status, out, err = by_ranks(tmp_path, path, 2)
+    assert status == 1 and not out
+    assert err.count("unknown fix style 'gravitate'") == 1 and "PMIX" not in err
+    assert main([str(path)]) == 1
+
+
+@needs_mpi
+def test_started_by_mpiexec(tmp_path):
+    """What it adds at the end is its own; no more than one message is ours."""
+    path = script(tmp_path, "run(2)")
+    words = [MPIEXEC, "-n", "2", *PROGRAM, str(path)]
+    process = started(tmp_path / "well", *words, **OPEN_MPI)
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0 and out.count("Run finished") == 1 and "\x1b" not in out, err
+    process = started(tmp_path / "wrong", *words, "--ranks", "3", **OPEN_MPI)
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 1 and err.count("error: ") == 1
+    assert "--ranks 3: mpiexec has started 2 processes" in err
+
+
+def running(folder: Path, *lines: str, **more: str) -> subprocess.Popen:
+    """A long run of two processes, which has begun."""
+    path = moving(folder, "set_output(1)", *lines, "run(100000)")
+    process = started(folder / "run", *PROGRAM, str(path), "--ranks", "2", **more)
+    log = folder / "run" / "log.mpm"
+    while not (log.exists() and log.read_text(encoding="utf-8").count("\n") > 3):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+    return process
+
+
+@needs_mpi
+def test_a_signal(tmp_path):
+    """As with one process: the last state, whole files, 128 + its number."""
+    process = running(tmp_path, "dump(d, all, particle, 1000, d.*.txt, x)")
+    process.send_signal(signal.SIGTERM)
+    _out, err = process.communicate(timeout=120)
+    assert process.returncode == 128 + signal.SIGTERM, err
+    assert err.count("interrupted: the log and the dumps are complete") == 1
+    last = (tmp_path / "run" / "log.mpm").read_text(encoding="utf-8").split()[-3]
+    assert (tmp_path / "run" / f"d.{last}.txt").exists()
+
+
+@needs_mpi
+@pytest.mark.parametrize("rank", [pytest.param(0, marks=pytest.mark.full), 1])
+def test_a_process_is_killed(tmp_path, rank):
+    process = running(tmp_path)
+    os.kill(_pids(process.pid)[rank], signal.SIGKILL)
+    _out, err = process.communicate(timeout=120)
+    assert process.returncode == 128 + signal.SIGKILL
+    assert err.count("error: ") == 1 and f"error: process {rank + 1} of 2 (pid " in err
+    lines = (tmp_path / "run" / "log.mpm").read_text(encoding="utf-8").splitlines()
+    assert all(len(line.split()) == 3 for line in lines)
+
+
+def _pids(launcher: int) -> list[int]:
+    """The processes of a run, in the order of their ranks."""
+    found = subprocess.run(
+        ["ps", "-e", "-o", "pid=,ppid="], capture_output=True, text=True, check=True
+    )
+    pairs = [tuple(map(int, line.split())) for line in found.stdout.splitlines()]
+    mpiexec = next(pid for pid, parent in pairs if parent == launcher)
+    return sorted(pid for pid, parent in pairs if parent == mpiexec)
+
+
+BREAKS = """
+import os
+import re
+from karamelo_py.run import ranks, shares, tiles
+tiles.DIRECT_UP_TO = 0
+if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
+    def out_of_memory(*_):
+        raise MemoryError
+    {} = out_of_memory
+"""
+
+
+@needs_mpi
+@pytest.mark.parametrize("function", ["ranks.Ranks.go", "shares.SharedTiles.exchange"])
+def test_only_one_fails(tmp_path, function):
+    """In its steps, and in what kernels ask for: the others end, too."""
+    (tmp_path / "sitecustomize.py").write_text(BREAKS.format(function), encoding="utf-8")
+    path = moving(tmp_path, "run(20)")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    status, _, err = by_ranks(tmp_path / "run", path, 2, PYTHONPATH=folders)
+    assert status == 1
+    assert err.count("error: ") == 1 and "memory" in err and "in process 2 of 2" in err
+
+
+# --- before anything is started -----------------------------------------------------------------
+
+
+def test_without_mpi4py(tmp_path, monkeypatch, capsys):
+    path = str(script(tmp_path, "run(2)"))
+    monkeypatch.setitem(sys.modules, "mpi4py", None)
+    hint = "hint: pip install 'karamelo-py[mpi]'"
+    if MPIEXEC:
+        assert main([path, "--ranks", "2"]) == 1
+        err = capsys.readouterr().err
+        assert err.startswith("error: --ranks 2 needs mpi4py") and hint in err
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "0")
+    assert main([path]) == 1
+    err = capsys.readouterr().err
+    assert err.startswith("error: several processes of one scene need mpi4py") and hint in err
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
+    monkeypatch.setattr(sys, "stdout", sys.stdout)
+    monkeypatch.setattr(sys, "stderr", sys.stderr)
+    assert main([path]) == 1
+    assert capsys.readouterr() == ("", "")
+
+
+def test_what_several_processes_cannot_do(monkeypatch, capsys):
+    assert main(["sweep", "in.script", "--ranks", "2"]) == 1
+    assert "error: karamelo-py sweep is of one process" in capsys.readouterr().err
+    monkeypatch.setenv("SLURM_STEP_NUM_TASKS", "4")
+    monkeypatch.setenv("SLURM_PROCID", "0")
+    assert main(["styles"]) == 1
+    assert "karamelo-py styles is of one process, and 4 were started" in capsys.readouterr().err
+
+
+def test_one_rank_is_no_other_run(tmp_path, run_interpreted):
+    assert run_interpreted(block(2, "run(2)"), "--ranks", "1").log.Step[-1] == 2
+
+
+# --- check ----------------------------------------------------------------------------------------
+
+COUNTS = """
+from karamelo_py.run import tiles
+from karamelo_py.run.crew import Crew
+tiles.DIRECT_UP_TO, tiles.TILES = 0, {2: 2}
+passed = Crew.passed
+def counting(self, given, taken):
+    with open(f"passed.{self.rank}", "a") as file:
+        print(sum(array.nbytes for array in given.values()), file=file)
+    passed(self, given, taken)
+Crew.passed = counting
+"""
+
+
+@needs_mpi
+def test_what_is_passed_on_is_foretold(tmp_path):
+    """`check` makes the plan of all processes in one; the bytes are those of real ones."""
+    (tmp_path / "sitecustomize.py").write_text(COUNTS, encoding="utf-8")
+    path = moving(tmp_path, "run(4)", size=0.5)
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    assert by_ranks(tmp_path / "run", path, 2, PYTHONPATH=folders)[0] == 0
+    check = started(tmp_path, *PROGRAM, "check", str(path), "--ranks", "2", PYTHONPATH=folders)
+    out, err = check.communicate(timeout=100)
+    assert check.returncode == 0, err
+    found = [
+        # The first step has the forces of the state that it begins with, too.
+        sum(map(int, (tmp_path / "run" / f"passed.{rank}").read_text().split()[-2:]))
+        for rank in (0, 1)
+    ]
+    low, high = re.search(r"bytes given in a step +(\d+) +(\d+)", out).groups()
+    assert sorted(found) == [int(low), int(high)] and int(low) > 0
+    points = re.search(r"  points +(\d+) +(\d+)", out).groups()
+    assert sum(map(int, points)) == 100
