@@ -36,7 +36,7 @@ full = pytest.mark.full
 both = pytest.mark.parametrize("kinematics", ["plane", "space"])
 
 # Eight corners, with all that a point knows of each, are more than a thread's registers in doubles.
-IN_SINGLES = ("H8",)
+IN_SINGLES = ("R8", "H8")
 
 
 def in_registers(made, library: bool = False) -> bool:
