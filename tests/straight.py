@@ -13,6 +13,7 @@ from __future__ import annotations
 import builtins
 import operator
 import re
+import threading
 import types
 from collections.abc import Callable
 from typing import Any
@@ -228,11 +229,11 @@ def _apart(one: str, other: str) -> bool:
     return any(a != b and a.isdigit() and b.isdigit() for a, b in pairs)
 
 
-_writers: list[Writer] = []
+_now = threading.local()  # ranks may be threads
 
 
 def _writer() -> Writer:
-    return _writers[-1]
+    return _now.writer
 
 
 def ref(thing: Any) -> str:
@@ -438,17 +439,12 @@ def _copy(thing: Any, copies: dict) -> Any:
 
 def write(function: Callable, arguments: tuple, other: Callable) -> Callable:
     """The straight function of arguments like these; `other` serves those that answer otherwise."""
-    writer = Writer()
-    _writers.append(writer)
+    writer = _now.writer = Writer()
     copies: dict = {}
-    try:
-        given = [writer.wrap(_copy(a, copies), f"a{k}") for k, a in enumerate(arguments)]
-        result = _called(function)(*given)
-        result = ref(result)
-        writer.flush()
-        writer.lines.append(f"return {result}")
-    finally:
-        _writers.pop()
+    given = [writer.wrap(_copy(a, copies), f"a{k}") for k, a in enumerate(arguments)]
+    result = ref(_called(function)(*given))
+    writer.flush()
+    writer.lines.append(f"return {result}")
     names = "".join(f"a{k}, " for k in range(len(arguments)))
     return compiling.define(
         "*arguments", f"{names} = arguments", *writer.needed(), other=other, **writer.names

@@ -1,7 +1,7 @@
 """Algebra on flat tuples of any length: sums, multiples, products.
 
-Comprehensions, which Numba does not know of tuples: kernels run them (`compiler/trace.py`). Of lists,
-which Python makes in two thirds of the time where all is interpreted.
+Comprehensions, which Numba does not know of tuples: kernels run them (`compiler/trace.py`). They
+are of lists, which Python makes in two thirds of the time where all is interpreted.
 """
 
 from __future__ import annotations
