@@ -122,16 +122,22 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
     """``state_interpreted(script, *columns)``: the exact state at the end, or columns of it.
 
     With ``boxes=True`` points give to boxes of small tiles, as many points do, not to the nodes;
-    with ``ranks=N`` so many share them. Files are kept in `out`.
+    with ``plainly=True`` every function is called as it is (see `straight.py`); with ``ranks=N``
+    so many share them. Files are kept in `out`.
     """
 
     def run(
-        script: str, *columns: str, boxes: bool = False, ranks: int = 1, out: str = ""
+        script: str,
+        *columns: str,
+        boxes: bool = False,
+        plainly: bool = False,
+        ranks: int = 1,
+        out: str = "",
     ) -> dict[str, np.ndarray]:
         path = _prepared(tmp_path, script)
         file = str(tmp_path / "state.npz")
         request = {"folder": str(tmp_path), "arguments": [str(path)], "state": file}
-        request["columns"], request["boxes"] = columns, boxes
+        request |= {"columns": columns, "boxes": boxes, "plainly": plainly}
         if out:
             (tmp_path / out).mkdir()
         request["ranks"], request["out"] = ranks, out and str(tmp_path / out)

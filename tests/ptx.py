@@ -6,20 +6,21 @@ Needs numba-cuda and NVIDIA's compiler libraries, but neither a GPU nor a driver
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import numpy as np
 from cuda.bindings import nvjitlink
-from numba import typeof, types
+from numba import njit, typeof, types
 from numba.cuda import dispatcher
 from numba.cuda.compiler import compile as compile_for_gpu
 
-from karamelo_py.compiler.compile import index
+from karamelo_py.compiler.compile import define, index
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import Setup
+from karamelo_py.kernels.arrays import Nodes, Setup
 from karamelo_py.kernels.g2p import (
     AverageStress,
     FBar,
@@ -32,6 +33,7 @@ from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient,
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all
 from karamelo_py.kernels.step import Insulated
+from karamelo_py.kernels.sums import sum_tile
 from karamelo_py.kernels.sweep import (
     Context,
     OldWeights,
@@ -147,14 +149,35 @@ def compiled(function: Any, *arguments: Any) -> Compiled:
     return Compiled(ptx, registers, stack, stores + loads)
 
 
+def calling(function: Callable, count: int) -> Callable:
+    """A kernel that writes down what a function of so many numbers gives, another tuple of them."""
+    names = ", ".join(f"a{k}" for k in range(count))
+    return define(
+        f"out, {names}",
+        f"for k, value in enumerate(function({names})): out[k] = value",
+        function=njit(function),
+    )
+
+
+def nodes_of(visit: Visit, setup: Setup) -> Nodes:
+    """The nodes that a visit works with."""
+    of_heat = any(isinstance(one, HeatContent | HeatFlow) for one in visit.quantities)
+    return setup.heat.nodes if of_heat else setup.nodes
+
+
+def compiled_sum(visit: Visit, setup: Setup) -> Compiled:
+    """What sums at a tile of nodes what a visit gave to the tiles of points."""
+    nodes = nodes_of(visit, setup)
+    buffers = setup.buffers._replace(nodes=nodes)
+    return compiled(sum_tile, visit.quantities, setup.kin, nodes, buffers, 0)
+
+
 def compiled_visit(visit: Visit, setup: Setup) -> Compiled:
     """A visit of a point of the scene's first law."""
-    s, block = setup, setup.blocks[0]
+    s, nodes = setup, nodes_of(visit, setup)
     real = s.nodes.sums.dtype.type
-    of_heat = any(isinstance(one, HeatContent | HeatFlow) for one in visit.quantities)
-    nodes = s.heat.nodes if of_heat else s.nodes
     context = Context(
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, nodes, nodes, 0, real(0)
     )
     report = np.zeros((1, 2), real)
-    return compiled(visit_point, visit, context, block, 0, real(1), 0, report)
+    return compiled(visit_point, visit, context, s.blocks[0], 0, real(1), 0, report)

@@ -6,13 +6,18 @@ Without a GPU: that scenes run on one, and how fast, nobody has seen.
 from __future__ import annotations
 
 import re
+from inspect import getmodule, isfunction, signature
 
 import numpy as np
 import pytest
-from combinations import BASES, MESHED, SCHEMES, TRANSFERS, fits, scene, write_mesh
+from combinations import BASES, MESHED, fits, scene, write_mesh
 
+from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import nodes
-from karamelo_py.kernels.loss import Lost
+from karamelo_py.kernels.contact import stay_node, touch_node
+from karamelo_py.kernels.hooks import CompiledHook
+from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.nodes import KeepLoss
 from karamelo_py.language import registry
 from karamelo_py.language.docstrings import sections
 
@@ -25,60 +30,63 @@ try:
 except pathfinder.DynamicLibNotFoundError:
     pytest.skip(REASON, allow_module_level=True)
 
-from ptx import compiled, compiled_visit, setup_of, visit_node, visits_of  # noqa: E402
+from ptx import calling, compiled, compiled_sum, compiled_visit, setup_of, visit_node, visits_of  # noqa: E402
 
 full = pytest.mark.full
 both = pytest.mark.parametrize("kinematics", ["plane", "space"])
 
-FORMULA = "Numba for CUDA does not know numpy.floor, ceil, rint and trunc of a number"
-UNROLLED = "NVVM unrolls its loop over the nodes; what a back end would have to forbid"
-# What does not compile, or does not stay in registers, and why.
-EXCEPTIONS = {
-    "test_bases[ulcpdi linear H8-space]": "more than the 255 registers of a thread, all in one",
-    **{
-        f"test_bases[{base}-space]": UNROLLED
-        for base in (
-            "tlmpm quadratic-spline ",
-            "tlmpm Bernstein-quadratic ",
-            "tlmpm cubic-spline ",
-            "tlmpm ugimp ",
-            "tlmpm cpgimp ",
-            "ulcpdi linear Tet4",
-            "tlcpdi linear Tet4",
-            "tlcpdi linear H8",
-            "tlcpdi linear R8",
-        )
-    },
-    **{f"test_laws[strength formula {k}-{d}]": FORMULA for k in (0, 1) for d in ("plane", "space")},
-}
+# Eight corners, with all that a point knows of each, are more than a thread's registers in doubles.
+IN_SINGLES = ("R8", "H8")
 
 
-@pytest.fixture(autouse=True)
-def exception(request):
-    """Known exceptions fail; one that no longer does is told."""
-    if reason := EXCEPTIONS.get(request.node.name):
-        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
+def in_registers(made, library: bool = False) -> bool:
+    """Whether a thread keeps all it knows in registers, and calls nothing.
 
-
-def in_registers(made) -> bool:
-    """Whether a thread keeps all it knows in registers, and calls nothing."""
-    assert not re.search(r"\bcall\b", made.ptx)
-    assert not re.search(r"\.local\b", made.ptx)
+    With `library` it may call what NVIDIA's library of mathematics calls itself.
+    """
+    called = re.findall(r"\bcall(?:\.uni)?\s+(?:\(\w+\),\s*)?(\w+)", made.ptx)
+    assert len(called) == len(re.findall(r"\bcall\b", made.ptx))
+    assert all(library and name.startswith("__internal_") for name in called), called
+    assert library or not re.search(r"\.local\b", made.ptx)
     assert made.stack == made.spilled == 0, (made.stack, made.spilled, made.registers)
     return True
 
 
-def visits_stay_in_registers(script: str, in_stages: bool = False) -> None:
+def visits_stay_in_registers(script: str, in_stages: bool = False, library: bool = False) -> None:
+    """Visits of the points, and what sums at the nodes what points gave."""
     setup, scheme = setup_of(script)
     visits = visits_of(setup, scheme, in_stages)
     assert visits
     for visit in visits:
-        assert in_registers(compiled_visit(visit, setup)), visit
+        assert in_registers(compiled_visit(visit, setup), library), visit
+        if visit.quantities:
+            assert in_registers(compiled_sum(visit, setup)), visit
+
+
+def warm(script: str, *numbers: float) -> str:
+    """The scene with these numbers of heat in its material: capacity, conductivity."""
+    return re.sub(r"(material\(.*)\)", rf"\1, {', '.join(map(str, numbers))})", script)
+
+
+def example_of(family: str, name: str) -> str:
+    """The words of `method` in the manual of a style."""
+    text = sections(registry.find(family, name).__doc__)[1]["Example"]
+    return re.search(r"^method\((.*)\)$", text, re.MULTILINE)[1]
 
 
 def test_step():
     """One of what follows."""
     visits_stay_in_registers(scene("plane", "ulmpm", "quadratic-spline", "", "MLS", "musl"))
+
+
+def test_all_are_tried():
+    """Bases and methods as combinations; the other styles are those of the registry."""
+    kinds, bases, options = map(set, zip(*BASES, strict=True))
+    assert kinds == set(registry.names("method"))
+    assert bases == set(registry.names("basis"))
+    styles = [("method", kind) for kind in kinds] + [("basis", basis) for basis in bases]
+    variants = [getattr(registry.find(*style), "variants", {}) for style in styles]
+    assert options == {"", *(name for names in variants for name in names)}
 
 
 @full
@@ -90,19 +98,25 @@ def test_bases(kinematics, base, tmp_path):
     if not fits(kinematics, option):
         pytest.skip("no such domains with this kinematics")
     mesh = write_mesh(tmp_path / "m.vtk", MESHED[option]) if option in MESHED else None
-    visits_stay_in_registers(scene(kinematics, *base, "FLIP", "usl", mesh=mesh))
+    script = scene(kinematics, *base, "FLIP", "usl", mesh=mesh)
+    visits_stay_in_registers("precision(single)\n" * (option in IN_SINGLES) + script)
 
 
 @full
 @both
-@pytest.mark.parametrize("transfer", TRANSFERS)
+@pytest.mark.parametrize("transfer", registry.names("transfer"))
 def test_transfers(kinematics, transfer):
-    visits_stay_in_registers(scene(kinematics, "tlmpm", "linear", "", transfer, "usl"))
+    words = example_of("transfer", transfer).split(", ")
+    words[0], words[2] = "tlmpm", "linear"
+    script = scene(kinematics, "tlmpm", "linear", "", "FLIP", "usl")
+    visits_stay_in_registers(
+        re.sub(r"^method\(.*$", f"method({', '.join(words)})", script, flags=re.MULTILINE)
+    )
 
 
 @full
 @both
-@pytest.mark.parametrize("name", [*SCHEMES, "usl/unlimited"])
+@pytest.mark.parametrize("name", registry.names("scheme"))
 def test_schemes(kinematics, name):
     """Fused and staged."""
     script = scene(kinematics, "ulmpm", "linear", "", "FLIP", name)
@@ -161,7 +175,8 @@ LAWS = laws()
 def test_laws(kinematics, law):
     script = scene(kinematics, "ulmpm", "linear", "", "FLIP", "usl")
     visits_stay_in_registers(
-        re.sub(r"^material\(.*$", "\n".join(LAWS[law]), script, flags=re.MULTILINE)
+        re.sub(r"^material\(.*$", "\n".join(LAWS[law]), script, flags=re.MULTILINE),
+        library=law.startswith("strength formula"),  # which knows every function
     )
 
 
@@ -170,9 +185,35 @@ def test_laws(kinematics, law):
 def test_heat(kinematics):
     """Conduction between points."""
     script = scene(kinematics, "ulmpm", "linear", "", "FLIP", "usl")
-    script = script.replace("0.98)", "0.98, thermo-mechanical)")
-    script = re.sub(r"(material\(.*)\)", r"\1, 460, 45)", script)
+    visits_stay_in_registers(warm(script.replace("0.98)", "0.98, thermo-mechanical)"), 460, 45))
+
+
+@full
+@both
+def test_loss(kinematics):
+    """Kinetic energy that a transfer takes heats a gas."""
+    script = scene(kinematics, "ulmpm", "linear", "", "TPIC", "usl")
+    gas = "\n".join(LAWS["eos ideal-gas 0"]).replace(STRENGTH, "strength(s, fluid, 0)")
+    script = re.sub(r"^material\(.*$", gas, script, flags=re.MULTILINE)
+    assert field(setup_of(script)[0].nodes.fields, Lost) is not None
     visits_stay_in_registers(script)
+
+
+@full
+@both
+def test_contact(kinematics):
+    """With friction, which heats."""
+    script = warm(scene(kinematics, "ulmpm/contacts", "linear", "", "FLIP", "musl"), 460, 0)
+    other = re.search(r"^region\((?:.|\n)*?^solid\(.*$", script, re.MULTILINE)[0]
+    other = other.replace("box", "rest").replace("body", "other")
+    rubs = "fix(rub, contact/friction, body, other, 0.3)\nset_dt"
+    script = script.replace("set_dt", f"{other}\n{rubs}")
+    visits_stay_in_registers(script)
+    s, _ = setup_of(script)
+    assert field(s.nodes.fields, Rubbed) is not None
+    touched = compiled(touch_node, s.contact, s.kin, s.grids, s.nodes, s.control, 0)
+    assert in_registers(touched)
+    assert in_registers(compiled(stay_node, s.contact, s.kin, s.nodes, 1, 0))
 
 
 @full
@@ -185,7 +226,22 @@ def test_nodes(kinematics):
     lost = Lost(np.zeros((len(setup.nodes.sums), 2)))  # of gases
     setup = setup._replace(nodes=setup.nodes._replace(fields=(*setup.nodes.fields, lost)))
     tasks = [kind for kind in vars(nodes).values() if hasattr(kind, "goes_through")]
-    assert len(tasks) > 10
+    assert KeepLoss in tasks
     for task in tasks:
         made = task(*(1.0,) * len(task._fields))
         assert in_registers(compiled(visit_node, made, setup.kin, setup.nodes, 0, 1.0)), task
+
+
+@full
+@pytest.mark.parametrize("name", registry.names("fix"))
+def test_hooks(name):
+    """What the fixes do at a point or a node, and what they have beside it with the same words."""
+    fix = registry.find("fix", name)
+    hooks = [h.function for h in vars(fix).values() if isinstance(h, CompiledHook)]
+    if not hooks:
+        pytest.skip("does nothing in a step, or does it in Python")
+    words = {tuple(signature(hook).parameters) for hook in hooks}
+    beside = [f for f in vars(getmodule(fix)).values() if isfunction(f)]
+    for function in {*hooks, *(f for f in beside if tuple(signature(f).parameters) in words)}:
+        numbers = (1.0,) * len(signature(function).parameters)
+        assert in_registers(compiled(calling(function, len(numbers)), np.zeros(4), *numbers))

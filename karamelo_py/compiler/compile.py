@@ -28,7 +28,7 @@ from karamelo_py.compiler.fingerprint import (
     tag_class,
 )
 from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.trace import at_work, forget, leave, run_for_kernel, traced
+from karamelo_py.compiler.trace import at_work, forget, run_for_kernel, traced
 
 
 class _NoCollections(event.Listener):
@@ -162,7 +162,6 @@ def shared(function: Callable | None = None, *, unless: Callable | None = None) 
 
 def looping(function: Callable) -> Callable:
     """Mark a helper with a loop that is left to the compiler to unroll."""
-    leave(function)
     overload(function, _INLINED, strict=False)(lambda *arguments: function)
     return function
 

@@ -110,7 +110,10 @@ def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 def field(fields: tuple, kind: type) -> Any:
     """The array of the field of this class, or None where the scene does not have it."""
-    return next((one.array for one in fields if type(one) is kind), None)
+    for one in fields:
+        if type(one) is kind:
+            return one.array
+    return None
 
 
 def _place_of(kind: Any, fields: Any) -> int | None:
@@ -152,7 +155,7 @@ def _lower_field(context, builder, signature, arguments):
 @shared
 def load(array, p, like):
     """Components 0, 1, ... of point `p`, as many as `like` has; none where there is no array."""
-    return () if array is None else tuple(array[k, p] for k in range(len(like)))
+    return () if array is None else tuple([array[k, p] for k in range(len(like))])
 
 
 @shared
@@ -180,4 +183,4 @@ def increase(array, p, values):
 @shared
 def load_vector(kin, array, p):
     """The first components of point `p`, as many as a vector has."""
-    return tuple(array[k, p] for k in range(kin.dimension))
+    return tuple([array[k, p] for k in range(kin.dimension)])

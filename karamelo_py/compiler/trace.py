@@ -346,7 +346,6 @@ class _Globals(dict):
 _modules: dict[int, _Globals] = {}
 _copies: dict[Any, Any] = {}
 _choosers: dict[Callable, list[Callable]] = {}
-_left: set[Callable] = set()
 
 
 class _Module:
@@ -443,12 +442,17 @@ def _copy(thing: Any) -> Any:
         return _Emitted(thing)
     if isinstance(thing, type) and issubclass(thing, tuple):
         return thing
-    known = cpu_target.typing_context._lookup_global
-    if thing in _left or hasattr(thing, "py_func") or known(thing):
+    if hasattr(thing, "py_func") or _numba_knows(thing):
         return _Emitted(thing)
     if isinstance(thing, python.FunctionType):
         return _copied(thing)
     raise Untraceable
+
+
+def _numba_knows(thing: Any) -> bool:
+    """Whether Numba has a version of its own; also before it compiled anything for processors."""
+    cpu_target.typing_context.refresh()
+    return bool(cpu_target.typing_context._lookup_global(thing))
 
 
 @functools.cache
@@ -540,11 +544,6 @@ def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
     if found is not None:
         note(found.parts)
     return found
-
-
-def leave(function: Callable) -> None:
-    """Leave a function to Numba: its loops stay loops."""
-    _left.add(function)
 
 
 def forget() -> None:

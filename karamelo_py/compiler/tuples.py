@@ -1,6 +1,7 @@
 """Algebra on flat tuples of any length: sums, multiples, products.
 
-Comprehensions, which Numba does not know of tuples: kernels run them (`compiler/trace.py`).
+Comprehensions, which Numba does not know of tuples: kernels run them (`compiler/trace.py`). They
+are of lists, which Python makes in two thirds of the time where all is interpreted.
 """
 
 from __future__ import annotations
@@ -11,31 +12,31 @@ from karamelo_py.compiler.compile import choose, fma, lanes_of, shared
 @shared
 def add(a, b):
     """a + b, component by component."""
-    return tuple(x + y for x, y in zip(a, b, strict=True))
+    return tuple([x + y for x, y in zip(a, b, strict=True)])
 
 
 @shared
 def subtract(a, b):
     """a - b, component by component."""
-    return tuple(x - y for x, y in zip(a, b, strict=True))
+    return tuple([x - y for x, y in zip(a, b, strict=True)])
 
 
 @shared
 def scale(factor, a):
     """factor * a."""
-    return tuple(factor * x for x in a)
+    return tuple([factor * x for x in a])
 
 
 @shared
 def add_scaled(a, factor, b):
     """a + factor * b."""
-    return tuple(fma(factor, y, x) for x, y in zip(a, b, strict=True))
+    return tuple([fma(factor, y, x) for x, y in zip(a, b, strict=True)])
 
 
 @shared
 def multiply_each(a, b):
     """a b, component by component."""
-    return tuple(x * y for x, y in zip(a, b, strict=True))
+    return tuple([x * y for x, y in zip(a, b, strict=True)])
 
 
 @shared
@@ -48,7 +49,7 @@ def put_at(array, i, first, values):
 @shared(unless=lambda array, i, first, like: lanes_of(i))
 def row(array, i, first, like):
     """(array[i, first], ..., array[i, first + len(like) - 1])."""
-    return tuple(array[i, first + k] for k in range(len(like)))
+    return tuple([array[i, first + k] for k in range(len(like))])
 
 
 @shared
@@ -57,7 +58,7 @@ def record(table, i):
 
     NamedTuples of arrays in it become NamedTuples of scalars, too.
     """
-    return type(table)(*(record(c, i) if isinstance(c, tuple) else c[i] for c in table))
+    return type(table)(*[record(c, i) if isinstance(c, tuple) else c[i] for c in table])
 
 
 @shared
@@ -82,7 +83,7 @@ def add_row(a, first, b):
             x = choose(first == k - j, a[k] + b[j], x)
         return x
 
-    return tuple(sum_at(k, x) for k, x in enumerate(a))
+    return tuple([sum_at(k, x) for k, x in enumerate(a)])
 
 
 @shared

@@ -231,6 +231,8 @@ def _meet(contact, nodes, n):
 
     It is 0 where a field that comes before that of `n` is among them: a place is visited once.
     """
+    if not nodes.sums[n, MASS] > 0:
+        return 0
     a = n // contact.stride
     for b in range(a):
         if nodes.sums[n - (a - b) * contact.stride, MASS] > 0:
@@ -410,6 +412,16 @@ def _keep_rigid(contact, kin, nodes, spans):
                     nodes.update[n, of_change(kin) + k] = 0
 
 
+@subkernel
+def touch_node(contact, kin, grids, nodes, control, n):
+    """Resolve contact at the place of node `n`, if its field is the first of those that meet."""
+    count = _meet(contact, nodes, n)
+    if count > 1:
+        grid = record(grids, n // contact.stride)
+        where = Where(node_position(grid, n), grid.h, control.values[DT])
+        _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
+
+
 @entered
 def _touch_nodes(contact, kin, grids, nodes, spans, control):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
@@ -424,13 +436,7 @@ def _touch_nodes(contact, kin, grids, nodes, spans, control):
                 totals[contact.pair[a, b] : contact.pair[a, b] + 3] = 0
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
-            if not nodes.sums[n, MASS] > 0:
-                continue
-            count = _meet(contact, nodes, n)
-            if count > 1:
-                grid = record(grids, n // contact.stride)
-                where = Where(node_position(grid, n), grid.h, values[DT])
-                _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
+            touch_node(contact, kin, grids, nodes, control, n)
     for a in range(fields):
         publish(control, contact.slot[a], 3)
         publish(control, contact.torque[a], 3)
@@ -488,6 +494,14 @@ def _stay_place(contact, d, nodes, place, count, step):
                 nodes.velocity[n, k] += contact.change[i, k]
 
 
+@subkernel
+def stay_node(contact, kin, nodes, step, n):
+    """The same for the velocity that deforms, where contact acted in `step`."""
+    count = _meet(contact, nodes, n)
+    if count > 1:
+        _stay_place(contact, dimension(kin), nodes, n % contact.stride, count, step)
+
+
 @entered
 def _stay_nodes(contact, kin, nodes, spans, step):
     """Where contact acted in `step`, keep the velocity that deforms from opening or closing it.
@@ -498,14 +512,9 @@ def _stay_nodes(contact, kin, nodes, spans, step):
     """
     if step == 0:
         return  # nothing has touched yet
-    d = dimension(kin)
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
-            if not nodes.sums[n, MASS] > 0:
-                continue
-            count = _meet(contact, nodes, n)
-            if count > 1:
-                _stay_place(contact, d, nodes, n % contact.stride, count, step)
+            stay_node(contact, kin, nodes, step, n)
 
 
 @touch.on(SeparateFields)

@@ -99,15 +99,14 @@ def for_tags(function: Callable, names: str, each: str | None = None) -> Callabl
     `names` are the other parameters; of the one called `each`, every tag gets its own item.
     """
 
-    parameters = names.split(", ")
+    own = names.split(", ").index(each) if each else None
 
     @shared
     def loop(tags, *arguments):
-        given = dict(zip(parameters, arguments, strict=True))
-        return tuple(
-            function(tag, *(v[k] if name == each else v for name, v in given.items()))
-            for k, tag in enumerate(tags)
-        )
+        if own is None:
+            return tuple([function(tag, *arguments) for tag in tags])
+        before, items, after = arguments[:own], arguments[own], arguments[own + 1 :]
+        return tuple([function(t, *before, items[k], *after) for k, t in enumerate(tags)])
 
     return loop
 
