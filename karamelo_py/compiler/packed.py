@@ -11,7 +11,7 @@ import ctypes
 import hashlib
 import struct
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,27 +118,37 @@ class _Plan(NamedTuple):
     types: HeldTuple
 
 
-_CODES = {1: "b", 8: "b", 16: "h", 32: "i", 64: "q"}
+_CODES = {8: "b", 16: "h", 32: "i", 64: "q"}
 
 
-def _words_of(kind: ir.Type, at: int) -> Iterator[tuple[int, str]]:
-    """Where in memory the words of an LLVM type are, and how they are written."""
-    data = cpu_target.target_context.codegen().target_data
-    if isinstance(kind, ir.ArrayType):
-        size = kind.element.get_abi_size(data)
-        for k in range(kind.count):
-            yield from _words_of(kind.element, at + k * size)
-    elif isinstance(kind, ir.Aggregate):
-        for k, item in enumerate(kind.elements):
-            yield from _words_of(item, at + kind.get_element_offset(data, k))
-    elif isinstance(kind, ir.IntType):
-        yield at, _CODES[kind.width]
+def _aligned(at: int, to: int) -> int:
+    return -(-at // to) * to
+
+
+def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, int]:
+    """Add where the words of a type are that begins at `at`, and how they are written.
+
+    Returns where it ends, and what it is aligned to; LLVM lays types as C does.
+    """
+    if isinstance(kind, ir.ArrayType | ir.Aggregate):
+        items = [kind.element] * kind.count if isinstance(kind, ir.ArrayType) else kind.elements
+        to = max([_lay(item, 0, [])[1] for item in items], default=1)
+        at = _aligned(at, to)
+        for item in items:
+            at, _ = _lay(item, at, places)
+        return _aligned(at, to), to
+    if isinstance(kind, ir.IntType):
+        code = _CODES[kind.width]
     else:
-        yield at, {ir.FloatType: "f", ir.DoubleType: "d"}.get(type(kind), "q")
+        code = {ir.FloatType: "f", ir.DoubleType: "d"}.get(type(kind), "q")
+    size = struct.calcsize(f"={code}")
+    at = _aligned(at, size)
+    places.append((at, code))
+    return at + size, size
 
 
 def _plan(arguments: tuple) -> _Plan:
-    data = cpu_target.target_context.codegen().target_data
+    models = cpu_target.target_context.data_model_manager
     places: list[tuple[int, str]] = []
     tuples: list[tuple[int, int]] = []
     end = 0
@@ -147,13 +157,13 @@ def _plan(arguments: tuple) -> _Plan:
         """Where a held tuple begins, behind those in it."""
         nonlocal end
         inner = [lay(item) if is_held(item) else None for item in held]
-        model = cpu_target.target_context.data_model_manager[held].get_data_type().pointee
-        begin = -(-end // 16) * 16
+        model = models[held].get_data_type().pointee
+        at = begin = _aligned(end, 16)
         for k, kind in enumerate(model.elements):
             if inner[k] is not None:
                 tuples.append((len(places), inner[k]))
-            places.extend(_words_of(kind, begin + model.get_element_offset(data, k)))
-        end = begin + model.get_abi_size(data)
+            at, _ = _lay(kind, at, places)
+        end = at
         return begin
 
     held = HeldTuple(tuple(held_type(typeof(argument)) for argument in arguments))
@@ -162,7 +172,7 @@ def _plan(arguments: tuple) -> _Plan:
     for place, code in places:
         text += f"{place - at}x{code}"
         at = place + struct.calcsize(f"={code}")
-    return _Plan(struct.Struct(f"{text}{end - at}x"), tuple(tuples), first, held)
+    return _Plan(struct.Struct(text), tuple(tuples), first, held)
 
 
 class Packed:
