@@ -71,6 +71,18 @@ _HOW = {
 }
 
 
+def _compiled(function: Callable, options: dict) -> Callable:
+    """Numba's dispatcher, which compiles nothing anew for the value of a number that is written."""
+    compiled = njit(**options)(function)
+    if not config.DISABLE_JIT:
+        template = compiled.get_call_template
+        compiled.get_call_template = lambda args, kws: template(
+            tuple(map(numba.types.unliteral, args)),
+            {name: numba.types.unliteral(kind) for name, kind in kws.items()},
+        )
+    return compiled
+
+
 def kernel(function: Callable | None = None, **options: Any) -> Callable:
     """Compile a loop over points or nodes; cached on disk, free of the interpreter lock.
 
@@ -81,7 +93,7 @@ def kernel(function: Callable | None = None, **options: Any) -> Callable:
     if function is None:
         return lambda f: kernel(f, **options)
     options = _HOW | options
-    compiled = njit(**options)(function)
+    compiled = _compiled(function, options)
     if not config.DISABLE_JIT:
         compiled._cache = KernelCache(function, options)
     return compiled
@@ -93,7 +105,7 @@ def subkernel(function: Callable) -> Callable:
     Python must not call it: there is nothing of it that Python could call.
     """
     inlining.claim(function.__qualname__, inlining.left)
-    return njit(**_HOW, no_cpython_wrapper=True)(function)
+    return _compiled(function, _HOW | {"no_cpython_wrapper": True})
 
 
 def entered(function: Callable) -> Callable:

@@ -38,10 +38,9 @@ def _hash(self: TargetConfig) -> int:
 def _as_inlined(flags: TargetConfig) -> TargetConfig:
     """The options of a function that is inlined in a kernel."""
     flags = flags.copy()
-    flags.forceinline = flags.no_cfunc_wrapper = True
-    for name in ("release_gil", "no_cpython_wrapper", "auto_parallel"):
-        if flags.is_set(name):
-            flags.discard(name)
+    flags.forceinline = flags.no_cfunc_wrapper = flags.no_cpython_wrapper = True
+    flags.discard("release_gil")
+    flags.discard("auto_parallel")
     return flags
 
 
@@ -51,7 +50,7 @@ _implementation = templates._OverloadFunctionTemplate._get_impl
 def _get_impl(self, args: tuple, kws: dict) -> tuple:
     """What is chosen by type; in kernels, which count no references, once for all callers."""
     flags = ConfigStack.top_or_none()
-    if flags is None or not flags.is_set("nrt") or flags.nrt:
+    if flags is None or flags.forceinline or flags.nrt:
         return _implementation(self, args, kws)
     with ConfigStack().enter(_as_inlined(flags)):
         return _implementation(self, args, kws)
