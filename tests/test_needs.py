@@ -145,8 +145,9 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script):
     text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
     run_script(text.replace("run_time(3.5)", "run(2)"))
     found = []
-    for arguments, compiled in advance.overloads.items():
-        classes = {one.__name__ for argument in arguments for one in classes_in(argument)}
+    for held, entry in advance.entries.items():
+        (compiled,) = entry.overloads.values()
+        classes = {one.__name__ for one in classes_in(held)}
         kinds = {name for c in contents(compiled.library).choices for name in c.classes}
         words = {name.rpartition(":")[2] for name in kinds if name}
         if {"PlaneStrain", "FLIP", "MUSL", "Linear", "Insulated", "NoContact"} <= classes:

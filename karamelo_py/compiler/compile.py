@@ -27,7 +27,8 @@ from karamelo_py.compiler.fingerprint import (
     serves,
     tag_class,
 )
-from karamelo_py.compiler.held import hold
+from karamelo_py.compiler.held import at_address, hold
+from karamelo_py.compiler.packed import Packed
 from karamelo_py.compiler.trace import at_work, forget, run_for_kernel, traced
 
 
@@ -70,6 +71,18 @@ _HOW = {
 }
 
 
+def _compiled(function: Callable, options: dict) -> Callable:
+    """Numba's dispatcher, which compiles nothing anew for the value of a number that is written."""
+    compiled = njit(**options)(function)
+    if not config.DISABLE_JIT:
+        template = compiled.get_call_template
+        compiled.get_call_template = lambda args, kws: template(
+            tuple(map(numba.types.unliteral, args)),
+            {name: numba.types.unliteral(kind) for name, kind in kws.items()},
+        )
+    return compiled
+
+
 def kernel(function: Callable | None = None, **options: Any) -> Callable:
     """Compile a loop over points or nodes; cached on disk, free of the interpreter lock.
 
@@ -80,7 +93,7 @@ def kernel(function: Callable | None = None, **options: Any) -> Callable:
     if function is None:
         return lambda f: kernel(f, **options)
     options = _HOW | options
-    compiled = njit(**options)(function)
+    compiled = _compiled(function, options)
     if not config.DISABLE_JIT:
         compiled._cache = KernelCache(function, options)
     return compiled
@@ -92,31 +105,55 @@ def subkernel(function: Callable) -> Callable:
     Python must not call it: there is nothing of it that Python could call.
     """
     inlining.claim(function.__qualname__, inlining.left)
-    return njit(**_HOW, no_cpython_wrapper=True)(function)
+    return _compiled(function, _HOW | {"no_cpython_wrapper": True})
 
 
 def entered(function: Callable) -> Callable:
     """A kernel for Python and for other kernels, which takes its tuples held.
 
-    What other kernels call is kept on disk for all of them; Python calls what holds the tuples.
+    What other kernels call is kept on disk for all of them.
     """
-    names = inspect.signature(function).parameters
+    if config.DISABLE_JIT:
+        return function
     inlining.claim(function.__qualname__, inlining.kept)
     inner = kernel(function, no_cpython_wrapper=True)
+    names = inspect.signature(function).parameters
     call = define(
         ", ".join(names),
         f"return inner({', '.join(f'hold({name})' for name in names)})",
         inner=inner,
         hold=hold,
     )
-    call.__module__, call.__qualname__ = function.__module__, f"{function.__qualname__}.entry"
-    entry = kernel(call)
+    enter = _packed(function, inner)
+    by_type(enter)(lambda *arguments: call)
+    return enter
+
+
+def loop(function: Callable) -> Callable:
+    """A kernel for Python alone, which takes its tuples held."""
+    return function if config.DISABLE_JIT else _packed(function, subkernel(function))
+
+
+def _packed(function: Callable, inner: Callable) -> Callable:
+    """What Python calls `inner` by, the compiled `function`."""
+
+    def make(held: Any, name: str) -> Callable:
+        items = ", ".join(f"a[{k}]" for k in range(len(held)))
+        lines = "a = at(number)", f"return inner({items})"
+        call = define("number", *lines, at=at_address(held), inner=inner)
+        call.__module__, call.__qualname__ = (
+            function.__module__,
+            f"{function.__qualname__}.entry.{name}",
+        )
+        return kernel(call)
+
+    packed = Packed(inner, make)
 
     @functools.wraps(function)
     def enter(*arguments: Any) -> Any:
-        return entry(*arguments)
+        return packed(*arguments)
 
-    by_type(enter)(lambda *arguments: call)
+    enter.compile, enter.entries = packed.compile, packed.entries
     return enter
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import config, types
 
-from karamelo_py.compiler.compile import by_type, caller_of, kernel, subkernel
+from karamelo_py.compiler.compile import by_type, caller_of, entered, loop, subkernel
 
 BLOCK = 128
 MAX_DEPTH = 32
@@ -266,7 +266,7 @@ def _binary(op, n, a, b):
             a[i] = _pair(op, a[i], b[i])
 
 
-@kernel
+@entered
 def _evaluate_compiled(program, globals_, points, count, out, stack):
     """Evaluate `program` at `count` points.
 
@@ -458,7 +458,7 @@ def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, las
     evaluate(program, globals_, scratch[:6], count, scratch[result], scratch[STACK:])
 
 
-@kernel
+@loop
 def evaluate_all(program, globals_, x, x0, out, scratch):
     """Evaluate `program` at any number of positions.
 

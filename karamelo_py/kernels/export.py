@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from karamelo_py.compiler.compile import index, kernel
+from karamelo_py.compiler.compile import index, loop
 from karamelo_py.compiler.fields import load, store
+from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.tuples import put_at, record, row, scale
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, reach, support
@@ -23,9 +24,10 @@ STRAIN, JACOBIAN, ENERGY = 6, 12, 13
 EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point
 
 
-@kernel
+@loop
 def export_state(kin, like, points, laws, out):
     """Fill ``out`` (n, EXPORTED) in the order of the points."""
+    points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
         state = load(points.state, p, initial_state(law, kin, like))
@@ -36,12 +38,13 @@ def export_state(kin, like, points, laws, out):
         out[p, ENERGY] = volume * energy_density(law, kin, state)
 
 
-@kernel
+@loop
 def export(what, times_volume, kin, like, points, laws, out):
     """One number ``out`` (n,) of each point, declared by laws that have it (`columns_of`).
 
     ``times_volume`` multiplies it by the reference volume: energies from their densities.
     """
+    points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
         state = load(points.state, p, initial_state(law, kin, like))
@@ -49,12 +52,13 @@ def export(what, times_volume, kin, like, points, laws, out):
         out[p] = points.mass[p] * specific_volume(law) * number if times_volume else number
 
 
-@kernel
+@loop
 def impose_stress(kin, like, points, laws, chosen, given, stress):
     """Set the Cauchy stress of the chosen points, where ``given`` (6,) says so.
 
     ``stress`` (n, 6) is in the order of the points and of the components of `kin`.
     """
+    points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         if not chosen[p]:
             continue
@@ -67,9 +71,10 @@ def impose_stress(kin, like, points, laws, chosen, given, stress):
         store(points.state, p, with_stress(law, kin, state, row(stress, p, 0, old)))
 
 
-@kernel
+@loop
 def export_to_nodes(basis, kin, grids, grid_of, where, values, out):
     """Add sum N value of the points to ``out`` (nodes,); ``values`` (n,)."""
+    grids = at_hand(grids)
     for p in range(values.size):
         grid = record(grids, index(grid_of[p]))
         stencil = locate(basis, kin, grid, place_at(basis, kin, where, p))
@@ -78,12 +83,13 @@ def export_to_nodes(basis, kin, grids, grid_of, where, values, out):
             out[index(part[0])] += part[1] * values[p]
 
 
-@kernel
+@loop
 def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
     """The moments ``out`` (d d, n) sum N v (X - x) of velocity fields with these gradients.
 
     ``where`` (w, n) are the places that the weights belong to, on the grids ``grid_of`` (n,).
     """
+    grids = at_hand(grids)
     flat = planar(kin)
     for p in range(out.shape[1]):
         grid = record(grids, index(grid_of[p]))

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.compile import caller_of, entered, point_function, subkernel
+from karamelo_py.compiler.compile import caller_of, entered, point_function, shared, subkernel
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.compiler.tuples import record
@@ -58,6 +58,8 @@ from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import dimension
+
+NONE = np.int64(0)  # a bare 0 would be a type of its own
 
 _F8 = types.float64
 NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)
@@ -145,6 +147,12 @@ def heat_hook(function: Callable, *, publishes: bool = False) -> CompiledHook:
     return CompiledHook(function, "heated points", publishes, False, False, False)
 
 
+@shared
+def directions(hooks):
+    """How many there are: a number that is read, so that no loop over them is unrolled."""
+    return hooks.x0.shape[1]
+
+
 @subkernel
 def _evaluate(hooks, h, component, count, control, result, shift):
     """Formula of one component over the chosen members, at the present time plus `shift`.
@@ -214,9 +222,8 @@ def _taken_over(hooks, control, h, n, c, force):
 def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, share):
     """Act on the chosen nodes; add to the totals, and to the work that is done."""
     step_back = min(control.clock[0].last_dt, control.values[TIME])  # nothing was before time 0
-    d = dimension(kin)
     slot = hooks.table[h].slot
-    for c in range(d):
+    for c in range(directions(hooks)):
         if hooks.programs[h, c].begin < 0:
             continue
         _evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
@@ -316,32 +323,37 @@ def publish_total(hooks, h, control):
 
 
 @subkernel
+def _choose_nodes(nodes, spans, hooks, h, span, member):
+    """The next members with mass, up to a block: how many, and where to go on."""
+    begin = hooks.table[h].begin
+    ranges = spans[0, 0] if begin < 0 else 1
+    count = 0
+    while span < ranges:
+        low = spans[1 + span, 0] if begin < 0 else begin
+        high = spans[1 + span, 1] if begin < 0 else hooks.table[h].end
+        for m in range(max(low, member), high):
+            n = m if begin < 0 else hooks.members[m]
+            if nodes.sums[n, MASS] > 0:
+                hooks.chosen[count] = n
+                count += 1
+                if count == BLOCK:
+                    return count, span, m + 1
+        span, member = span + 1, NONE
+    return count, span, member
+
+
+@subkernel
 def _go_through(task, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share):
     """Do `task` with the members that have mass, block by block; return their number here."""
     heavy = 0
-    count = np.int64(0)  # a bare 0 would be a type of its own
-    begin = hooks.table[h].begin
-    everything = begin < 0
-    ranges = spans[0, 0] if everything else 1
-    for s in range(ranges):
-        low = spans[1 + s, 0] if everything else begin
-        high = spans[1 + s, 1] if everything else hooks.table[h].end
-        for m in range(low, high):
-            n = m if everything else hooks.members[m]
-            if not nodes.sums[n, MASS] > 0:
-                continue
-            if task == COUNT:
-                heavy += counts(control.ranks, n)
-                continue
-            hooks.chosen[count] = n
-            count += 1
-            if count == BLOCK:
-                _do_at_nodes(
-                    task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
-                )
-                count = np.int64(0)
-    if count > 0:
-        _do_at_nodes(task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share)
+    count, span, member = BLOCK, NONE, NONE
+    while count == BLOCK:
+        count, span, member = _choose_nodes(nodes, spans, hooks, h, span, member)
+        if task == COUNT:
+            for q in range(count):
+                heavy += counts(control.ranks, hooks.chosen[q])
+        else:
+            _do_at_nodes(task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share)
     return heavy
 
 
@@ -420,7 +432,7 @@ def act_on_points(what, kin, hooks, control, dt, h, count):
 def _(what, kin, hooks, control, dt, h, count):
     v, y = what.v, what.y
     step_back = min(control.clock[0].last_dt, control.values[TIME])
-    d = dimension(kin)
+    d = directions(hooks)
     for c in range(d):
         if hooks.programs[h, c].begin < 0:
             continue
@@ -486,15 +498,23 @@ def _(what, kin, hooks, control, dt, h, count):
 
 
 @subkernel
-def _apply_at_points(what, kin, ids, hooks, control, dt, h, count):
-    """Act on the chosen points, where they are before the step."""
+def _choose_points(what, ids, hooks, h, p):
+    """The next members from point `p` on, up to a block, and where they are before the step.
+
+    Returns how many, and where to go on.
+    """
+    begin = hooks.table[h].begin
     where = hooks.scratch
-    for q in range(count):
-        p = hooks.chosen[q]
-        for c in range(dimension(kin)):
-            where[c, q] = what.x[c, p]
-            where[3 + c, q] = hooks.x0[ids[p], c]
-    act_on_points(what, kin, hooks, control, dt, h, count)
+    count = 0
+    while p < ids.size and count < BLOCK:
+        if begin < 0 or hooks.members[begin + ids[p]] != 0:
+            hooks.chosen[count] = p
+            for c in range(directions(hooks)):
+                where[c, count] = what.x[c, p]
+                where[3 + c, count] = hooks.x0[ids[p], c]
+            count += 1
+        p += 1
+    return count, p
 
 
 @entered
@@ -517,21 +537,11 @@ def publish_totals(stage, hooks, control):
 def point_hooks(stage, what, kin, ids, hooks, control, dt):
     """Call the point functions of `stage` on the members in a block."""
     dt = float(dt)
-    for axis in range(6):
-        for q in range(BLOCK):
-            hooks.scratch[axis, q] = 0.0
+    hooks.scratch[:6] = 0.0
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
-        count = np.int64(0)
-        begin = hooks.table[h].begin
-        for p in range(ids.size):
-            if begin >= 0 and hooks.members[begin + ids[p]] == 0:
-                continue
-            hooks.chosen[count] = p
-            count += 1
-            if count == BLOCK:
-                _apply_at_points(what, kin, ids, hooks, control, dt, h, count)
-                count = np.int64(0)
-        if count > 0:
-            _apply_at_points(what, kin, ids, hooks, control, dt, h, count)
+        count, p = BLOCK, NONE
+        while count == BLOCK:
+            count, p = _choose_points(what, ids, hooks, h, p)
+            act_on_points(what, kin, hooks, control, dt, h, count)

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import kernel, subkernel
+from karamelo_py.compiler.compile import loop, subkernel
 from karamelo_py.compiler.fields import field, load
+from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.points.kinematics import dimension, vector_at
@@ -50,9 +51,10 @@ def _number(id, begin1, end1, begin2, end2, bodies):
     return id - begin2 + bodies.first2 if begin2 <= id < end2 else -1
 
 
-@kernel
+@loop
 def collect(kin, x, points, laws, begin1, end1, begin2, end2, bodies):
     """Take from a block the points whose ids lie in one of the two ranges."""
+    points, laws, bodies = at_hand(points), at_hand(laws), at_hand(bodies)
     for p in range(points.id.size):
         i = _number(points.id[p], begin1, end1, begin2, end2, bodies)
         if i < 0:
@@ -69,9 +71,10 @@ def collect(kin, x, points, laws, begin1, end1, begin2, end2, bodies):
         bodies.radius[i] = radius(kin, float(volume), vector_at(kin, bodies.x, i))
 
 
-@kernel
+@loop
 def distribute(kin, points, begin1, end1, begin2, end2, bodies):
     """Add the forces to the points of a block."""
+    points, bodies = at_hand(points), at_hand(bodies)
     for p in range(points.id.size):
         i = _number(points.id[p], begin1, end1, begin2, end2, bodies)
         if i < 0:
@@ -183,13 +186,14 @@ def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     return 1
 
 
-@kernel
+@loop
 def push_apart(law, kin, bodies, cells, reach, dt, kick, total):
     """Add the forces of all pairs that touch; returns their number.
 
     Two points touch when they are closer than the sum of their radii, and closer than `reach` in
     every direction. `total` (3,) takes the force on the first body.
     """
+    bodies, cells = at_hand(bodies), at_hand(cells)
     d = dimension(kin)
     total[:] = 0.0
     touching = 0

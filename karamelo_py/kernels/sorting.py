@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from karamelo_py.compiler.compile import kernel, real, shared
+from karamelo_py.compiler.compile import loop, real, shared
+from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent, first_node
@@ -19,7 +20,7 @@ def cell_of(grid, direction, at):
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
-@kernel
+@loop
 def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
     """Stable counting sort of places `x` (w, n) by tile.
 
@@ -28,6 +29,7 @@ def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
     `order` (n,) the points by tile, and ``start[t]`` ends as the end of tile t, which is the start
     of tile t + 1.
     """
+    grids = at_hand(grids)
     start[:] = 0
     for p in range(x.shape[1]):
         g = of[p]
@@ -46,7 +48,7 @@ def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
         start[t] += 1
 
 
-@kernel
+@loop
 def order_in_tiles(kin, grids, basis, size, points, x, ranges, width, boxes, bins, cell, order):
     """Sort the points of each tile by the first node that they see, then by id.
 
@@ -55,6 +57,7 @@ def order_in_tiles(kin, grids, basis, size, points, x, ranges, width, boxes, bin
     takes between what places the points lie, in cells. `bins` (2, cells of a tile)
     and `cell` (2, n) are scratch; `order` (n,) is by tile.
     """
+    grids, points = at_hand(grids), at_hand(points)
     d = dimension(kin)
     for t in range(len(ranges)):
         begin, end = ranges[t, 0], ranges[t, 1]
@@ -93,9 +96,10 @@ def order_in_tiles(kin, grids, basis, size, points, x, ranges, width, boxes, bin
             order[at] = p
 
 
-@kernel
+@loop
 def widest(kin, basis, grids, x, of):
     """How far from its point a corner of a domain is at most, in cells."""
+    grids = at_hand(grids)
     far = 0.0
     for p in range(x.shape[1]):
         far = max(far, extent(basis, kin, record(grids, of[p]), place_at(basis, kin, x, p)))

@@ -14,14 +14,14 @@ from karamelo_py.compiler.compile import (
     by_type,
     define,
     entered,
-    kernel,
+    loop,
     over_blocks,
     point_function,
     real,
     shared,
 )
 from karamelo_py.compiler.fields import field, load, load_vector
-from karamelo_py.compiler.held import hold
+from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.tuples import clear_first, record, subtract
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import (
@@ -705,7 +705,6 @@ def run_steps(scheme, visits, mode, s, hooks, count):
     left the surroundings of its tile. When that is depends on the points only, never on where a run
     is interrupted.
     """
-    s, hooks = hold(s), hold(hooks)
     values = s.control.values
     clock = s.control.clock[0]
     if not begin(scheme, visits, mode, s):
@@ -731,11 +730,12 @@ def run_steps(scheme, visits, mode, s, hooks, count):
     return DONE
 
 
-advance = kernel(run_steps)
+advance = loop(run_steps)
 
 
-@kernel
+@loop
 def _fastest(frame, kin, points, laws, control):
+    points, laws = at_hand(points), at_hand(laws)
     clock = control.clock[0]
     rate = 0.0
     for p in range(points.mass.size):

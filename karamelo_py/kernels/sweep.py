@@ -8,15 +8,11 @@ sums are made in one order, whatever the number of threads.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, NamedTuple
-
-from numba import prange, types
-from numba.extending import overload
+from typing import NamedTuple
 
 from karamelo_py.compiler.compile import (
     by_type,
     choose,
-    define,
     entered,
     first_failing,
     in_all,
@@ -30,8 +26,9 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.fingerprint import classes_in
-from karamelo_py.compiler.held import address, at_address, at_hand, hold, is_held
+from karamelo_py.compiler.held import at_hand, hold
 from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
+from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
@@ -45,14 +42,6 @@ from karamelo_py.points.frames import Total, Updated, follows
 from karamelo_py.points.grid import inside, renumbered
 
 ROUNDING = 1e-3  # cells by which distances in cells may be rounded
-
-
-class Serial(NamedTuple):
-    """One thread."""
-
-
-class Threaded(NamedTuple):
-    """All threads that Numba was given."""
 
 
 class Visit(NamedTuple):
@@ -333,72 +322,9 @@ def visit_nodes(task, kin, nodes, spans, dt, t):
 
 # --- threads ----------------------------------------------------------------------------------
 
-
-def _leaves(numba_type: Any, path: str, names: dict[str, Any], leaves: dict[str, str]) -> str:
-    """An expression that makes a tuple of this type again from the numbers and arrays in it."""
-    if is_held(numba_type):
-        leaf, again = f"v{len(leaves)}", f"again{len(names)}"
-        names[again] = at_address(numba_type)
-        leaves[leaf] = f"address({path})"
-        return f"{again}({leaf})"
-    if not isinstance(numba_type, types.BaseTuple):
-        leaf = f"v{len(leaves)}"
-        leaves[leaf] = path
-        return leaf
-    items = [_leaves(t, f"{path}[{k}]", names, leaves) for k, t in enumerate(numba_type)]
-    if isinstance(numba_type, types.BaseNamedTuple):
-        make = f"make{len(names)}"
-        names[make] = numba_type.instance_class
-        return f"{make}({', '.join(items)})"
-    return f"({''.join(item + ', ' for item in items)})"
-
-
-def in_threads(function: Any, parameters: str) -> Any:
-    """Make ``f(mode, begin, end, ...)``: ``function(..., t)`` for each t from begin to end.
-
-    Numba hands tuples of arrays to threads, but no tuples of such tuples: they are taken apart
-    before and put together again in each thread.
-    """
-
-    def loop(mode, begin, end, *arguments):
-        for t in range(begin, end):
-            function(*arguments, t)
-
-    def written_out(mode, begin, end, *arguments):
-        names = {"function": function, "prange": prange, "address": address}
-        threaded = mode.instance_class is Threaded
-        leaves: dict[str, str] = {}
-        again = [
-            _leaves(t, name, names, leaves) if threaded else name
-            for t, name in zip(arguments, parameters.split(", "), strict=True)
-        ]
-        return define(
-            f"mode, begin, end, {parameters}",
-            *(f"{leaf} = {path}" for leaf, path in leaves.items()),
-            f"for t in {'prange' if threaded else 'range'}(begin, end):",
-            f"    function({', '.join(again)}, t)",
-            **names,
-        )
-
-    def threaded(mode, begin, end, *arguments):
-        if mode.instance_class is Threaded:
-            return written_out(mode, begin, end, *arguments)
-        return None
-
-    def serial(mode, begin, end, *arguments):
-        if mode.instance_class is Threaded:
-            return None
-        return written_out(mode, begin, end, *arguments)
-
-    options = {"parallel": True, "nogil": True, "error_model": "numpy"}
-    overload(loop, options, strict=False)(threaded)
-    by_type(loop)(serial)
-    return loop
-
-
-_visit_shares = in_threads(visit_share, "visit, s, block, then, gathers, scatters, dt")
-_sum_tiles = in_threads(sum_tile, "quantities, kin, nodes, buffers")
-_visit_spans = in_threads(visit_nodes, "task, kin, nodes, spans, dt")
+_visit_shares = shared_out(visit_share, "visit, s, block, then, gathers, scatters, dt")
+_sum_tiles = shared_out(sum_tile, "quantities, kin, nodes, buffers")
+_visit_spans = shared_out(visit_nodes, "task, kin, nodes, spans, dt")
 
 
 @point_function()
@@ -409,7 +335,7 @@ def sweep_points(mode, visit, s, block, then, gathers, scatters, dt):
 @entered
 def _visit_all(mode, visit, s, block, then, gathers, scatters, dt):
     shares = block.tiling.count[1]
-    _visit_shares(mode, 0, shares, visit, s, block, then, gathers, scatters, dt)
+    _visit_shares(mode, shares, visit, s, block, then, gathers, scatters, dt)
 
 
 @sweep_points.on(Serial)
@@ -433,7 +359,7 @@ def sum_buffers(mode, quantities, s, due):
 @entered
 def _sum_all(mode, quantities, kin, nodes, buffers, due):
     count = buffers.count[0] if due else 0
-    _sum_tiles(mode, 0, count, quantities, kin, nodes, buffers)
+    _sum_tiles(mode, count, quantities, kin, nodes, buffers)
 
 
 @sum_buffers.on(Serial)
@@ -449,7 +375,7 @@ def sweep_nodes(mode, task, kin, nodes, spans, dt):
 
 @entered
 def _visit_all_spans(mode, task, kin, nodes, spans, dt):
-    _visit_spans(mode, 0, spans[0, 0], task, kin, nodes, spans, dt)
+    _visit_spans(mode, spans[0, 0], task, kin, nodes, spans, dt)
 
 
 @sweep_nodes.on(Serial)

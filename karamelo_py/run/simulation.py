@@ -551,8 +551,7 @@ class Simulation:
         if numba.config.DISABLE_JIT or self._python.by_stage:
             return
         visits = Staged() if self.staged else Fused()
-        arguments = (self.hub.update.scheme, visits, self.mode, self.stepped, self.hooks, 1)
-        advance.compile(tuple(numba.typeof(argument) for argument in arguments))
+        advance.compile(self.hub.update.scheme, visits, self.mode, self.stepped, self.hooks, 1)
 
     def _advance(self, count: int) -> int:
         scheme = self.hub.update.scheme

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.lanes import lanes_for
+from karamelo_py.compiler.packed import forget
 from karamelo_py.kernels.arrays import (
     ADD,
     CLEAR,
@@ -395,4 +396,5 @@ def steps_of(shapes: np.ndarray) -> np.ndarray:
 def grow(array: np.ndarray, rows: int) -> None:
     """See that an array has so many rows; in place, since setups hold it."""
     if len(array) < rows:
+        forget(array)
         array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

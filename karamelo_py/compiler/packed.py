@@ -1,0 +1,231 @@
+"""Arguments of kernels put into memory by Python, and passed as one number.
+
+Numba takes every tuple that Python passes apart, array by array, in code that is compiled for each
+kernel anew and is longer than many kernels. Here Python writes the arguments into memory as kernels
+hold them (:mod:`karamelo_py.compiler.held`), and a kernel is called with its address.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import struct
+import weakref
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import typeof, types
+from numba.core.registry import cpu_target
+
+from karamelo_py.compiler.fingerprint import Unknown, describe
+from karamelo_py.compiler.held import HeldTuple, held_type, is_held
+
+
+class _Array(NamedTuple):
+    """What is known of an array as long as it lives. NumPy resizes none that is known in place."""
+
+    alive: weakref.ref
+    kind: int  # the same for arrays of one type
+    words: tuple[int, ...]  # as Numba's model of arrays has them
+
+
+_arrays: dict[int, _Array] = {}
+_kinds: dict[tuple, int] = {}
+
+
+def _array(array: np.ndarray) -> _Array:
+    number = id(array)
+    known = _arrays.get(number)
+    if known is None:
+        flags = array.flags
+        kind = (
+            array.dtype, array.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned,
+            flags.writeable,
+        )  # fmt: skip
+        words = (0, 0, array.size, array.itemsize, array.ctypes.data, *array.shape, *array.strides)
+        alive = weakref.ref(array, lambda _: _arrays.pop(number, None))
+        kept = _kinds.setdefault(kind, len(_kinds))
+        known = _arrays[number] = _Array(alive, kept, words)
+    return known
+
+
+def forget(array: np.ndarray) -> None:
+    """Before an array is resized in place."""
+    _arrays.pop(id(array), None)
+
+
+class _Words:
+    """What is written for some arguments: held tuples one after another, inner ones first.
+
+    Attributes
+    ----------
+    kinds
+        What decides on the types of the arguments.
+    words
+        The numbers in the tuples; 0 for a tuple in a tuple.
+    """
+
+    __slots__ = ("kinds", "words")
+
+    def __init__(self, arguments: tuple):
+        self.kinds: list = []
+        self.words: list = []
+        own, _ = self._of(arguments)
+        self.words += own
+
+    def _of(self, items: tuple) -> tuple[list, bool]:
+        """The words of a tuple, and whether there are arrays in it."""
+        own: list = []
+        arrays = False
+        kinds = self.kinds
+        kinds.append(type(items))
+        kinds.append(len(items))
+        for item in items:
+            kind = type(item)
+            if issubclass(kind, np.ndarray):
+                known = _array(item)
+                kinds.append(known.kind)
+                own += known.words
+                arrays = True
+            elif kind is float or kind is int or kind is bool:
+                kinds.append(kind)
+                own.append(item)
+            elif issubclass(kind, tuple):
+                inner, held = self._of(item)
+                if held:
+                    self.words += inner
+                    own.append(0)
+                    arrays = True
+                else:
+                    own += inner
+            elif issubclass(kind, np.generic):
+                kinds.append(item.dtype)
+                own.append(item.item())
+            else:  # of which there is nothing to be written: None, classes
+                kinds.append(item)
+                own.append(0)
+        return own, arrays
+
+
+class _Plan(NamedTuple):
+    """How the words for arguments of some types are written."""
+
+    text: struct.Struct
+    tuples: tuple[tuple[int, int], ...]  # which word is a tuple in a tuple, where that begins
+    first: int  # where the arguments themselves begin
+    types: HeldTuple
+
+
+_CODES = {8: "b", 16: "h", 32: "i", 64: "q"}
+
+
+def _aligned(at: int, to: int) -> int:
+    return -(-at // to) * to
+
+
+def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, int]:
+    """Add where the words of a type are that begins at `at`, and how they are written.
+
+    Returns where it ends, and what it is aligned to; LLVM lays types as C does.
+    """
+    if isinstance(kind, ir.ArrayType | ir.Aggregate):
+        items = [kind.element] * kind.count if isinstance(kind, ir.ArrayType) else kind.elements
+        to = max([_lay(item, 0, [])[1] for item in items], default=1)
+        at = _aligned(at, to)
+        for item in items:
+            at, _ = _lay(item, at, places)
+        return _aligned(at, to), to
+    if isinstance(kind, ir.IntType):
+        code = _CODES[kind.width]
+    else:
+        code = {ir.FloatType: "f", ir.DoubleType: "d"}.get(type(kind), "q")
+    size = struct.calcsize(f"={code}")
+    at = _aligned(at, size)
+    places.append((at, code))
+    return at + size, size
+
+
+def _plan(arguments: tuple) -> _Plan:
+    models = cpu_target.target_context.data_model_manager
+    places: list[tuple[int, str]] = []
+    tuples: list[tuple[int, int]] = []
+    end = 0
+
+    def lay(held: Any) -> int:
+        """Where a held tuple begins, behind those in it."""
+        nonlocal end
+        inner = [lay(item) if is_held(item) else None for item in held]
+        model = models[held].get_data_type().pointee
+        at = begin = _aligned(end, 16)
+        for k, kind in enumerate(model.elements):
+            if inner[k] is not None:
+                tuples.append((len(places), inner[k]))
+            at, _ = _lay(kind, at, places)
+        end = at
+        return begin
+
+    held = HeldTuple(tuple(held_type(typeof(argument)) for argument in arguments))
+    first = lay(held)
+    text, at = "=", 0
+    for place, code in places:
+        text += f"{place - at}x{code}"
+        at = place + struct.calcsize(f"={code}")
+    return _Plan(struct.Struct(text), tuple(tuples), first, held)
+
+
+class Packed:
+    """A kernel that Python calls with arguments of any types.
+
+    Parameters
+    ----------
+    inner
+        The kernel, which takes held tuples.
+    make
+        ``make(held, name)`` compiles a function of the address of a held tuple of the arguments;
+        `name` is another for others.
+    """
+
+    def __init__(self, inner: Callable, make: Callable[[HeldTuple, str], Callable]):
+        self._inner, self._make = inner, make
+        self._plans: dict[tuple, tuple[_Plan, Callable]] = {}
+        self.entries: dict[HeldTuple, Callable] = {}
+
+    @property
+    def made_of(self) -> tuple:
+        """What code that calls it depends on (:mod:`karamelo_py.compiler.fingerprint`)."""
+        return (self._inner,)
+
+    def __call__(self, *arguments: Any) -> Any:
+        written = _Words(arguments)
+        plan, entry = self._known(written, arguments)
+        memory = bytearray(plan.text.size)
+        at = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+        words = written.words
+        for k, begin in plan.tuples:
+            words[k] = at + begin
+        plan.text.pack_into(memory, 0, *words)
+        return entry(at + plan.first)
+
+    def compile(self, *arguments: Any) -> None:
+        """Have the kernel compiled for arguments of these types."""
+        _, entry = self._known(_Words(arguments), arguments)
+        entry.compile((types.intp,))
+
+    def _known(self, written: _Words, arguments: tuple) -> tuple[_Plan, Callable]:
+        kinds = tuple(written.kinds)
+        if kinds not in self._plans:
+            plan = _plan(arguments)
+            self._plans[kinds] = plan, self._entry(plan.types)
+        return self._plans[kinds]
+
+    def _entry(self, held: HeldTuple) -> Callable:
+        if held not in self.entries:
+            try:
+                words = describe(held)
+            except Unknown:  # such are not kept on disk
+                words = repr(held)
+            name = hashlib.sha256(words.encode()).hexdigest()[:16]
+            self.entries[held] = self._make(held, name)
+        return self.entries[held]
