@@ -13,6 +13,7 @@ from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.run.crew import Crew
 from karamelo_py.run.shares import SharedTiles
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.stable import sparse
 from karamelo_py.run.tiles import summed
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
@@ -94,7 +95,9 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
     per_node = bytes_of_node(simulation)
 
     def tiles_of(crew: Crew) -> SharedTiles:
-        return SharedTiles(crew, lattices, s.basis, simulation.count, one_place=one_place)
+        return SharedTiles(
+            crew, lattices, s.basis, simulation.count, sparse(simulation.hub), one_place=one_place
+        )
 
     first = tiles_of(_Pretended(0, [None] * ranks))
     per_tile = np.zeros(first.count, np.int64)
