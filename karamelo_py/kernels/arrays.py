@@ -158,6 +158,7 @@ HOOK = np.dtype(
         ("uses_before", np.int64),  # the value one step earlier
         ("uses_share", np.int64),  # one over the number of members with mass
         ("holds", np.int64),  # sets the velocity, or bounds it
+        ("uses_place", np.int64),  # whether its formulas differ from place to place
     ]
 )
 PROGRAM = np.dtype(

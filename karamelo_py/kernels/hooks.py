@@ -359,7 +359,8 @@ def _go_through(task, target, kin, grids, nodes, spans, hooks, control, dt, kept
 
 @subkernel
 def _do_at_nodes(task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share):
-    _locate_nodes(kin, grids, hooks, count)
+    if hooks.table[h].uses_place:
+        _locate_nodes(kin, grids, hooks, count)
     if task == RUB:
         _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count)
     else:
@@ -509,9 +510,10 @@ def _choose_points(what, ids, hooks, h, p):
     while p < ids.size and count < BLOCK:
         if begin < 0 or hooks.members[begin + ids[p]] != 0:
             hooks.chosen[count] = p
-            for c in range(directions(hooks)):
-                where[c, count] = what.x[c, p]
-                where[3 + c, count] = hooks.x0[ids[p], c]
+            if hooks.table[h].uses_place:
+                for c in range(directions(hooks)):
+                    where[c, count] = what.x[c, p]
+                    where[3 + c, count] = hooks.x0[ids[p], c]
             count += 1
         p += 1
     return count, p

@@ -13,6 +13,7 @@ from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import told
 from karamelo_py.scene.hub import Hub
+from karamelo_py.script.expressions import POINT_SEEDS
 
 NO_PROGRAM = (-1, -1, -1, -1)
 
@@ -68,7 +69,10 @@ class _Builder:
         with told(f"fix {fix.style}", moment, hook.function, fix.place):
             address = address_of(hook.function, hook.signature)
         uses = int(hook.uses_before), int(hook.uses_share), int(hook.holds and slot >= 0)
-        self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
+        formulas = [f for f in (*fix.formulas, fix.wall_friction) if f is not None]
+        uses_place = any(f.names & set(POINT_SEEDS) for f in formulas)
+        row = (address, STAGES[moment], begin, end, slot, *uses, int(uses_place))
+        self.rows.append(row)
         programs = [self._program(formula) for formula in fix.formulas]
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
         self.programs.append([*programs, self._program(fix.wall_friction)])
