@@ -19,6 +19,15 @@ def weighted(points, column, of):
     return np.average(points[column][there], weights=points.mass[there])
 
 
+def exceeded(points, share, of):
+    """The plastic strain that a share of a solid exceeds, by mass."""
+    there = points.type == of
+    order = np.argsort(points.ep[there])
+    mass = points.mass[there][order]
+    behind = np.cumsum(mass) - 0.5 * mass
+    return np.interp((1 - share) * mass.sum(), behind, points.ep[there][order])
+
+
 def compare(run, axes, full):
     """Mean and largest plastic strain and temperature, shape, energies."""
     plane, space = run(scene="cold_spray_axisymmetric", **SAME), run()
@@ -31,7 +40,10 @@ def compare(run, axes, full):
     ):
         there, here = weighted(a, column, 2) - zero, weighted(b, column, 2) - zero
         yield Row(f"mean {name} of the ball", there, here, 0.05, SOURCE)
-    yield Row("largest plastic strain", flat.worst_Epmax[-1], solid.worst_Epmax[-1], 0.25, SOURCE)
+    # The largest of all is that of one point at the rim of the contact, and grows with the grid.
+    there, here = exceeded(a, 0.05, 2), exceeded(b, 0.05, 2)
+    yield Row("plastic strain that 5 % of the ball exceed", there, here, 0.05, SOURCE)
+    yield Row("largest plastic strain", flat.worst_Epmax[-1], solid.worst_Epmax[-1], 0.1, SOURCE)
     rise = flat.flat_Tmax[-1] - 298
     yield Row("largest rise of temperature (K)", rise, solid.flat_Tmax[-1] - 298, 0.1, SOURCE)
     yield Row("top above the block (um)", flat.height[-1], solid.height[-1], 0.05, SOURCE)

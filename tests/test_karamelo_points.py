@@ -137,6 +137,7 @@ def test_solids_as_in_2020(run_interpreted):
         ("solid(s, cylinder, 0.5, 0, 0.1, 2, rubber, 0.1)", "region(box, cylinder, 0.5, 0, 0.1), "),
         ("solid(s, rectangle, 0, 1, 0, 1, 2, m, 0.1)", "and solid(s, region, box, 2, m, 0.1)"),
         ("solid(s, sphere)", "solid(ID, region, box, ppc"),
+        ("solid(s, block, box, 9, 6, rubber, 0.1)", "solid(s, region, box, 1, rubber, 0.1), or"),
         (
             "strength(s, JC, 1, 2, 3, 4, 5, 6)",
             "strength(s, johnson_cook, 1, 2, 3, 4, 5, 6, 0, 0, 1)",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from typing import Literal
 
 from karamelo_py.language import registry, signature
@@ -59,6 +60,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
             arguments = (Argument(parse_text(kind)[0], hub.interpreter), *arguments)
             kind = "region"
         elif kind in SHAPES and arguments and arguments[0].word() in hub.regions:
+            _refuse_counts(hub, ID, arguments)
             kind = "region"
         elif hint := filled(hub.interpreter.statement):
             raise ScriptError(
@@ -75,6 +77,19 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
 
 
 solid.syntax = "ID, region, regionID, ppc, material, h[, T0] | ID, mesh, file, material, h[, T0]"
+
+
+def _refuse_counts(hub: Hub, ID: str, arguments: Sequence[Argument]) -> None:
+    """Tell of the form that gave the number of points along each direction of a region."""
+    region, *counts, material, h = (argument.text for argument in arguments)
+    if len(counts) == hub.domain.dimension > 1:
+        raise ScriptError(
+            f"{', '.join(counts)} points along the sides: points are counted in a cell here",
+            place=arguments[1].place,
+            expected=solid.syntax,
+            hint=f"solid({ID}, region, {region}, 1, {material}, {h}), or more than 1 in each "
+            "direction of a cell",
+        )
 
 
 def group(
