@@ -104,7 +104,7 @@ def subkernel(function: Callable) -> Callable:
 
     Python must not call it: there is nothing of it that Python could call.
     """
-    inlining.claim(function.__qualname__, inlining.left)
+    inlining.claim(function.__qualname__, "left")
     return _compiled(function, _HOW | {"no_cpython_wrapper": True})
 
 
@@ -115,7 +115,7 @@ def entered(function: Callable) -> Callable:
     """
     if config.DISABLE_JIT:
         return function
-    inlining.claim(function.__qualname__, inlining.kept)
+    inlining.claim(function.__qualname__, "kept")
     inner = kernel(function, no_cpython_wrapper=True)
     names = inspect.signature(function).parameters
     call = define(

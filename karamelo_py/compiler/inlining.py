@@ -31,11 +31,17 @@ left: set[str] = set()  # qualified names of functions that nobody but compiled 
 kept: set[str] = set()  # the same, of those that are kept on disk
 
 
-def claim(name: str, of: set[str]) -> None:
-    """Put a function into `left` or `kept`: its name is all that tells it from others later."""
-    if name in (kept if of is left else left):
+def claim(name: str, of: str) -> None:
+    """Put a function into "left" or "kept": its name is all that tells it from others later."""
+    sets = vars(claim)["sets"]
+    if any(name in names for way, names in sets.items() if way != of):
         raise NameError(f"there is another '{name}', which is compiled in another way: rename it")
-    of.add(name)
+    sets[of].add(name)
+
+
+# Beside the function, not among its globals: they grow in a run, and what kernels are made of does
+# not change by that.
+claim.sets = {"left": left, "kept": kept}
 
 
 def _is_inner(library: codegen.JITCodeLibrary, names: set[str]) -> bool:

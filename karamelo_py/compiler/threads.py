@@ -63,7 +63,7 @@ def _in_parallel(count, task, arguments):
         _call(task, arguments, number)
 
 
-inlining.claim(_in_parallel.__qualname__, inlining.kept)
+inlining.claim(_in_parallel.__qualname__, "kept")
 _in_parallel = kernel(_in_parallel, parallel=True, no_cpython_wrapper=True)
 
 
