@@ -290,7 +290,7 @@ def held(script: str, high: float = 0.2) -> str:
 
 def test_a_base_held_at_the_corners_of_its_cells_is_rigid(run_interpreted):
     """By all nodes that its points see, so that the normal is upright; not where only a part is."""
-    script = glide(0, 0.2, 12, "quadratic-spline")
+    script = glide(0, 0.2, 8, "quadratic-spline")
     rigid, whole, part = (
         run_interpreted(text).log for text in (script, held(script), held(script, 0.11))
     )

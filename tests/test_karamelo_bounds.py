@@ -79,3 +79,33 @@ def test_fixes_that_do_not_agree(run_interpreted, second, warns):
     ).err  # fmt: skip
     assert ("gives 169 nodes of this group another vx: this fix decides there" in err) == warns
     assert ("another vx" in err) == warns
+
+
+REBOUND = """
+    method(ulmpm, FLIP, linear, 1)
+    scheme({})
+    dimension(1, 0, 2, 0.1)
+    region(bar, block, 0.3, 0.8)
+    region(low, block, INF, 0.01)
+    material(m, neo-hookean, 1, 1, 0)
+    solid(bar, region, bar, 2, m, 0.1, 0)
+    group(low, nodes, region, low, all)
+    fix(v, initial_velocity_particles, all, -0.05)
+    fix(wall, velocity_nodes, low, geq0)
+    compute(v, average_velocity, all)
+    compute(Ek, kinetic_energy, all)
+    compute(Es, strain_energy, all)
+    E = Ek + Es
+    set_output(1000)
+    dt_factor(0.4)
+    log_modify(custom, step, E, v_x)
+    run_time(9)
+"""
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_bar_rebounds_from_a_bound(run_interpreted, scheme):
+    """An elastic bar leaves a wall as fast as it came: it gained as much as its energy again."""
+    log = run_interpreted(REBOUND.format(scheme)).log
+    assert 0.85 < log.E[-1] / log.E[0] < 1.02
+    assert log.v_x[-1] == pytest.approx(0.05, rel=0.08)

@@ -10,6 +10,8 @@ Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star
     a change of v before the update adds to the momentum of points over dt. Of the hooks that hold
     a node, the last to bring v_star to its value decides: it gets what the others had of that node.
     `dt` is the time that forces act for in the step, half of the last step and half of this one.
+    Of the velocity that deforms, mapped apart from v_star, v is set; before the forces (usf, usavg)
+    that is done with the hooks of the update, where those that hold make it their v_star.
 Point function ``(mass, v, x_old, x, value, before, dt, kick) -> (v, x, total)``
     `dt` is the time that the point moves for, `kick` the time that forces act for.
 Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``
@@ -223,6 +225,12 @@ def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, shar
     """Act on the chosen nodes; add to the totals, and to the work that is done."""
     step_back = min(control.clock[0].last_dt, control.values[TIME])  # nothing was before time 0
     slot = hooks.table[h].slot
+    stage = hooks.table[h].stage
+    remaps = target == ON_VELOCITY and stage == POST_VELOCITIES_TO_GRID
+    # What is strained by before the forces belongs to the last step, and to what held it then.
+    strains_first = target == ON_VELOCITY and stage == POST_UPDATE_GRID_STATE
+    strains_first = strains_first and hooks.table[h].holds > 0
+    given = BEFORE if strains_first and hooks.table[h].uses_before else VALUE
     for c in range(directions(hooks)):
         if hooks.programs[h, c].begin < 0:
             continue
@@ -242,6 +250,9 @@ def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, shar
             else:
                 v = nodes.velocity[n, c]
                 star = v
+                last = nodes.update[n, c]  # before the forces, that of the step before
+                if remaps or (strains_first and last == hooks.scratch[given, q]):
+                    star = last
             old, old_star = v, star
             old_force = nodes.sums[n, of_force(kin) + c]
             v, star, force, total = _call_node_function(
@@ -250,7 +261,7 @@ def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, shar
                 v,
                 star,
                 old_force,
-                hooks.scratch[VALUE, q],
+                hooks.scratch[given, q],
                 hooks.scratch[BEFORE, q],
                 dt,
                 share,
@@ -271,7 +282,7 @@ def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, shar
                 nodes.update[n, c] = star
                 nodes.update[n, of_change(kin) + c] = star - v
             else:
-                nodes.velocity[n, c] = v
+                nodes.velocity[n, c] = star if strains_first else v
             # Formulas have been taken: their rows hold what is to be added up.
             own = counts(control.ranks, n)
             hooks.scratch[VALUE, q] = total if own else 0.0

@@ -33,8 +33,11 @@ def prescribe_at_most(mass, v, v_star, force, value, before, dt, share):
 
 
 def prescribe_mapped_at_most(mass, v, v_star, force, value, before, dt, share):
-    """Nor is the re-mapped velocity."""
-    allowed = min(v, value)
+    """Nor is the re-mapped velocity, which does not leave the bound where that has held v*.
+
+    Else stress would do work on nothing: a rebound would gain half of the energy.
+    """
+    allowed = value if v_star == value else min(v, value)
     return allowed, allowed, force, 0.0
 
 
@@ -45,8 +48,8 @@ def prescribe_at_least(mass, v, v_star, force, value, before, dt, share):
 
 
 def prescribe_mapped_at_least(mass, v, v_star, force, value, before, dt, share):
-    """Nor is the re-mapped velocity."""
-    allowed = max(v, value)
+    """Nor is the re-mapped velocity (see `prescribe_mapped_at_most`)."""
+    allowed = value if v_star == value else max(v, value)
     return allowed, allowed, force, 0.0
 
 
@@ -146,7 +149,7 @@ class VelocityNodes(Fix):
             # Contact may move these nodes: they are held only as far as they come.
             self.prescribes_velocity = False
             self.post_update_grid_state = node_hook(
-                prescribe_at_most if most else prescribe_at_least, holds=True
+                prescribe_at_most if most else prescribe_at_least, uses_before=True, holds=True
             )
             self.post_velocities_to_grid = node_hook(
                 prescribe_mapped_at_most if most else prescribe_mapped_at_least, publishes=False
