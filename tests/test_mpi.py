@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -84,6 +85,21 @@ def test_compiled_in_the_plane(tmp_path):
     same_files(one, two)
 
 
+@needs_mpi
+@pytest.mark.full
+def test_bench(tmp_path):
+    """Shares of waiting are shares; each process has steps of its own to do."""
+    words = (*PROGRAM, "bench", "disks-80", "--ranks", "2", "--seconds", "0.2", "-o", "a.json")
+    process = started(tmp_path, *words, compiled=True)
+    _, err = process.communicate(timeout=500)
+    assert process.returncode == 0, err
+    text = (tmp_path / "a.json").read_text(encoding="utf-8")
+    rows = json.loads(text)["workloads"]["disks-80"]["scaling"]
+    for row in rows:
+        assert (0 < row["exchange"] < 1) == (row["ranks"] > 1)
+        assert 0 <= row["imbalance"] < 1
+
+
 # --- one end for all ----------------------------------------------------------------------------
 
 
@@ -156,6 +172,7 @@ def _pids(launcher: int) -> list[int]:
 
 
 BREAKS = """
+import json
 import os
 import re
 from karamelo_py.run import ranks, shares, tiles
