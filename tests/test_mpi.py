@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from conftest import INPUTS
+from conftest import INPUTS, ROOT
 from scenes import block
 from test_restart import same_files
 
@@ -266,3 +266,16 @@ def test_what_is_passed_on_is_foretold(tmp_path):
     assert sorted(found) == [int(low), int(high)] and int(low) > 0
     points = re.search(r"  points +(\d+) +(\d+)", out).groups()
     assert sum(map(int, points)) == 100
+
+
+def test_the_page_of_many_processes(tmp_path):
+    """Its batch script is one, and it explains each line that `check` prints of processes."""
+    page = (ROOT / "docs" / "many-processes.md").read_text(encoding="utf-8")
+    batch = re.search(r"^```bash\n(.*?)^```", page, re.S | re.M)[1]
+    if bash := shutil.which("bash"):
+        subprocess.run([bash, "-n"], input=batch, text=True, check=True)
+    checked = started(tmp_path, *PROGRAM, "check", str(script(tmp_path, "run(1)")), "--ranks", "2")
+    lines = checked.communicate(timeout=100)[0].partition("shared out among 2 processes")[2]
+    names = re.findall(r"^  ([a-z][a-z ]*[a-z]) +[\d.]", lines, re.M)
+    assert len(names) == 6 and all(f"| `{name}` |" in page for name in names)
+    assert "so few points are not shared out" in lines

@@ -34,8 +34,8 @@ karamelo-py help FAMILY STYLE    where a name means several things:
                                  karamelo-py help fix kinetic_energy
 karamelo-py styles [FAMILY]      list commands and styles"""
 USAGE = """\
-karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [-log FILE] [-out FOLDER]
-                          [-restart FILE]
+karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [-log FILE]
+                          [-out FOLDER] [-restart FILE]
                           [--trust-geometries] [--quiet] [--debug]
        karamelo-py COMMAND ..."""
 VARIABLE = ("-var", "--var", "-v")
