@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from karamelo_py.app.bench import measure, record
+from karamelo_py.app.bench import measure, record, scaling
 from karamelo_py.app.bench.measure import Measured
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.cli import main
@@ -170,3 +170,46 @@ def test_the_commit_is_that_of_the_repository():
     except (OSError, subprocess.CalledProcessError):
         pytest.skip("there is no repository here")
     assert record.commit() in (head, head + "-dirty")
+
+
+# --- several processes ----------------------------------------------------------------------------
+
+
+def test_processes_beside_threads(tmp_path, monkeypatch, capsys):
+    """Strong, with as many threads, and weak; shares of waiting as they were found."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
+    monkeypatch.setattr("numba.config.NUMBA_NUM_THREADS", 2)
+    parts = []
+
+    def measured(part, *, weak=False):
+        parts.append(part)
+        best = 1e6 * part.ranks**0.5
+        return scaling.Scaled(part.ranks, part.threads, weak, 100, best, 0.02, 0.125)
+
+    monkeypatch.setattr(scaling, "_measured", measured)
+    assert main(["bench", "block-3d-mls", "--ranks", "4,2", "-o", "a.json"]) == 0
+    out = capsys.readouterr().out
+    assert [(p.ranks, p.threads) for p in parts] == [(1, 1), (2, 1), (1, 2), (4, 1), (2, 1), (4, 1)]
+    assert parts[4].presets == {"N": "29"} and parts[5].presets == {"N": "37"}  # of 23
+    assert re.search(r"4 x 1 \(larger\) +100 +2\.00 +2\.00 +2\.0 % +12\.5 %\n", out)
+    rows = json.loads((tmp_path / "a.json").read_text("utf-8"))["workloads"]["block-3d-mls"]
+    assert rows["best"] == 1e6 and [row["weak"] for row in rows["scaling"]] == 4 * [False] + 2 * [
+        True
+    ]
+
+
+def test_scenes_grow_with_processes():
+    points = {}
+    for times in (1, 4):
+        found = scaling.grown(WORKLOADS["bar-3d-ul"].script, {"coarser": "4"}, times)
+        hub = Hub()
+        Interpreter(hub, presets=found).run_text(WORKLOADS["bar-3d-ul"].script)
+        points[times] = sum(solid.count for solid in hub.solids.values())
+    # Cells of another size do not fill the bar as well.
+    assert points[4] == pytest.approx(4 * points[1], rel=0.2)
+
+
+def test_what_is_no_list_of_ranks(capsys):
+    assert main(["bench", "--ranks", "1,x"]) == 1
+    assert "'1,x' is no list of numbers of processes, such as 1,2,4" in capsys.readouterr().err

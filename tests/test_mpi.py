@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -13,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from conftest import INPUTS
+from conftest import INPUTS, ROOT
 from scenes import block
 from test_restart import same_files
 
@@ -82,6 +83,21 @@ def test_compiled_in_the_plane(tmp_path):
     shutil.copytree(three, two)
     assert by_ranks(two, words[0], 2, *words[1:], "-restart", "r.10.h5", compiled=True)[0] == 0
     same_files(one, two)
+
+
+@needs_mpi
+@pytest.mark.full
+def test_bench(tmp_path):
+    """Shares of waiting are shares; each process has steps of its own to do."""
+    words = (*PROGRAM, "bench", "disks-80", "--ranks", "2", "--seconds", "0.2", "-o", "a.json")
+    process = started(tmp_path, *words, compiled=True)
+    _, err = process.communicate(timeout=500)
+    assert process.returncode == 0, err
+    text = (tmp_path / "a.json").read_text(encoding="utf-8")
+    rows = json.loads(text)["workloads"]["disks-80"]["scaling"]
+    for row in rows:
+        assert (0 < row["exchange"] < 1) == (row["ranks"] > 1)
+        assert 0 <= row["imbalance"] < 1
 
 
 # --- one end for all ----------------------------------------------------------------------------
@@ -156,6 +172,7 @@ def _pids(launcher: int) -> list[int]:
 
 
 BREAKS = """
+import json
 import os
 import re
 from karamelo_py.run import ranks, shares, tiles
@@ -249,3 +266,16 @@ def test_what_is_passed_on_is_foretold(tmp_path):
     assert sorted(found) == [int(low), int(high)] and int(low) > 0
     points = re.search(r"  points +(\d+) +(\d+)", out).groups()
     assert sum(map(int, points)) == 100
+
+
+def test_the_page_of_many_processes(tmp_path):
+    """Its batch script is one, and it explains each line that `check` prints of processes."""
+    page = (ROOT / "docs" / "many-processes.md").read_text(encoding="utf-8")
+    batch = re.search(r"^```bash\n(.*?)^```", page, re.S | re.M)[1]
+    if bash := shutil.which("bash"):
+        subprocess.run([bash, "-n"], input=batch, text=True, check=True)
+    checked = started(tmp_path, *PROGRAM, "check", str(script(tmp_path, "run(1)")), "--ranks", "2")
+    lines = checked.communicate(timeout=100)[0].partition("shared out among 2 processes")[2]
+    names = re.findall(r"^  ([a-z][a-z ]*[a-z]) +[\d.]", lines, re.M)
+    assert len(names) == 6 and all(f"| `{name}` |" in page for name in names)
+    assert "so few points are not shared out" in lines

@@ -34,8 +34,8 @@ karamelo-py help FAMILY STYLE    where a name means several things:
                                  karamelo-py help fix kinetic_energy
 karamelo-py styles [FAMILY]      list commands and styles"""
 USAGE = """\
-karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [-log FILE] [-out FOLDER]
-                          [-restart FILE]
+karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [-log FILE]
+                          [-out FOLDER] [-restart FILE]
                           [--trust-geometries] [--quiet] [--debug]
        karamelo-py COMMAND ..."""
 VARIABLE = ("-var", "--var", "-v")
@@ -47,13 +47,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     keep_to_oneself()
-    status, text = _outcome(lambda: _dispatch(arguments), debugging="--debug" in arguments)
+    status, text = outcome_of(lambda: _dispatch(arguments), debugging="--debug" in arguments)
     if text:
         _complain(text)
     return status
 
 
-def _outcome(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
+def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
     """How something ends, with what is left to be said."""
     try:
         return Outcome(act())
@@ -292,7 +292,7 @@ def _run(options: argparse.Namespace) -> int:
         return together(
             options.ranks,
             lambda crew: _carry_out(options, script, crew),
-            lambda act: _outcome(act, debugging=debugging),
+            lambda act: outcome_of(act, debugging=debugging),
         )
     if (options.ranks or 1) > 1:
         return launch(options.ranks, options.command_line)

@@ -47,8 +47,8 @@ AT_ONCE = 3  # so many signals end all without waiting for the step
 LONGEST_NAME = 90  # of a socket
 
 
-def launch(ranks: int, arguments: Sequence[str]) -> int:
-    """Run a command line on so many processes of this machine; returns the exit status.
+def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.start") -> int:
+    """Run a program on so many processes of this machine; returns the exit status.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def launch(ranks: int, arguments: Sequence[str]) -> int:
         import mpi4py  # noqa: F401
     except ImportError:
         raise ScriptError(f"--ranks {ranks} needs mpi4py", hint=INSTALL) from None
-    command = [mpiexec, "-n", str(ranks), sys.executable, "-m", "karamelo_py.app.start"]
+    command = [mpiexec, "-n", str(ranks), sys.executable, "-m", module]
     with tempfile.TemporaryFile() as said, _folder() as folder:
         return Launcher(ranks, [*command, *arguments], f"{folder}/s", said).run()
 

@@ -371,6 +371,15 @@ class Ranks(Simulation):
         self._shown = False
         return status
 
+    def waits(self) -> np.ndarray:
+        """Seconds that each process has waited for others in steps so far."""
+        self._tell("tell_of_waiting")
+        return np.array(self.tell_of_waiting())
+
+    def tell_of_waiting(self) -> list | None:
+        """The same, of all processes for the first."""
+        return self.crew.gathered(self.crew.waited)
+
     def compile(self) -> None:
         """Have the loop over the steps compiled now, by all processes."""
         self._see_parts()

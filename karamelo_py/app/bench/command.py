@@ -12,7 +12,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.app.bench import measure, record
+from karamelo_py.app.bench import measure, record, scaling
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.cli import add_variables, threads_option
 from karamelo_py.app.studies.options import out_file
@@ -42,6 +42,11 @@ workloads:
         help="threads to use (default: 1)",
     )  # fmt: skip
     parser.add_argument(
+        "--ranks", type=_counts, metavar="N,M,...",
+        help="measure with so many processes instead, and with as many threads: on the scene as it "
+        f"is, and on one as many times as large (default workloads: {', '.join(scaling.USUAL)})",
+    )  # fmt: skip
+    parser.add_argument(
         "--seconds", type=_positive, default=2.0, metavar="S",
         help="how long each scene is measured (default: 2)",
     )  # fmt: skip
@@ -61,7 +66,7 @@ def measure_all(options: Namespace) -> int:
                 expected="one of " + ", ".join(WORKLOADS),
                 hint=meant(name, WORKLOADS),
             )
-    chosen = options.workloads or list(WORKLOADS)
+    chosen = options.workloads or (scaling.USUAL if options.ranks else list(WORKLOADS))
     known = {name: set(re.findall(r"\w+", WORKLOADS[name].script)) for name in chosen}
     for variable, _ in options.var:
         if not any(variable in words for words in known.values()):
@@ -81,10 +86,20 @@ def measure_all(options: Namespace) -> int:
     for name in chosen:
         workload = WORKLOADS[name]
         presets = {n: value for n, value in options.var if n in known[name]}
-        simulation = measure.build(workload, threads, presets)
-        one = measure.measured(simulation, options.seconds, triad, workload.lead)
-        _print(name, one, published=not presets)
-        found["workloads"][name] = record.entry(one, workload.title, presets)
+        if options.ranks:
+            rows = []
+            print(f"\n{name}: {workload.title}\n{scaling.HEADING}")
+            for row in scaling.scaled(
+                name, options.ranks, threads, presets, options.seconds, available
+            ):
+                rows.append(row)
+                print(scaling.line(row, rows[0]), flush=True)
+            found["workloads"][name] = record.scaled(rows, workload.title, presets)
+        else:
+            simulation = measure.build(workload, threads, presets)
+            one = measure.measured(simulation, options.seconds, triad, workload.lead)
+            _print(name, one, published=not presets)
+            found["workloads"][name] = record.entry(one, workload.title, presets)
         if out:
             record.write(out, found)
     if earlier:
@@ -92,6 +107,13 @@ def measure_all(options: Namespace) -> int:
     if out:
         print(f"\nwritten: {out}")
     return 0
+
+
+def _counts(text: str) -> list[int]:
+    words = text.split(",")
+    if not all(word.isdigit() and int(word) for word in words):
+        raise ArgumentTypeError(f"'{text}' is no list of numbers of processes, such as 1,2,4")
+    return [int(word) for word in words]
 
 
 def _positive(text: str) -> float:

@@ -25,6 +25,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 ARRAYS = 3 * 256 * 2**20  # bytes
+REPETITIONS = 5
 ALONE = 0.5  # the share of a step from which on something is said to limit it
 
 
@@ -162,7 +163,11 @@ def build(
 
 
 def measured(
-    simulation: Simulation, seconds: float, triad: float, lead: int = 3, repetitions: int = 5
+    simulation: Simulation,
+    seconds: float,
+    triad: float,
+    lead: int = 3,
+    repetitions: int = REPETITIONS,
 ) -> Measured:
     """Measure a scene for about so many seconds; `triad` is the bandwidth of the memory."""
     rates = speeds(simulation, seconds, lead, repetitions)
@@ -181,25 +186,29 @@ def measured(
 
 
 def speeds(
-    simulation: Simulation, seconds: float, lead: int = 3, repetitions: int = 5
+    simulation: Simulation, seconds: float, lead: int = 3, repetitions: int = REPETITIONS
 ) -> list[float]:
     """Particle-steps per second of each repetition.
 
     Every repetition starts from the same state, that after `lead` steps.
     """
-    _advance(simulation, lead)
+    timed_steps(simulation, lead)
     start = simulation.snapshot()
-    per_step = _advance(simulation, 5) / 5
-    count = min(max(5, int(seconds / repetitions / per_step)), MOST_STEPS)
+    count = step_count(timed_steps(simulation, 5) / 5, seconds, repetitions)
     rates = []
     for _ in range(repetitions):
         simulation.restore(start)
-        rates.append(simulation.count * count / _advance(simulation, count))
+        rates.append(simulation.count * count / timed_steps(simulation, count))
     simulation.restore(start)
     return rates
 
 
-def _advance(simulation: Simulation, count: int) -> float:
+def step_count(per_step: float, seconds: float, repetitions: int = REPETITIONS) -> int:
+    """Steps of a repetition, where one takes so long and all together about `seconds`."""
+    return min(max(5, int(seconds / repetitions / per_step)), MOST_STEPS)
+
+
+def timed_steps(simulation: Simulation, count: int) -> float:
     """Seconds that `count` steps take."""
     begun = time.perf_counter()
     if simulation.advance(count) != DONE:

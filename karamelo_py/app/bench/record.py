@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import karamelo_py
 from karamelo_py.app.bench.measure import Measured
+from karamelo_py.app.bench.scaling import Scaled
 from karamelo_py.app.studies.records import surroundings
 from karamelo_py.script.errors import ScriptError
 
@@ -39,6 +40,17 @@ def entry(one: Measured, title: str, presets: Mapping[str, str]) -> dict[str, An
         "share_of_rest": one.rest,
         "sweeps_of_points": one.of_points,
         "sweeps_of_nodes": one.of_nodes,
+    }
+
+
+def scaled(rows: Sequence[Scaled], title: str, presets: Mapping[str, str]) -> dict[str, Any]:
+    """What is kept of a workload that several processes ran; the speed of one comes first."""
+    return {
+        "title": title,
+        "variables": dict(presets),
+        "points": rows[0].points,
+        "best": rows[0].best,
+        "scaling": [row._asdict() for row in rows],
     }
 
 
