@@ -16,6 +16,7 @@ import re
 import threading
 import types
 from collections.abc import Callable
+from itertools import count
 from linecache import getlines
 from typing import Any
 
@@ -470,8 +471,10 @@ class Kinds:
 
     def __init__(self) -> None:
         self.known: dict[int, tuple] = {}
+        self.numbers: dict[Any, int] = {}
+        self.new = count()
 
-    def __getitem__(self, thing: tuple) -> tuple:
+    def __getitem__(self, thing: tuple) -> int:
         found = self.known.get(id(thing))
         if found is None:
             if len(self.known) > 500:
@@ -479,7 +482,7 @@ class Kinds:
             # A visit works with parts that stay, and with others of its tile; no array is in two.
             parts = isinstance(thing, Work)
             kind = tuple(self[part] for part in thing) if parts else _kind_of(thing, {})
-            found = self.known[id(thing)] = thing, kind
+            found = self.known[id(thing)] = thing, self.numbers.setdefault(kind, next(self.new))
         return found[1]
 
 
