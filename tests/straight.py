@@ -16,6 +16,8 @@ import re
 import threading
 import types
 from collections.abc import Callable
+from itertools import count
+from linecache import getlines
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,7 @@ import numpy as np
 from karamelo_py.compiler import compile as compiling
 from karamelo_py.compiler.compile import SPELLED
 from karamelo_py.kernels import sums, sweep
+from karamelo_py.kernels.visit import Work
 
 AFTER = 300  # calls from which on it is worth to write a function down
 
@@ -302,6 +305,12 @@ class Called:
     def __init__(self, function: Callable):
         self.function = function
         self.seen: Callable | None = None
+        # As often as its numbers say: each other number would be another answer.
+        text = getlines(function.__code__.co_filename)
+        lines = {line for _, _, line in function.__code__.co_lines() if line}
+        self.loops = bool(text) and any("while " in text[line - 1] for line in lines)
+        # What stands there knows no arrays, or only reads them.
+        self.is_pure = (function.__module__ or "").startswith("karamelo_py.points")
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.function, name)
@@ -333,13 +342,15 @@ class Called:
     def __call__(self, *arguments: Any) -> Any:
         writer = _writer()
         classes = self.function, tuple(type(a) for a in arguments)
-        if classes not in writer.failed:
+        if classes not in writer.failed and not self.loops:
             before = writer.state()
             try:
                 return self.chosen(arguments)(*arguments)
             except Branches:
                 writer.restore(before)
                 writer.failed.add(classes)
+        if self.is_pure:
+            return _opaque(self.function)(*arguments)
         writer.flush()
         writer.stored = True  # perhaps
         text = f"{writer.constant(self.function)}({', '.join(map(ref, arguments))})"
@@ -373,6 +384,7 @@ def _opaque(function: Callable) -> Callable:
         text = f"{_writer().constant(function)}({', '.join(map(ref, arguments))})"
         return _writer().pure(text, function(*map(actual, arguments)))
 
+    call.itself = function
     return call
 
 
@@ -383,7 +395,7 @@ def _type(thing: Any) -> type:
 
 
 def _isinstance(thing: Any, kind: Any) -> bool:
-    return isinstance(actual(thing), kind)
+    return isinstance(actual(thing), getattr(kind, "itself", kind))
 
 
 INSTEAD = {
@@ -459,13 +471,18 @@ class Kinds:
 
     def __init__(self) -> None:
         self.known: dict[int, tuple] = {}
+        self.numbers: dict[Any, int] = {}
+        self.new = count()
 
-    def __getitem__(self, thing: tuple) -> tuple:
+    def __getitem__(self, thing: tuple) -> int:
         found = self.known.get(id(thing))
         if found is None:
-            if len(self.known) > 200:
+            if len(self.known) > 500:
                 self.known.clear()
-            found = self.known[id(thing)] = thing, _kind_of(thing, {})
+            # A visit works with parts that stay, and with others of its tile; no array is in two.
+            parts = isinstance(thing, Work)
+            kind = tuple(self[part] for part in thing) if parts else _kind_of(thing, {})
+            found = self.known[id(thing)] = thing, self.numbers.setdefault(kind, next(self.new))
         return found[1]
 
 
@@ -529,6 +546,16 @@ def of_node(task: tuple, kin: tuple, nodes: tuple, n: int, dt: float) -> tuple:
     return type(task), type(kin), kinds[nodes], type(dt)
 
 
+def of_point(basis: tuple, kin: tuple, array: np.ndarray, p: int) -> tuple:
+    """The kind of where a point is."""
+    return type(basis), type(kin), array.dtype
+
+
+def of_stencil(weights: tuple, w: tuple, stencil: tuple, p: int) -> tuple:
+    """The kind of a stencil after the move."""
+    return type(weights), kinds[w]
+
+
 def of_record(quantities: tuple, kin: tuple, nodes: tuple, n: int) -> tuple:
     """The kind of what is cleared at a node."""
     return kinds[quantities], type(kin), kinds[nodes]
@@ -540,6 +567,8 @@ _FOUND = {
         for name in ("_gather", "_scatter", "empty_all", "settled_all", "load_all")
     },
     (sweep, "locate"): of_place,
+    (sweep, "place_at"): of_point,
+    (sweep, "restencil"): of_stencil,
     (sweep, "at_node"): of_node,
     (sums, "_clear_record"): of_record,
 }
