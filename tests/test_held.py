@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 import pytest
 from numba import config, typeof
+from numba.core.registry import cpu_target
 
-from karamelo_py.compiler.compile import entered, kernel, subkernel
+from karamelo_py.compiler import packed
+from karamelo_py.compiler.compile import entered, kernel, loop, subkernel
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.held import at_hand, held_type, hold, is_held
+from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 
 
 class Pair(NamedTuple):
@@ -81,6 +85,93 @@ def test_python_and_kernels_enter_alike():
     off = setup(False)
     _from_anywhere(off)
     assert not off.pair.b.any()
+
+
+class Mixed(NamedTuple):
+    on: bool
+    half: np.float32
+    pair: tuple
+    array: np.ndarray
+    none: None
+    small: np.int32
+    inner: tuple
+
+
+@loop
+def _of_python(mixed, whole, out):
+    out[0] = mixed.half if mixed.on else 0.0
+    out[1] = mixed.pair[0] + 10 * mixed.pair[1][1]
+    for i in range(mixed.array.shape[0]):
+        for j in range(mixed.array.shape[1]):
+            out[2 + 2 * i + j] = mixed.array[i, j]
+    out[6] = mixed.small + mixed.inner[0].a[0] + whole
+    return mixed.none is None, out.size
+
+
+def test_python_writes_what_kernels_hold():
+    """Numbers of all widths beside each other, arrays with gaps between their rows."""
+    gaps = np.arange(12.0).reshape(3, 4)[::2, ::3]
+    inner = (Pair(np.full(1, 0.5), np.zeros(0)),)
+    mixed = Mixed(True, np.float32(0.25), (3, (1, 2.0)), gaps, None, np.int32(-7), inner)
+    for whole in (1, 2):
+        out = np.zeros(8)
+        assert _of_python(mixed, whole, out) == (True, 8)
+        assert out.tolist() == [0.25, 23.0, 0.0, 3.0, 8.0, 11.0, whole - 6.5, 0.0]
+    out = np.zeros(8)
+    _of_python(mixed._replace(on=False, pair=(np.float32(3), (True, 2))), 1, out)
+    assert out[:2].tolist() == [0.0, 23.0]
+
+
+def test_memory_that_moves_is_noticed():
+    """NumPy resizes no array in place that kernels know, and they learn where it is afterwards."""
+    out = np.zeros(8)
+    mixed = Mixed(True, np.float32(1), (3, (1, 2.0)), np.eye(2), None, np.int32(0), ())
+    mixed = mixed._replace(inner=(Pair(np.zeros(1), np.zeros(0)),))
+    assert _of_python(mixed, 1, out)[1] == 8
+    if not config.DISABLE_JIT:
+        with pytest.raises(ValueError, match="resize"):
+            out.resize(100_000, refcheck=False)
+    packed.forget(out)
+    out.resize(100_000, refcheck=False)
+    out[:] = 0.0
+    assert _of_python(mixed, 1, out)[1] == 100_000
+    assert out[0] == 1.0
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_types_are_laid_as_llvm_lays_them():
+    target = cpu_target.target_context
+    data = target.codegen().target_data
+    inner = (Pair(np.full(1, 0.5), np.zeros(0)),)
+    values = Mixed(True, np.float32(1), (3, (1, 2.0)), np.eye(2), None, np.int32(0), inner)
+    for value in (values, setup(), (True, (True, 1.5)), (np.float32(1), np.int8(2))):
+        for kind in (typeof(value), held_type(typeof(value))):
+            model = target.data_model_manager[kind].get_data_type()
+            model = getattr(model, "pointee", model)
+            end, aligned = packed._lay(model, 0, [])
+            size = -(-end // aligned) * aligned
+            assert size == model.get_abi_size(data)
+
+
+def _count_up(out, factor, k):
+    out.a[k] += factor * k
+
+
+_counted = shared_out(subkernel(_count_up), "out, factor")
+
+
+@entered
+def _count_all(mode, out, factor):
+    _counted(mode, out.a.size, out, factor)
+
+
+@pytest.mark.parametrize("mode", [Serial(), Threaded()], ids=["serial", "threaded"])
+def test_each_number_is_done_once(mode):
+    """By one thread or by several, with the same arguments."""
+    numba.set_num_threads(min(2, config.NUMBA_NUM_THREADS))
+    out = Pair(np.zeros(1000), np.zeros(1))
+    _count_all(mode, out, 2.0)
+    assert out.a.tolist() == [2.0 * k for k in range(1000)]
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

@@ -9,10 +9,19 @@ import numba
 import pytest
 from llvmlite.binding import ffi
 from numba import config, njit, types
-from numba.core import base, caching, ccallback, codegen, compiler, dispatcher, targetconfig
+from numba.core import (
+    base,
+    caching,
+    callconv,
+    ccallback,
+    codegen,
+    compiler,
+    dispatcher,
+    targetconfig,
+)
 from numba.core.typing import context, templates
 
-from karamelo_py.compiler import inlining
+from karamelo_py.compiler import inlining, lean
 from karamelo_py.compiler.compile import entered, kernel, shared
 from karamelo_py.kernels import contact, heat  # noqa: F401  (with all that they stand on)
 
@@ -110,6 +119,9 @@ INSIDE = {
     ffi._LLVMLock: "674e02dc78ae",
     context.BaseContext._lookup_global: "08d354cbcacf",
     templates.make_overload_template: "7f6974584cb1",
+    lean._implementation: "4e27d07b214c",
+    dispatcher._DispatcherBase.get_call_template: "f15b62d0e9c0",
+    callconv.CPUCallConv: "2840bb216163",
     templates.fold_arguments: "a3806ed4b7d1",
     templates.AbstractTemplate.apply: "8c5f7129b8f3",
     types.Function.get_call_type: "6559c167bfc0",

@@ -21,6 +21,7 @@ from karamelo_py.compiler.compile import (
     shared,
 )
 from karamelo_py.compiler.held import hold
+from karamelo_py.language.faults import cause_of
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -219,6 +220,25 @@ def test_a_mistake_is_told_by_numba():
 
     with pytest.raises(Exception, match="nth"):
         kernel(caller)(1.0)
+
+
+@shared
+def both(x):
+    """A comprehension, which Numba does not know, behind a branch, which only a run decides."""
+    if x > 0:
+        return tuple(k * x for k in (1.0, 2.0))
+    return x, x
+
+
+def test_a_branch_that_leaves_a_function_to_numba_is_named():
+    def caller(x):
+        return both(x)
+
+    with pytest.raises(Exception) as raised:  # of Numba
+        kernel(caller)(1.0)
+    line = both.__code__.co_firstlineno + 3
+    words = f"(Numba compiles what branches: line {line}, 'if x > 0:')"
+    assert cause_of(raised.value).endswith(words)
 
 
 @shared

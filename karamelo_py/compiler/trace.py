@@ -21,10 +21,12 @@ import dis
 import functools
 import inspect
 import operator
+import os
 import types as python
 from collections import namedtuple
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager
+from traceback import walk_tb
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -519,6 +521,7 @@ class _Formula(NamedTuple):
 
 
 _formulas: dict[tuple, _Formula | None] = {}
+_asking: dict[python.CodeType, int] = {}  # of functions left to Numba: the line that is why
 
 
 def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
@@ -527,9 +530,11 @@ def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
     if key not in _formulas:
         _formulas[key] = None  # of one that calls itself
         lowering = _Lowering(typing)
+        chosen = None
         try:
             with _at_work(lowering), parts_noted() as parts:
-                run = _copied(_chosen(dispatch, kinds))
+                chosen = _chosen(dispatch, kinds)
+                run = _copied(chosen)
                 note([run.__code__])
                 result = run(*(lowering.wrapped(kind, None) for kind in kinds))
                 result = types.unliteral(lowering.kind_of(result))
@@ -538,12 +543,25 @@ def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
             if hasattr(dispatch, "tags"):
                 parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
             _formulas[key] = _Formula(run, result, frozenset(parts))
-        except (Exception, Untraceable):  # Numba tells what is wrong, if it is
-            pass
+        except (Exception, Untraceable) as why:  # Numba tells what is wrong, if it is
+            code = getattr(chosen, "__code__", None)
+            lines = [k for frame, k in walk_tb(why.__traceback__) if frame.f_code is code]
+            if lines:
+                _asking[code] = lines[-1]
     found = _formulas[key]
     if found is not None:
         note(found.parts)
     return found
+
+
+def line_that_asks(file: str, line: int) -> int | None:
+    """The line for which the function at a place was not run, but left to Numba."""
+    file = os.path.realpath(file)
+    for code, asking in _asking.items():
+        lines = (k for _, _, k in code.co_lines())
+        if line in lines and os.path.realpath(code.co_filename) == file:
+            return asking
+    return None
 
 
 def forget() -> None:

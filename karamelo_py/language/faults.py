@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import linecache
 import re
 import sysconfig
 import traceback
@@ -14,6 +15,7 @@ from typing import Any
 from numba.core.errors import NumbaError
 
 from karamelo_py.compiler.compile import Undefined
+from karamelo_py.compiler.trace import line_that_asks
 from karamelo_py.language import registry
 from karamelo_py.script.errors import Place, Quit, ScriptError
 
@@ -85,8 +87,16 @@ def cause_of(error: Exception) -> str:
     if not is_of_numba(error):
         return f"{type(error).__name__}: {error}"
     text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
-    causes = (line.strip() for line in text.splitlines() if not line.startswith("Failed in "))
-    return f"Numba cannot compile it: {next(filter(None, causes), type(error).__name__)}"
+    inner = text.rpartition("raised a specific error:")[2] or text
+    lines = (line.strip() for line in inner.splitlines())
+    causes = (line for line in lines if line and not re.match(r"(\w+: )?Failed in ", line))
+    text = f"Numba cannot compile it: {next(causes, type(error).__name__)}"
+    for file, line in places_of(error):
+        asking = line_that_asks(file, line)
+        if asking is not None:
+            what = linecache.getline(file, asking).strip()
+            return f"{text} (Numba compiles what branches: line {asking}, '{what}')"
+    return text
 
 
 def places_of(error: Exception) -> list[tuple[str, int]]:

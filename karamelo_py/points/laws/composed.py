@@ -10,7 +10,7 @@ from math import sqrt
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import choose, point_function, real, shared
-from karamelo_py.compiler.tuples import either, following, leading, plus, scale
+from karamelo_py.compiler.tuples import either, following, leading, plus
 from karamelo_py.points.kinematics import after_symmetric, von_mises
 from karamelo_py.points.laws import Absent, specific_volume
 from karamelo_py.points.laws.damages import damage_after, initial_damage, integrity
@@ -91,7 +91,7 @@ def intact_pressure(law, j, m):
 def full_pressure(law, j, m):
     """The pressure in the stress: damage takes of tension, not of compression."""
     p = intact_pressure(law, j, m)
-    return plus(choose(p < 0, borne(law.damage, m.damage, p), p), m.viscous)
+    return plus(choose(p < 0, p * borne_share(law.damage, m.damage, p), p), m.viscous)
 
 
 @shared
@@ -137,33 +137,18 @@ def _(viscosity, law, j, m, squared, density):
 
 
 @point_function()
-def borne(damage, memory, x):
-    """The share of a number that the damaged material bears: (1 - D) x."""
+def borne_share(damage, memory, like):
+    """The share of a stress or energy that the damaged material bears, 1 - D."""
 
 
-@borne.on(Absent)
-def _(damage, memory, x):
-    return x
+@borne_share.on(Absent)
+def _(damage, memory, like):
+    return real(1, like)
 
 
-@borne.otherwise
-def _(damage, memory, x):
-    return x * integrity(damage, memory)
-
-
-@point_function()
-def nominal(damage, memory, s):
-    """The deviatoric stress that damage leaves, (1 - D) s."""
-
-
-@nominal.on(Absent)
-def _(damage, memory, s):
-    return s
-
-
-@nominal.otherwise
-def _(damage, memory, s):
-    return scale(integrity(damage, memory), s)
+@borne_share.otherwise
+def _(damage, memory, like):
+    return integrity(damage, memory)
 
 
 @point_function()

@@ -13,8 +13,8 @@ from __future__ import annotations
 from math import log
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, real
-from karamelo_py.compiler.tuples import added, increased, plus
+from karamelo_py.compiler.compile import choose, real, shared
+from karamelo_py.compiler.tuples import added, increased, plus, scale
 from karamelo_py.points.kinematics import (
     add_pressure,
     deviator,
@@ -51,13 +51,12 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.points.laws.composed import (
     Memory,
-    borne,
+    borne_share,
     broken_further,
     full_pressure,
     intact_pressure,
     lossless,
     memory_of,
-    nominal,
     released,
     slowed_by_viscosity,
     state_of,
@@ -187,7 +186,7 @@ def _(law, kin, state, dl, dt):
     strain = symmetric_part(kin, dl)
     old = spin(kin, dl, leading_symmetric(kin, state[1:]))
     s, memory, work = respond(law.strength, law, kin, old, strain, j, m, dt)
-    work = borne(law.damage, m.damage, j * work)
+    work = j * work * borne_share(law.damage, m.damage, work)
     viscous = viscous_after(law.viscosity, law, j, m, trace(strain) / dt)
     viscous_work = plus(j - j, viscous) * (before - j)
     energy = compressed(law.eos, m.energy, before, j, work + viscous_work)
@@ -202,10 +201,17 @@ def _(law, kin, state, dl, dt):
     return state_of(j, s, Memory(energy, viscous, broken, heat, loss, memory, further))
 
 
+@shared
+def stress_left(law, kin, m, state):
+    """The deviatoric stress that damage leaves, (1 - D) s."""
+    s = leading_symmetric(kin, state[1:])
+    return scale(borne_share(law.damage, m.damage, s[0]), s)
+
+
 @cauchy_stress.on(EosStrength)
 def _(law, kin, state):
     m = memory_of(law, kin, state)
-    s = nominal(law.damage, m.damage, leading_symmetric(kin, state[1:]))
+    s = stress_left(law, kin, m, state)
     return add_pressure(kin, real(1, state[0]), s, -full_pressure(law, state[0], m))
 
 
@@ -213,7 +219,7 @@ def _(law, kin, state):
 def _(law, kin, state):
     j = state[0]
     m = memory_of(law, kin, state)
-    s = nominal(law.damage, m.damage, leading_symmetric(kin, state[1:]))
+    s = stress_left(law, kin, m, state)
     return add_pressure(kin, j, s, -j * full_pressure(law, j, m))
 
 
@@ -246,9 +252,10 @@ def _(law, kin, state):
     volume -= stored_heat(law.eos, plus(j - j, m.loss))
     volume += plus(j - j, thermal_pressure(law.temperature, m.heat)) * (real(1, j) - j)
     tension = intact_pressure(law, j, m) < 0
-    volume = choose(tension, borne(law.damage, m.damage, volume), volume)
+    share = borne_share(law.damage, m.damage, j)
+    volume = choose(tension, share * volume, volume)
     shear = shear_energy(law.strength, kin, leading_symmetric(kin, state[1:]))
-    return volume + j * borne(law.damage, m.damage, shear)
+    return volume + j * (share * shear)
 
 
 @dissipated_energy.on(EosStrength)
@@ -296,7 +303,7 @@ def _(law):
 @damage.on(EosStrength)
 def _(law, kin, state):
     one = real(1, state[0])
-    return one - borne(law.damage, memory_of(law, kin, state).damage, one)
+    return one - borne_share(law.damage, memory_of(law, kin, state).damage, one)
 
 
 @damage_initiation.on(EosStrength)
