@@ -14,12 +14,14 @@ LINES = cycler(color=look.PALETTE[1:7]) + cycler(linestyle=look.DASHES)
 STYLE = {"axes.prop_cycle": LINES, "legend.fontsize": 7, "legend.frameon": False}
 
 
-def coloured(axes: Any, x: Any, y: Any, values: Any, name: str, **words: Any) -> None:
-    """Points in the colours of a value, and beside them what the colours mean."""
+def coloured(
+    axes: Any, x: Any, y: Any, values: Any, name: str, bar: float = 0.04, **words: Any
+) -> None:
+    """Points in the colours of a value, and a bar (so wide) that says what the colours mean."""
     points = axes.scatter(x, y, c=values, linewidths=0, **words)
-    bar = axes.figure.colorbar(points, cax=axes.inset_axes((1.03, 0, 0.04, 1)))
-    bar.set_label(name, fontsize=8)
-    bar.ax.tick_params(labelsize=7)
+    scale = axes.figure.colorbar(points, cax=axes.inset_axes((1 + 0.75 * bar, 0, bar, 1)))
+    scale.set_label(name, fontsize=8)
+    scale.ax.tick_params(labelsize=7)
 
 
 def finish(axes: Any, title: str) -> None:
