@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -85,6 +86,41 @@ def test_compiled_in_the_plane(tmp_path):
     same_files(one, two)
 
 
+# Few points are shared out, too, in tiles of few cells.
+SMALL_TILES = """
+from karamelo_py.run import tiles
+tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 4, 3: 2}
+"""
+# Every method: contact, heat, mesh, damage, axisymmetry, one to three dimensions.
+DOZEN = {
+    "two_disks": 20, "sod": 1, "heat_slab": 1, "column": 1, "dam_break": 0.4, "cantilever": 0.5,
+    "granular_column": 0.4, "elastic_gate": 0.5, "shear_heating": 1, "disk_impact": 0.4,
+    "cold_spray_axisymmetric": 0.5, "axis_aligned_3d": 0.5, "taylor_bar": 0.4, "hertz": 0.5,
+}  # fmt: skip
+
+
+@needs_mpi
+@pytest.mark.full
+@pytest.mark.parametrize("name", DOZEN)
+def test_scenes(tmp_path, name):
+    """The same bytes from 1 to 4 processes with 1 and 2 threads."""
+    (tmp_path / "sitecustomize.py").write_text(SMALL_TILES, encoding="utf-8")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    text = (INPUTS / f"in.{name}").read_text(encoding="utf-8")
+    every = "set_output(5)\nrestart(10, r.*.h5)\ndump(every, all, particle, 10, every.txt, x, vx)\n"
+    text = re.sub(r"^run\w*\(.*$", every + "run(30)", text, flags=re.M)
+    (tmp_path / "in.script").write_text(text, encoding="utf-8")
+    size = "N" if name == "two_disks" else "refine"
+    for ranks, threads in product((1, 2, 3, 4), (1, 2)):
+        words = ("-var", size, str(DOZEN[name]), "--threads", str(threads))
+        folder = tmp_path / f"{ranks}x{threads}"
+        found = by_ranks(
+            folder, tmp_path / "in.script", ranks, *words, compiled=True, PYTHONPATH=folders
+        )
+        assert found[0] == 0, found[2]
+        same_files(tmp_path / "1x1", folder)
+
+
 @needs_mpi
 @pytest.mark.full
 def test_bench(tmp_path):
@@ -114,16 +150,11 @@ def test_a_wrong_script(tmp_path):
 
 @needs_mpi
 def test_started_by_mpiexec(tmp_path):
-    """What it adds at the end is its own; no more than one message is ours."""
+    """One output, without the codes of a terminal that mpiexec pretends to be."""
     path = script(tmp_path, "run(2)")
-    words = [MPIEXEC, "-n", "2", *PROGRAM, str(path)]
-    process = started(tmp_path / "well", *words, **OPEN_MPI)
+    process = started(tmp_path, MPIEXEC, "-n", "2", *PROGRAM, str(path), **OPEN_MPI)
     out, err = process.communicate(timeout=300)
     assert process.returncode == 0 and out.count("Run finished") == 1 and "\x1b" not in out, err
-    process = started(tmp_path / "wrong", *words, "--ranks", "3", **OPEN_MPI)
-    out, err = process.communicate(timeout=300)
-    assert process.returncode == 1 and err.count("error: ") == 1
-    assert "--ranks 3: mpiexec has started 2 processes" in err
 
 
 def running(folder: Path, *lines: str, **more: str) -> subprocess.Popen:
@@ -185,7 +216,10 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
 
 
 @needs_mpi
-@pytest.mark.parametrize("function", ["ranks.Ranks.go", "shares.SharedTiles.exchange"])
+@pytest.mark.parametrize(
+    "function",
+    [pytest.param("ranks.Ranks.go", marks=pytest.mark.full), "shares.SharedTiles.exchange"],
+)
 def test_only_one_fails(tmp_path, function):
     """In its steps, and in what kernels ask for: the others end, too."""
     (tmp_path / "sitecustomize.py").write_text(BREAKS.format(function), encoding="utf-8")
@@ -212,6 +246,8 @@ def test_without_mpi4py(tmp_path, monkeypatch, capsys):
     assert main([path]) == 1
     err = capsys.readouterr().err
     assert err.startswith("error: several processes of one scene need mpi4py") and hint in err
+    assert main([path, "--ranks", "3"]) == 1
+    assert "error: --ranks 3: mpiexec has started 2 processes" in capsys.readouterr().err
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
     monkeypatch.setattr(sys, "stdout", sys.stdout)
     monkeypatch.setattr(sys, "stderr", sys.stderr)
