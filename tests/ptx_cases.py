@@ -1,0 +1,247 @@
+"""All that is done at a point or a node compiles for a GPU, and stays in its registers.
+
+Without a GPU: that scenes run on one, and how fast, nobody has seen.
+"""
+
+from __future__ import annotations
+
+import re
+from inspect import getmodule, isfunction, signature
+
+import numpy as np
+import pytest
+from combinations import BASES, MESHED, fits, scene, write_mesh
+
+from karamelo_py.compiler.fields import field
+from karamelo_py.kernels import nodes
+from karamelo_py.kernels.contact import stay_node, touch_node
+from karamelo_py.kernels.hooks import CompiledHook
+from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.nodes import KeepLoss
+from karamelo_py.language import registry
+from karamelo_py.language.docstrings import sections
+
+REASON = "needs numba-cuda and NVIDIA's compiler libraries: pip install 'karamelo-py[gpu]'"
+pathfinder = pytest.importorskip("cuda.pathfinder", reason=REASON)
+pytest.importorskip("numba_cuda", reason=REASON)
+try:
+    pathfinder.load_nvidia_dynamic_lib("nvvm")
+    pathfinder.load_nvidia_dynamic_lib("nvJitLink")
+except pathfinder.DynamicLibNotFoundError:
+    pytest.skip(REASON, allow_module_level=True)
+
+from ptx import calling, compiled, compiled_sum, compiled_visit, setup_of, visit_node, visits_of  # noqa: E402
+
+full = pytest.mark.full
+both = pytest.mark.parametrize("kinematics", ["plane", "space"])
+
+# Eight corners, with all that a point knows of each, are more than a thread's registers in doubles.
+IN_SINGLES = ("R8", "H8")
+
+
+def in_registers(made, library: bool = False) -> bool:
+    """Whether a thread keeps all it knows in registers, and calls nothing.
+
+    With `library` it may call what NVIDIA's library of mathematics calls itself.
+    """
+    called = re.findall(r"\bcall(?:\.uni)?\s+(?:\(\w+\),\s*)?(\w+)", made.ptx)
+    assert len(called) == len(re.findall(r"\bcall\b", made.ptx))
+    assert all(library and name.startswith("__internal_") for name in called), called
+    assert library or not re.search(r"\.local\b", made.ptx)
+    assert made.stack == made.spilled == 0, (made.stack, made.spilled, made.registers)
+    return True
+
+
+def visits_stay_in_registers(script: str, in_stages: bool = False, library: bool = False) -> None:
+    """Visits of the points, and what sums at the nodes what points gave."""
+    setup, scheme = setup_of(script)
+    visits = visits_of(setup, scheme, in_stages)
+    assert visits
+    for visit in visits:
+        assert in_registers(compiled_visit(visit, setup), library), visit
+        if visit.quantities:
+            assert in_registers(compiled_sum(visit, setup)), visit
+
+
+def warm(script: str, *numbers: float) -> str:
+    """The scene with these numbers of heat in its material: capacity, conductivity."""
+    return re.sub(r"(material\(.*)\)", rf"\1, {', '.join(map(str, numbers))})", script)
+
+
+def example_of(family: str, name: str) -> str:
+    """The words of `method` in the manual of a style."""
+    text = sections(registry.find(family, name).__doc__)[1]["Example"]
+    return re.search(r"^method\((.*)\)$", text, re.MULTILINE)[1]
+
+
+def test_step():
+    """One of what follows."""
+    visits_stay_in_registers(scene("plane", "ulmpm", "quadratic-spline", "", "MLS", "musl"))
+
+
+def test_all_are_tried():
+    """Bases and methods as combinations; the other styles are those of the registry."""
+    kinds, bases, options = map(set, zip(*BASES, strict=True))
+    assert kinds == set(registry.names("method"))
+    assert bases == set(registry.names("basis"))
+    styles = [("method", kind) for kind in kinds] + [("basis", basis) for basis in bases]
+    variants = [getattr(registry.find(*style), "variants", {}) for style in styles]
+    assert options == {"", *(name for names in variants for name in names)}
+
+
+@full
+@both
+@pytest.mark.parametrize("base", BASES, ids=" ".join)
+def test_bases(kinematics, base, tmp_path):
+    """Each with gather and scatter in one visit."""
+    option = base[2]
+    if not fits(kinematics, option):
+        pytest.skip("no such domains with this kinematics")
+    mesh = write_mesh(tmp_path / "m.vtk", MESHED[option]) if option in MESHED else None
+    script = scene(kinematics, *base, "FLIP", "usl", mesh=mesh)
+    visits_stay_in_registers("precision(single)\n" * (option in IN_SINGLES) + script)
+
+
+@full
+@both
+@pytest.mark.parametrize("transfer", registry.names("transfer"))
+def test_transfers(kinematics, transfer):
+    words = example_of("transfer", transfer).split(", ")
+    words[0], words[2] = "tlmpm", "linear"
+    script = scene(kinematics, "tlmpm", "linear", "", "FLIP", "usl")
+    visits_stay_in_registers(
+        re.sub(r"^method\(.*$", f"method({', '.join(words)})", script, flags=re.MULTILINE)
+    )
+
+
+@full
+@both
+@pytest.mark.parametrize("name", registry.names("scheme"))
+def test_schemes(kinematics, name):
+    """Fused and staged."""
+    script = scene(kinematics, "ulmpm", "linear", "", "FLIP", name)
+    visits_stay_in_registers(script, in_stages=True)
+
+
+@full
+@both
+def test_averaged_volumes(kinematics):
+    script = scene(kinematics, "ulmpm", "linear", "", "FLIP", "musl")
+    visits_stay_in_registers(script.replace("region(", "anti_volumetric_locking(true)\nregion("))
+
+
+# --- laws: those of the examples in their manuals ---------------------------------------------
+
+EOS = "eos(e, linear, 7850, 160e9)"
+STRENGTH = "strength(s, plastic, 80e9, 400e6, 100e6)"
+SHOCK = "eos(e, shock, 8940, 110e9, 3933, 1.5, 1.99, 385, 294, 1.5, 0.06)"
+FLOW = "strength(s, johnson_cook, 46e9, 90e6, 292e6, 0.31, 1, 0.025, 1.09, 298, 1356)"
+
+
+def examples(family: str, ID: str) -> dict[str, str]:
+    """Commands that make every style of a family, under one name."""
+    found = {}
+    for name in registry.names(family):
+        text = sections(registry.find(family, name).__doc__)[1]["Example"]
+        lines = re.findall(rf"^{family}\(\w+(,.*)$", text, re.MULTILINE)
+        assert lines, name
+        for k, rest in enumerate(lines):
+            found[f"{family} {name} {k}"] = f"{family}({ID}{rest}"
+    return found
+
+
+def laws() -> dict[str, list[str]]:
+    """Commands that make the material `rubber`, with each law and each part of one."""
+    composed = "material(rubber, eos-strength, e, s)"
+    found = {
+        name: [line]
+        for name, line in examples("material", "rubber").items()
+        if "eos-strength" not in name
+    }
+    found |= {name: [line, STRENGTH, composed] for name, line in examples("eos", "e").items()}
+    found |= {name: [EOS, line, composed] for name, line in examples("strength", "s").items()}
+    for family in ("damage", "temperature"):
+        for name, line in examples(family, "o").items():
+            found[name] = [SHOCK, FLOW, line, composed.replace("s)", "s, o)")]
+    return found
+
+
+LAWS = laws()
+
+
+@full
+@both
+@pytest.mark.parametrize("law", LAWS)
+def test_laws(kinematics, law):
+    script = scene(kinematics, "ulmpm", "linear", "", "FLIP", "usl")
+    visits_stay_in_registers(
+        re.sub(r"^material\(.*$", "\n".join(LAWS[law]), script, flags=re.MULTILINE),
+        library=law.startswith("strength formula"),  # which knows every function
+    )
+
+
+@full
+@both
+def test_heat(kinematics):
+    """Conduction between points."""
+    script = scene(kinematics, "ulmpm", "linear", "", "FLIP", "usl")
+    visits_stay_in_registers(warm(script.replace("0.98)", "0.98, thermo-mechanical)"), 460, 45))
+
+
+@full
+@both
+def test_loss(kinematics):
+    """Kinetic energy that a transfer takes heats a gas."""
+    script = scene(kinematics, "ulmpm", "linear", "", "TPIC", "usl")
+    gas = "\n".join(LAWS["eos ideal-gas 0"]).replace(STRENGTH, "strength(s, fluid, 0)")
+    script = re.sub(r"^material\(.*$", gas, script, flags=re.MULTILINE)
+    assert field(setup_of(script)[0].nodes.fields, Lost) is not None
+    visits_stay_in_registers(script)
+
+
+@full
+@both
+def test_contact(kinematics):
+    """With friction, which heats."""
+    script = warm(scene(kinematics, "ulmpm/contacts", "linear", "", "FLIP", "musl"), 460, 0)
+    other = re.search(r"^region\((?:.|\n)*?^solid\(.*$", script, re.MULTILINE)[0]
+    other = other.replace("box", "rest").replace("body", "other")
+    rubs = "fix(rub, contact/friction, body, other, 0.3)\nset_dt"
+    script = script.replace("set_dt", f"{other}\n{rubs}")
+    visits_stay_in_registers(script)
+    s, _ = setup_of(script)
+    assert field(s.nodes.fields, Rubbed) is not None
+    touched = compiled(touch_node, s.contact, s.kin, s.grids, s.nodes, s.control, 0)
+    assert in_registers(touched)
+    assert in_registers(compiled(stay_node, s.contact, s.kin, s.nodes, 1, 0))
+
+
+@full
+@both
+def test_nodes(kinematics):
+    """Every task at a node, with all fields that they know."""
+    script = scene(kinematics, "ulmpm", "linear", "", "XPIC", "usl")
+    script = script.replace("region(", "anti_volumetric_locking(true)\nregion(")
+    setup, _ = setup_of(script)
+    lost = Lost(np.zeros((len(setup.nodes.sums), 2)))  # of gases
+    setup = setup._replace(nodes=setup.nodes._replace(fields=(*setup.nodes.fields, lost)))
+    tasks = [kind for kind in vars(nodes).values() if hasattr(kind, "goes_through")]
+    assert KeepLoss in tasks
+    for task in tasks:
+        made = task(*(1.0,) * len(task._fields))
+        assert in_registers(compiled(visit_node, made, setup.kin, setup.nodes, 0, 1.0)), task
+
+
+@full
+@pytest.mark.parametrize("name", registry.names("fix"))
+def test_hooks(name):
+    """What the fixes do at a point or a node, and what they have beside it with the same words."""
+    fix = registry.find("fix", name)
+    hooks = [h.function for h in vars(fix).values() if isinstance(h, CompiledHook)]
+    if not hooks:
+        pytest.skip("does nothing in a step, or does it in Python")
+    words = {tuple(signature(hook).parameters) for hook in hooks}
+    beside = [f for f in vars(getmodule(fix)).values() if isfunction(f)]
+    for function in {*hooks, *(f for f in beside if tuple(signature(f).parameters) in words)}:
+        numbers = (1.0,) * len(signature(function).parameters)
+        assert in_registers(compiled(calling(function, len(numbers)), np.zeros(4), *numbers))
