@@ -78,18 +78,18 @@ class _Builder:
         self.programs.append([*programs, self._program(fix.wall_friction)])
         self.on_points |= not hook.on_nodes
         if hook.holds:
-            self.holding.append(fix.group)
+            self.holding.append(fix)
 
     def shared_nodes(self) -> int:
         """The number of nodes, where hooks hold some of them in common; else 0."""
-        groups = self.holding
-        if len(groups) < 2:
+        fixes = self.holding
+        if len(fixes) < 2:
             return 0
-        if not any(group.all for group in groups):
-            nodes = np.concatenate([group.nodes for group in groups])
+        if not any(fix.group.all for fix in fixes):
+            nodes = np.concatenate([fix.nodes for fix in fixes])
             if len(np.unique(nodes)) == len(nodes):
                 return 0
-        return groups[0].total()
+        return fixes[0].group.total()
 
     def _members(self, fix: Any, hook: CompiledHook) -> tuple[int, int]:
         if fix.group.all:
