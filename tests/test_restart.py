@@ -75,7 +75,7 @@ def goes_on(run, script: str, *, files: int = 1) -> Path:
         shutil.rmtree(again, ignore_errors=True)
         shutil.copytree(whole, again)
         said = run(script, "-restart", file.name, folder="again")
-        assert "gone on with at step" in said.out
+        assert "continued from step" in said.out
         same_files(whole, again)
     return whole
 

@@ -61,6 +61,10 @@ def test_what_cancels_leaves_what_is_small():
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
 def test_a_term_that_is_no_number_is_seen(wrong):
     assert np.isnan(total_of([1.0, wrong]))
+    for terms in ([wrong], [0.0, wrong], [wrong, 1.0]):
+        totals = np.zeros((1, LIMBS), np.int64)
+        add_blocks(totals, np.array(terms), 2)
+        assert np.isnan(rounded(totals[0]))
 
 
 @given(

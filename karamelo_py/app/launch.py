@@ -45,6 +45,7 @@ PAUSE = 0.05  # seconds between two looks at mpiexec
 GRACE = 2.0  # seconds that processes have to end after it
 AT_ONCE = 3  # so many signals end all without waiting for the step
 LONGEST_NAME = 90  # of a socket
+A_CORE = 16  # processes at most: who asks for more means another number
 
 
 def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.start") -> int:
@@ -53,8 +54,14 @@ def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.
     Raises
     ------
     ScriptError
-        If there is no mpiexec, or no mpi4py.
+        If there is no mpiexec, or no mpi4py, or not the cores for so many.
     """
+    cores = os.cpu_count() or 1
+    if ranks > A_CORE * cores:
+        raise ScriptError(
+            f"--ranks {ranks}: this machine has {cores} cores",
+            hint=f"--ranks {cores}, or mpiexec with a list of machines",
+        )
     beside = Path(sys.executable).parent / "mpiexec"
     mpiexec = str(beside) if beside.exists() else shutil.which("mpiexec")
     if not hasattr(socket, "send_fds"):

@@ -55,7 +55,7 @@ from karamelo_py.kernels.arrays import (
     of_force,
     of_momentum,
 )
-from karamelo_py.kernels.totals import WORK, add_many, add_to, counts, number_of_all, publish
+from karamelo_py.kernels.totals import WORK, add_many, add_to, carry, counts, number_of_all, publish
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.heat import face
@@ -323,6 +323,7 @@ def clear_total(hooks, h, control):
 @subkernel
 def publish_total(hooks, h, control):
     """Publish the totals of a hook."""
+    carry(control.totals[WORK])  # it grows from step to step
     slot = hooks.table[h].slot
     rubs = hooks.programs[h, FRICTION].begin >= 0
     first, last = 3, -1

@@ -2,8 +2,8 @@
 
 A total is a fixed-point number as wide as the range of double precision, in limbs of 32 bits with
 room for carries: every term is added without rounding, so that points and nodes may be shared out
-in any way. A published total is rounded once (Kulisch 1971; Neal 2015, "Fast exact summation using
-small and large superaccumulators").
+in any way. A published total is right within a unit of its last digit (Kulisch 1971; Neal 2015,
+"Fast exact summation using small and large superaccumulators").
 """
 
 from __future__ import annotations
@@ -59,12 +59,13 @@ def add_many(totals, row, terms, count):
 
     They are sums of whole numbers of two sizes, but for terms 2^30 times smaller than the largest.
     """
-    largest = 0.0
+    largest = odd = 0.0
     for q in range(count):
         largest = max(largest, abs(terms[q]))
-    if largest == 0.0:
+        odd += 0.0 * terms[q]  # NaN where a term is no number
+    if largest == 0.0 and odd == 0.0:
         return
-    if not COARSE < largest < FINE:
+    if not (COARSE < largest < FINE and odd == 0.0):
         for q in range(count):
             add_to(totals, row, terms[q])
         return

@@ -20,7 +20,7 @@ INSTALL = "pip install 'karamelo-py[mpi]'"
 LAUNCHED = (
     ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
     ("PMI_SIZE", "PMI_RANK"),
-    ("MPI_LOCALNRANKS", "MPI_LOCALRANKID"),
+    ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"),
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
 )
 # Words at a meeting beside those of runs, which are above zero.
@@ -69,12 +69,14 @@ class Crew:
         if world is None:
             try:
                 from mpi4py import MPI
+                from mpi4py.util import pkl5
             except (ImportError, RuntimeError) as error:
                 raise ScriptError(
                     f"several processes of one scene need mpi4py, which does not load: {error}",
                     hint=INSTALL,
                 ) from None
-            world = MPI.COMM_WORLD
+            # Its messages may be longer than 2 GB.
+            world = pkl5.Intracomm(MPI.COMM_WORLD)
         self.world = world
         self.rank, self.size = world.Get_rank(), world.Get_size()
         self._aside = world.Dup()  # where they meet, whatever is under way elsewhere

@@ -29,7 +29,7 @@ from karamelo_py.run.shares import SharedTiles, joined, sized
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.state import changing, of_nodes, remembered_at, take_points, take_tiling
-from karamelo_py.run.tiles import Tiles, in_tiles, in_use, numbers, shares_of, used
+from karamelo_py.run.tiles import DIRECT_UP_TO, Tiles, in_tiles, in_use, numbers, shares_of, used
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
@@ -55,6 +55,7 @@ class Ranks(Simulation):
         self._leading = False
         self._stepping = False  # arrays are those of the part
         self._at_work = False  # steps are taken
+        self._joint = False  # all processes do the same, and wait for each other
         self._kept: dict[str, np.ndarray] = {}
         self._prepared = False
         self._bare = False
@@ -76,8 +77,9 @@ class Ranks(Simulation):
             self._whole = whole._replace(control=self.control, contact=self._whole.contact)
         if not self._shown:
             if self._leading:
-                self._tell("gather")
-            self.gather(everywhere=not self._leading)
+                self._together("gather")
+            else:
+                self.gather(everywhere=True)
         return self._whole
 
     @setup.setter
@@ -139,6 +141,12 @@ class Ranks(Simulation):
     def _part(self, s: Setup) -> None:
         self._parted.setup = s
 
+    @property
+    def processes(self) -> dict[str, str]:
+        """What a banner says of those that share the scene."""
+        alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
+        return {"processes": f"{self.crew.size}{alone if self.tiles.direct else ''}"}
+
     # --- leading and following --------------------------------------------------------------------
 
     @property
@@ -157,11 +165,15 @@ class Ranks(Simulation):
             well = True
         finally:
             self._leading = False
-            more = well and self.hub.interpreter.has_more
-            self.crew.told((OVER, well, self._prepared, more, self.hub.values.array))
-            if self._prepared and more:
-                self._shown = False
-                self.gather(everywhere=True)
+            if self._joint:
+                # In the midst of what all do together: the others would wait for ever.
+                self.crew.amid = True
+            else:
+                more = well and self.hub.interpreter.has_more
+                self.crew.told((OVER, well, self._prepared, more, self.hub.values.array))
+                if self._prepared and more:
+                    self._shown = False
+                    self.gather(everywhere=True)
 
     def _meet(self) -> None:
         """See that all processes are about to do the same run."""
@@ -208,6 +220,14 @@ class Ranks(Simulation):
     def _tell(self, what: str, *arguments: Any) -> None:
         self.crew.told((what, *arguments))
 
+    def _together(self, what: str, *arguments: Any, **own: Any) -> Any:
+        """Have all call a method with these arguments, this process with its `own` ones, too."""
+        before, self._joint = self._joint, True
+        self._tell(what, *arguments)
+        found = getattr(self, what)(*arguments, **own)
+        self._joint = before  # not where it failed: then the others wait
+        return found
+
     def prepare(self, begun: list[str]) -> None:
         """Make ready for the steps of a run: the hooks of the fixes that are left to act."""
         import numba
@@ -215,10 +235,18 @@ class Ranks(Simulation):
         if self.threads > 1:
             numba.set_num_threads(self.threads)
         self.begun = begun
+        self._let_go()
         self._prepare_hooks()
         self.hub.update.method.begin(self.hub, self._whole.contact)
 
     # --- handing out and gathering ----------------------------------------------------------------
+
+    def _let_go(self) -> None:
+        """From here on the whole is with the first alone."""
+        self._bare = False
+        self._whole = self._whole._replace(
+            blocks=tuple(b._replace(points=sized(b.points, 0)) for b in self._whole.blocks)
+        )
 
     def _see_parts(self) -> None:
         """Hand out the whole where the parts do not have its present state."""
@@ -245,8 +273,7 @@ class Ranks(Simulation):
             [_share(k, block, *tiles.cuts[rank : rank + 2]) for k, block in enumerate(whole.blocks)]
             for rank in range(self.crew.size)
         ]
-        self._tell("take", tiles.cuts, nodes, memory)
-        self.take(tiles.cuts, nodes, memory, shares)
+        self._together("take", tiles.cuts, nodes, memory, shares=shares)
         self._handed_out = self.version
 
     def take(
@@ -260,11 +287,6 @@ class Ranks(Simulation):
             one[nodes] = rows
         if not self.crew.leads:
             self.control.totals[WORK] = 0
-            # From here on the whole is with the first alone.
-            self._bare = False
-            self._whole = self._whole._replace(
-                blocks=tuple(b._replace(points=sized(b.points, 0)) for b in self._whole.blocks)
-            )
         self._put({name: array for block in found for name, array in block.items()})
 
     def _put(self, found: dict[str, np.ndarray]) -> None:
@@ -358,8 +380,7 @@ class Ranks(Simulation):
     def advance(self, count: int) -> int:
         """Take up to `count` steps, all processes together; DONE, or why it stopped."""
         self._see_parts()
-        self._tell("go", count, self.control.values, self.control.clock.view(np.ndarray))
-        return self.go(count)
+        return self._together("go", count, self.control.values, self.control.clock.view(np.ndarray))
 
     def go(self, count: int, values: Any = None, clock: Any = None) -> int:
         """Take the steps of this process, from these values and this clock."""
@@ -373,8 +394,7 @@ class Ranks(Simulation):
 
     def waits(self) -> np.ndarray:
         """Seconds that each process has waited for others in steps so far."""
-        self._tell("tell_of_waiting")
-        return np.array(self.tell_of_waiting())
+        return np.array(self._together("tell_of_waiting"))
 
     def tell_of_waiting(self) -> list | None:
         """The same, of all processes for the first."""
@@ -405,6 +425,7 @@ class Ranks(Simulation):
             function(self._whole)
         except BaseException:
             crew.told(None)
+            self._joint = False  # the others know
             raise
         self._stepping = True
         whole = self._whole
@@ -491,8 +512,7 @@ class Ranks(Simulation):
         if self.hub.running.halve:
             return super().snapshot(before)
         self._see_parts()
-        self._tell("keep")
-        return self.keep()
+        return self._together("keep")
 
     def keep(self) -> dict[str, np.ndarray]:
         """Copy every array of the part that a step changes."""
@@ -507,8 +527,7 @@ class Ranks(Simulation):
         if self.hub.running.halve:
             super().restore(snapshot)
             return
-        self._tell("go_back")
-        self.go_back()
+        self._together("go_back")
         self._shown = False
         self.version += 1
         self._handed_out = self.version

@@ -150,7 +150,8 @@ class Restart:
                 self._state: dict[str, np.ndarray] = {}
                 root["state"].visititems(self._keep)
         except (OSError, KeyError) as error:
-            raise ScriptError(f"{what}: {error}", argument="file", expected=expected) from None
+            why = "" if "signature" in str(error) else f": {error}"
+            raise ScriptError(f"{what}{why}", argument="file", expected=expected) from None
 
     def _keep(self, name: str, item: Any) -> None:
         if hasattr(item, "shape"):

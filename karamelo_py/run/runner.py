@@ -384,7 +384,7 @@ class Runner:
     def _banner(self, simulation: Simulation, going_on: bool) -> None:
         hub = self.hub
         hub.console.banner(
-            f"Run, gone on with at step {simulation.step}" if going_on else "Run",
+            f"Run, continued from step {simulation.step}" if going_on else "Run",
             {
                 "method": hub.update.words,
                 "points": int(simulation.present.sum()),
@@ -393,6 +393,7 @@ class Runner:
                 "dt": simulation.dt,
                 "stable dt": simulation.limit,
                 "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
+                **simulation.processes,
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,
                 **({"units": str(hub.output.units)} if hub.output.units else {}),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -201,6 +201,7 @@ class Simulation:
         self.told_of_growth = False  # since it is followed
         self.mapped = False  # whether the nodes show a state of this simulation
 
+    processes: ClassVar[dict[str, str]] = {}  # what a banner says of those that share the scene
     follows = False  # another process says what this one does in a run
 
     @contextmanager
