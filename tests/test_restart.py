@@ -33,6 +33,7 @@ from test_laws_scripts import ALL, pulled
 from test_walls import scene as rubbed
 
 from karamelo_py.language import registry
+from karamelo_py.run.memory import memory_of, remember
 
 EVERY = "restart(2, r.*.h5)\n"
 
@@ -780,3 +781,23 @@ def test_what_was_foreseen_is_not_told_again(run_interpreted):
     script = script.replace("quadratic-spline", "linear")
     assert "affine noise" in run_interpreted(script).err
     assert "affine noise" not in run_interpreted(script, "-restart", "r.3.h5").err
+
+
+def test_generators_and_sets_are_kept():
+    """What NumPy draws behind a file is what it would have drawn; all kinds of plain data."""
+
+    class Part:
+        remembers = ("rng", "old", "seen", "z", "raw")
+
+        def __init__(self):
+            self.rng = np.random.default_rng(3)
+            self.old = np.random.RandomState(4)
+            self.seen, self.z, self.raw = {1, 2}, 1 + 2j, bytearray(b"ab")
+
+    held: list = []
+    part, other = Part(), Part()
+    part.rng.normal(size=3), part.old.normal(size=3), part.seen.add(5)
+    kept = json.loads(json.dumps(memory_of(part, held)))
+    remember(other, kept, held)
+    assert other.rng.normal() == part.rng.normal() and other.old.normal() == part.old.normal()
+    assert (other.seen, other.z, other.raw) == (part.seen, part.z, part.raw)

@@ -29,7 +29,7 @@ from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.stable import one_a_cell
+from karamelo_py.run.stable import one_a_cell, sparse
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.musl import MUSL
@@ -42,6 +42,7 @@ FAST = 0.2  # of the speed of waves, from where on usf and usavg feed moments
 STRETCH = 0.3  # strain beyond which one is said to stretch
 DRIFT = 0.05  # of the speed of waves, from where on it feeds the noise of FLIP ...
 LONG = 5000  # ... in so many steps
+SWING = 0.05  # strain of vibrations that bodies do not bear for long
 SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
 ELASTIC = LinearElastic, NeoHookean, Thermoelastic
 
@@ -133,6 +134,27 @@ class Foreseen:
         return float(apart) / self.waves if self.waves > 0 else 0.0
 
     @cached_property
+    def vibration(self) -> tuple[float, float]:
+        """The strain by which a solid swings that is stretched evenly, and in how many periods."""
+        most = 0.0, 0.0
+        (x, v), present = self.motion, self.simulation.present
+        of_solid = self.simulation.solid_of[present]
+        mass = self.simulation.mass[present]
+        for k in range(len(self.hub.solids)):
+            of = of_solid == k
+            if not (of.any() and self.waves > 0):
+                continue
+            here, fast, m = x[of], v[of], mass[of, None]
+            size = float(np.ptp(here, axis=0).max()) / 2
+            here = here - np.average(here, axis=0, weights=m[:, 0])
+            # The gradient that is nearest to the velocities of all points; its turn is no strain.
+            gradient = np.linalg.lstsq(np.sqrt(m) * here, np.sqrt(m) * fast, rcond=None)[0]
+            rate = float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
+            strain = rate * size / (2 * self.waves)
+            most = max(most, (strain, self.duration * self.waves / (3 * size) if size else 0.0))
+        return most
+
+    @cached_property
     def sag(self) -> float:
         """The strain of a solid under its own weight, g L / c^2."""
         x, _ = self.motion
@@ -206,6 +228,23 @@ def _drift_noise(s: Foreseen) -> Iterator[Failure]:
             "and with musl and usf what the grid does not see of the velocities grows, whatever "
             "the step (its energy by e in 150 steps in 1D, 400 in the plane; cubic splines, 600)",
             "scheme(usavg), with which it does not",
+        )
+
+
+def _large_vibration(s: Foreseen) -> Iterator[Failure]:
+    """Told by docs/energy.md: nothing of FLIP and its kin lasts there but usl, which damps."""
+    kept = isinstance(s.transfer, (FLIP, ASFLIP)) and s.transfer.alpha > 0.9
+    damps = isinstance(s.scheme, USL) and not sparse(s.hub)
+    if not (s.moves and kept and s.solids(*ELASTIC)) or damps:
+        return
+    strain, periods = s.vibration
+    if strain > SWING and periods > 2:
+        yield Failure(
+            "large vibrations",
+            f"a body will vibrate by about {strain:.1g} of strain for about {periods:.0f} periods, "
+            f"and with {s.words} elastic bodies that do so while they move through the grid break "
+            "after 2 to 50 periods (by 0.14, drifting)",
+            "method tlmpm, or scheme(usl) with two points a cell and direction, which damps",
         )
 
 
@@ -312,6 +351,7 @@ RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _numerical_fracture,
     _repeated_contact,
     _drift_noise,
+    _large_vibration,
     _vanishing_domains,
     _hourglass,
     _lost_spin,

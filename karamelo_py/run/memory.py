@@ -5,9 +5,10 @@ A part names the attributes in which it keeps what it has seen or added up::
     class Dose(Compute):
         remembers = ("total",)
 
-Numbers, texts, bytes, arrays, lists, tuples and dictionaries of these can be kept, and objects
-whose class says in the same way what they remember. Classes add to what their bases name. After a
-part has got back what it remembers, its method ``resumed()`` is called where it has one.
+Numbers, texts, bytes, arrays, generators of random numbers of NumPy, lists, tuples, sets and
+dictionaries of these can be kept, and objects whose class says in the same way what they remember.
+Classes add to what their bases name. After a part has got back what it remembers, its method
+``resumed()`` is called where it has one.
 """
 
 from __future__ import annotations
@@ -48,11 +49,18 @@ def _written(value: Any, arrays: list[np.ndarray]) -> Any:
         return value
     if isinstance(value, np.generic):
         return value.item()
-    if isinstance(value, (bytes, np.ndarray)):
-        kind = "bytes" if isinstance(value, bytes) else "array"
-        arrays.append(np.frombuffer(value, np.uint8) if kind == "bytes" else value)
+    if isinstance(value, complex):
+        return {"complex": [value.real, value.imag]}
+    if isinstance(value, (bytes, bytearray, np.ndarray)):
+        kind = "array" if isinstance(value, np.ndarray) else type(value).__name__
+        arrays.append(value if kind == "array" else np.frombuffer(bytes(value), np.uint8))
         return {kind: len(arrays) - 1}
-    if type(value) in (list, tuple):
+    if isinstance(value, np.random.Generator):
+        source = value.bit_generator
+        return {"Generator": [type(source).__name__, _written(source.state, arrays)]}
+    if isinstance(value, np.random.RandomState):
+        return {"RandomState": _written(value.get_state(legacy=False), arrays)}
+    if type(value) in (list, tuple, set):
         return {type(value).__name__: [_written(item, arrays) for item in value]}
     if type(value) is dict:
         items = value.items()
@@ -80,9 +88,20 @@ def _read(kept: Any, arrays: list[np.ndarray]) -> Any:
     ((kind, content),) = kept.items()
     if kind == "array":
         return arrays[content]
-    if kind == "bytes":
-        return arrays[content].tobytes()
+    if kind in ("bytes", "bytearray"):
+        found = arrays[content].tobytes()
+        return found if kind == "bytes" else bytearray(found)
+    if kind == "complex":
+        return complex(*content)
+    if kind == "Generator":
+        source = getattr(np.random, content[0])()
+        source.state = _read(content[1], arrays)
+        return np.random.Generator(source)
+    if kind == "RandomState":
+        found = np.random.RandomState()
+        found.set_state(_read(content, arrays))
+        return found
     if kind == "dict":
         return {_read(k, arrays): _read(v, arrays) for k, v in content}
     items = [_read(item, arrays) for item in content]
-    return tuple(items) if kind == "tuple" else items
+    return {"tuple": tuple, "set": set, "list": list}[kind](items)

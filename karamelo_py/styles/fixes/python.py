@@ -103,9 +103,11 @@ class Python(Fix):
 
     What the function keeps from step to step goes into files to go on from where it is named:
     ``remembers = ("taken", "left")`` in the module names variables of the module, and in the class
-    of an object that is called, attributes of the object. Numbers, texts, arrays, and lists,
-    tuples and dictionaries of these can be kept. Of what else has changed since the fix was made
-    a warning tells when the first such file is written.
+    of an object that is called, attributes of the object. Numbers, texts, arrays, generators of
+    NumPy, and lists, tuples, sets and dictionaries of these can be kept. Of other such data there
+    that has changed since the fix was made a warning tells when the first such file is written.
+    What lies elsewhere is not seen: in defaults of arguments, other objects, other modules, or
+    ``np.random`` itself.
 
     Example
     -------
