@@ -132,6 +132,8 @@ def test_solids_as_in_2020(run_interpreted):
     ("line", "says"),
     [
         ("method_modify(FLIP, 0.99)", "method(ulmpm, FLIP, linear, 0.99), in the place of line 1"),
+        ("method_modify(0.98)", "method(ulmpm, FLIP, linear, 0.98), in the place of line 1"),
+        ("method_modify(tlmpm)", "method(tlmpm, FLIP, linear"),
         ("method_modify(PIC, cubic-spline)", "method(ulmpm, PIC, cubic-spline), in the place"),
         ("solid(s, block, 0, 1, 0, 2*H, 2, rubber, 0.1)", "region(box, block, 0, 1, 0, 2*H), and"),
         ("solid(s, cylinder, 0.5, 0, 0.1, 2, rubber, 0.1)", "region(box, cylinder, 0.5, 0, 0.1), "),

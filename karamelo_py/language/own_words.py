@@ -40,6 +40,10 @@ def in_own_words(script: Any, name: str) -> str | None:
     before, rest = words_of(own), words_of(asked[0] if asked else None)
     where = f"in the place of line {own.place.line}" if own else "before the first solid"
     if name == "method_modify" and rest:
+        if registry.knows("method", rest[0]):
+            before, rest = [rest[0], *before[1:]], rest[1:] or before[1:] or ["FLIP"]
+        elif not registry.knows("transfer", rest[0]):  # a share alone
+            rest = [*(before[1:3] if len(before) > 2 else ("FLIP", "linear")), *rest]
         if len(rest) == 1 or not registry.knows("basis", rest[1]):
             rest.insert(1, before[2] if len(before) > 2 else "linear")
         if len(rest) == 2 and rest[0] in FLIPS:
