@@ -112,7 +112,10 @@ def _measured(part: Part, *, weak: bool = False) -> Scaled:
         else:
             status = subprocess.run([sys.executable, "-m", MODULE, *words], check=False).returncode
         if status or not file.exists():
-            raise ScriptError(f"{part.workload} could not be measured with {part.ranks} processes")
+            why = f"ended by signal {abs(status) % 128}" if not 0 <= status < 128 else "see above"
+            raise ScriptError(
+                f"{part.workload} could not be measured with {part.ranks} x {part.threads}: {why}"
+            )
         found = json.loads(file.read_text(encoding="utf-8"))
     return Scaled(part.ranks, part.threads, weak, **found)
 
