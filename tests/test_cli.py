@@ -57,6 +57,7 @@ def test_variables(run_script, option):
         ("in.a -var n=10", "hint: -var n 10"),
         ("in.a -var n ten", "-var n ten is a text, and the script has a number"),
         ("in.a in.b", "one word too many: in.b"),
+        ("in.a --ranks 100000", "--ranks 100000: this machine has"),
         ("check", "expected: karamelo-py check SCRIPT"),
         ("run", "expected: karamelo-py SCRIPT"),
         ("in.a -out in.b/x", "hint: -out x is a folder in this one"),

@@ -272,6 +272,10 @@ class Runner:
         # Rows of log and dumps that have been written since go with what they show.
         restart.give_back(self.hub, self.memories)
         simulation.halve_step(self.halvings)
+        while simulation.above_limit() and self.halvings < HALVINGS:
+            # What is above the limit would only come back.
+            self.halvings += 1
+            simulation.halve_step(self.halvings)
         self.hub.warn(
             f"{message}. Back to step {simulation.step}, time {simulation.time:.6g}, with "
             f"1/{2**self.halvings} of the step",
