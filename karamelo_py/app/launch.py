@@ -23,7 +23,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from karamelo_py.run.crew import INSTALL
+from karamelo_py.run.crew import ENDING, INSTALL
 from karamelo_py.script.errors import ScriptError, render_message
 
 # Where the launcher of this program waits for the processes to report.
@@ -37,9 +37,6 @@ OPEN_MPI = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
-ENDING = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-]
 SIGNALLED = 128
 PAUSE = 0.05  # seconds between two looks at mpiexec
 GRACE = 2.0  # seconds that processes have to end after it

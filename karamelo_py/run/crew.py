@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import time
 import traceback
@@ -23,6 +24,9 @@ LAUNCHED = (
     ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"),
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
 )
+# Ctrl-C; batch systems, kill; a terminal that is closed (which Windows does not tell).
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 # Words at a meeting beside those of runs, which are above zero.
 WELL, FAILED = 0, -1
 PAUSE = 0.005  # seconds between two looks whether the others have come

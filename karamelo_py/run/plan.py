@@ -11,10 +11,10 @@ from karamelo_py.kernels.step import Fused, Staged, step
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.run.crew import Crew
-from karamelo_py.run.shares import SharedTiles
+from karamelo_py.run.shares import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import sparse
-from karamelo_py.run.tiles import summed
+from karamelo_py.run.tiles import chosen_of
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 
@@ -81,9 +81,7 @@ def bytes_of_node(simulation: Simulation) -> int:
     control.values[:], control.clock[:], control.totals[:] = kept
     total = 0
     for what, nodes in sums.found:
-        added, velocity, *rest = summed(nodes)
-        arrays = [added] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
-        total += sum(array.itemsize * array.shape[1] for array in arrays)
+        total += sum(array.itemsize * array.shape[1] for array in chosen_of(nodes, what))
     return total
 
 
@@ -100,11 +98,7 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
         )
 
     first = tiles_of(_Pretended(0, [None] * ranks))
-    per_tile = np.zeros(first.count, np.int64)
-    for block in s.blocks:
-        numbers, sizes = _occupied(block.tiling)
-        np.add.at(per_tile, numbers, sizes)
-    first.share_out(per_tile)
+    first.share_out(first.points_in(s.blocks))
     cuts, d = first.cuts, first.dimension
     parts = [[_part(b.tiling, *cuts[r : r + 2]) for b in s.blocks] for r in range(ranks)]
     boxes = []
@@ -129,18 +123,12 @@ def _share(s: Setup, tiles: SharedTiles, part: list[Tiling], per_node: int) -> S
     )  # boxes of nothing: only their places matter
     mine = s._replace(blocks=blocks, spans=spans, heat=None, buffers=tiles.empty_buffers(none))
     tiles.lay_out(mine)
-    points = sum(int(_occupied(one)[1].sum()) for one in part)
+    points = sum(int(occupied(one)[1].sum()) for one in part)
     used = spans[1 : 1 + spans[0, 0]]
     rows = sum(map(len, tiles.given.values()))
     count = sum(int(one.count[0]) for one in part)
     nodes = int(np.diff(used, axis=1).sum())
     return Share(points, count, nodes, len(tiles.given), rows * per_node)
-
-
-def _occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the occupied tiles of a block, and how many points they have."""
-    count = tiling.count[0]
-    return tiling.number[:count], np.diff(tiling.range[:count], axis=1)[:, 0]
 
 
 def _part(tiling: Tiling, low: int, high: int) -> Tiling:

@@ -23,7 +23,7 @@ from karamelo_py.kernels.arrays import Block, Nodes, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import BOXES, CALL, HEAT, NUMBER, REPORTS, TOTALS, Linked
 from karamelo_py.kernels.totals import WORK, rounded
-from karamelo_py.run.crew import FAILED, Crew
+from karamelo_py.run.crew import ENDING, FAILED, Crew
 from karamelo_py.run.lowering import State, lower
 from karamelo_py.run.shares import SharedTiles, joined, sized
 from karamelo_py.run.simulation import Simulation
@@ -34,9 +34,6 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
 OVER = "over"
-SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-# The first hears of Ctrl-C, and of batch systems.
-ENDING = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
 ROWS = ("number", "range", "grid", "box")  # of a tiling
 
 
@@ -195,7 +192,7 @@ class Ranks(Simulation):
     def follow(self) -> None:
         """Do what the first process says, until its run is over."""
         if threading.current_thread() is threading.main_thread():
-            for number in ENDING:
+            for number in ENDING:  # the first hears of them
                 signal.signal(number, signal.SIG_IGN)
         self._meet()
         hub = self.hub
@@ -261,12 +258,7 @@ class Ranks(Simulation):
         if clock.drift > clock.drift_limit or not covered:
             super().sort()
         tiles = self._parted.tiles
-        per_tile = np.zeros(tiles.count, np.int64)
-        for block in whole.blocks:
-            count = block.tiling.count[0]
-            sizes = np.diff(block.tiling.range[:count], axis=1)[:, 0]
-            np.add.at(per_tile, block.tiling.number[:count], sizes)
-        tiles.share_out(per_tile)
+        tiles.share_out(tiles.points_in(whole.blocks))
         nodes = numbers(whole.spans)
         memory = [one[nodes] for one in self._memory()]
         shares = [

@@ -18,6 +18,7 @@ from karamelo_py.compiler import cache
 from karamelo_py.kernels.step import DONE, STOPPED
 from karamelo_py.output.console import duration
 from karamelo_py.run import diagnosis, foresight, restart
+from karamelo_py.run.crew import ENDING
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
@@ -32,10 +33,6 @@ CHUNK = 100  # steps between two looks at the run, and between two snapshots, at
 HALVINGS = 5  # at most, in a run
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
 
-
-# Ctrl-C; batch systems, kill; a terminal that is closed (which Windows does not tell).
-NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
-ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
 
 

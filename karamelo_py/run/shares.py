@@ -7,15 +7,23 @@ summed by each of them, from the same boxes in the same order.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import Block, Points, Setup, arrays_of
-from karamelo_py.kernels.sorting import order_points
+from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of
 from karamelo_py.run.crew import Crew
-from karamelo_py.run.tiles import Boxes, Tiles, buffers_of, ragged, steps_of, summed
+from karamelo_py.run.tiles import (
+    Boxes,
+    Tiles,
+    between,
+    buffers_of,
+    chosen_of,
+    ragged,
+    rows_of,
+    steps_of,
+)
 from karamelo_py.scene.lattice import Lattice
 
 IMBALANCE = 1.1  # largest share of the points over the mean: above it they are shared out anew
@@ -63,9 +71,16 @@ class SharedTiles(Tiles):
             # A tile is of the one that has its middle.
             self.cuts[1:-1] = np.searchsorted(ends - 0.5 * per_tile, parts)
 
+    def points_in(self, blocks: Iterable[Block]) -> np.ndarray:
+        """Number of the points in each tile, of blocks that are sorted."""
+        per_tile = np.zeros(self.count, np.int64)
+        for block in blocks:
+            np.add.at(per_tile, *occupied(block.tiling))
+        return per_tile
+
     def migrate(self, s: Setup) -> Setup:
         """Hand over the points that have gone to the tiles of others."""
-        tiles = [self._tiles_of(s, block) for block in s.blocks]
+        tiles = [self._by_tile(s, block)[1] for block in s.blocks]
         here = sum(np.bincount(of, minlength=self.count) for of in tiles)
         per_tile = self.crew.added(here)
         shares = np.diff(np.append(0, np.cumsum(per_tile))[self.cuts])
@@ -91,16 +106,6 @@ class SharedTiles(Tiles):
             for k, block in enumerate(s.blocks)
         )
         return s._replace(blocks=blocks)
-
-    def _tiles_of(self, s: Setup, block: Block) -> np.ndarray:
-        points = block.points
-        x = points.x[s.control.clock[0].now] if points.home is None else points.home
-        tile, order = np.empty((2, x.shape[1]), np.int64)
-        order_points(
-            s.kin, s.grids, self.size, self.shapes, self.first, x, points.grid, self._start, tile,
-            order,
-        )  # fmt: skip
-        return tile
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
         return float(self.crew.largest(np.array([super()._reach(s, block, x)]))[0])
@@ -164,25 +169,19 @@ class SharedTiles(Tiles):
     def _own_nodes(self, tiles: np.ndarray, own: np.ndarray) -> None:
         self.foreign[self._marked] = 0
         away = own[self._first_of_place[self._place(tiles)] != self.crew.rank]
-        row, left = ragged(away[:, 2] * away[:, 3])
-        away = away[row]
-        begin = away[:, 0] + left // away[:, 3] * away[:, 5] + left % away[:, 3] * away[:, 6]
-        row, left = ragged(away[:, 4])
-        self._marked = begin[row] + left
+        self._marked = between(*rows_of(away))
         self.foreign[self._marked] = 1
 
     def exchange(self, s: Setup, number: int, what: int) -> None:
         """Pass on what the own tiles give to nodes of others, and get what theirs give to own."""
-        nodes = buffers_of(s)[number].nodes
-        sums, velocity, *rest = summed(nodes)
-        arrays = [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
+        arrays = chosen_of(buffers_of(s)[number].nodes, what)
         width = sum(array.shape[1] for array in arrays)
         given = {
             rank: np.concatenate([array[rows] for array in arrays], axis=1)
             for rank, rows in self.given.items()
         }
         taken = {
-            rank: np.empty((rows.stop - rows.start, width), sums.dtype)
+            rank: np.empty((rows.stop - rows.start, width), arrays[0].dtype)
             for rank, rows in self._taken.items()
         }
         self.crew.passed(given, taken)
@@ -191,6 +190,12 @@ class SharedTiles(Tiles):
             for array in arrays:
                 array[rows] = taken[rank][:, first : first + array.shape[1]]
                 first += array.shape[1]
+
+
+def occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the occupied tiles of a block, and how many points they have."""
+    count = tiling.count[0]
+    return tiling.number[:count], np.diff(tiling.range[:count], axis=1)[:, 0]
 
 
 def sized(points: Points, count: int) -> Points:

@@ -158,15 +158,21 @@ class Tiles:
         drift = DRIFT + rounding if s.frame.moves else 0.0
         return far + drift if far < cells else cells  # also where it is not a number
 
-    def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
-        """Sort the points of a block; the numbers of the tiles that they are in."""
-        points, tiling = block.points, block.tiling
+    def _by_tile(self, s: Setup, block: Block) -> tuple[np.ndarray, ...]:
+        """The places (w, n) that weights belong to; the tile of each point, and points by tile."""
+        points = block.points
         x = points.x[s.control.clock[0].now] if points.home is None else points.home
         tile, order = np.empty((2, x.shape[1]), np.int64)
         order_points(
             s.kin, s.grids, self.size, self.shapes, self.first, x, points.grid, self._start, tile,
             order,
         )  # fmt: skip
+        return x, tile, order
+
+    def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
+        """Sort the points of a block; the numbers of the tiles that they are in."""
+        points, tiling = block.points, block.tiling
+        x, tile, order = self._by_tile(s, block)
         ends = self._start[:-1]
         begins = np.concatenate([[0], ends[:-1]])
         occupied = np.flatnonzero(ends > begins)
@@ -319,16 +325,22 @@ def _extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np
 
 def _spans(boxes: np.ndarray) -> np.ndarray:
     """(k, 2) the rows of boxes of nodes (see `Buffers`), joined where one ends at another."""
-    row, left = ragged(boxes[:, 2] * boxes[:, 3])
-    own = boxes[row]
-    begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
+    begin, end = rows_of(boxes)
     order = np.argsort(begin, kind="stable")
-    begin, end = begin[order], (begin + own[:, 4])[order]
+    begin, end = begin[order], end[order]
     apart = begin[1:] != end[:-1]
     begin, end = np.append(begin[:1], begin[1:][apart]), np.append(end[:-1][apart], end[-1:])
     of, left = ragged(-(-(end - begin) // SPAN))
     begin = begin[of] + left * SPAN
     return np.stack([begin, np.minimum(begin + SPAN, end[of])], axis=1)
+
+
+def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First nodes of the rows of boxes of nodes (see `Buffers`), and those behind their last."""
+    row, left = ragged(boxes[:, 2] * boxes[:, 3])
+    own = boxes[row]
+    begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
+    return begin, begin + own[:, 4]
 
 
 def in_use(tiling: Tiling) -> list[tuple[str, int]]:
@@ -360,9 +372,13 @@ def used(spans: np.ndarray) -> np.ndarray:
 
 def numbers(spans: np.ndarray) -> np.ndarray:
     """The numbers of the nodes in spans, of which the first row is the count."""
-    spans = used(spans)[1:]
-    of, left = ragged(spans[:, 1] - spans[:, 0])
-    return spans[of, 0] + left
+    return between(*used(spans)[1:].T)
+
+
+def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """All whole numbers from each begin to before its end."""
+    of, left = ragged(end - begin)
+    return begin[of] + left
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -374,6 +390,12 @@ def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def buffers_of(s: Setup) -> list[Buffers]:
     """All buffers of a scene, in the order of their numbers."""
     return [s.buffers] + ([s.heat.buffers] if isinstance(s.heat, Conducting) else [])
+
+
+def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
+    """The arrays that points give to, of the kinds that `what` names (kernels.sums.given)."""
+    sums, velocity, *rest = summed(nodes)
+    return [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
 
 
 def summed(nodes: Nodes) -> list[np.ndarray]:
