@@ -51,6 +51,13 @@ class FakeFields:
     def absent_at_nodes(self):
         return list(ABSENT_AT_NODES)
 
+    @property
+    def present(self):
+        return np.ones(len(self.points["id"]), np.bool_)
+
+    def pieces(self):
+        yield self
+
     def particle_names(self):
         return list(self.points)
 

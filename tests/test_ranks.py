@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from itertools import product
 
+import h5py
+import numpy as np
 import pytest
 from combinations import MESHED, scene, write_mesh
 from scenes import SCHEMES, block
@@ -50,3 +52,31 @@ def test_every_way(state_interpreted, tmp_path, way):
     mesh = write_mesh(tmp_path / "m.vtk", MESHED[option]) if option in MESHED else None
     script = with_files(scene(*way, mesh=mesh, steps=4))
     assert shared(state_interpreted, tmp_path, script, ranks=3)
+
+
+DUMPS = (
+    "dump(t, all, particle/gz, 6, t.gz, x, y, vx, s11)",
+    "dump(b, all, particle/bin, 6, b.*.bin, x, y, x0, volume, type)",
+    "dump(h, all, hdf5, 6, h.h5, x, y, seq)",
+)
+
+
+def test_dumps_in_pieces(state_interpreted, tmp_path, monkeypatch):
+    """So many ids after another, with points that are not there any more: the bytes of all at once.
+
+    HDF5 puts its rows into the file in pieces: what it holds is the same.
+    """
+    script = block(
+        2, "boundary(delete)", *DUMPS, MOVING[0].replace("0.9", "9"), *MOVING[1:], "run(28)",
+        ppc=3, size=(0.3, 0.1),
+    )  # fmt: skip
+    state_interpreted(script, boxes=True, out="at once")
+    for module in ("run.by_id", "styles.dumps.hdf5"):
+        monkeypatch.setattr(f"karamelo_py.{module}.PIECE", 16)
+    assert shared(state_interpreted, tmp_path, script)
+    one, other = tmp_path / "at once", tmp_path / "parts"
+    for path in (*one.glob("*.bin"), one / "t.gz"):
+        assert path.read_bytes() == (other / path.name).read_bytes()
+    with h5py.File(one / "h.h5") as a, h5py.File(other / "h.h5") as b:
+        assert np.isnan(a["x"][-1]).any() and len(a["id"]) > 32
+        assert all(np.array_equal(a[name], b[name], equal_nan=True) for name in a)

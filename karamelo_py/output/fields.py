@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -28,6 +28,7 @@ from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_d
 from karamelo_py.points.laws.plastic_rate import has_rate
 from karamelo_py.points.transfers import Moment
 
+PIECE = 1 << 17  # points that are looked at together
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
 PARTICLE_NAMES = (
@@ -62,23 +63,31 @@ class Fields:
     """Named fields of the running scene; arrays are copies that are safe to keep.
 
     N counts all points there have ever been: deleted ones (boundary delete) have zeros. `members`
-    and `particle` leave them out.
+    and `particle` leave them out. Those of a `piece` are some of the points, one id after another.
     """
 
-    def __init__(self, hub: Scene):
+    def __init__(self, hub: Scene, piece: Any = None):
         self.hub = hub
+        self._piece = piece
         self._key: Any = None
         self._cache: dict[str, Any] = {}
 
     @property
     def _simulation(self):
         """The simulation; the cache of derived fields is forgotten when it has gone on."""
+        if self._piece is not None:
+            return self._piece
         simulation = self.hub.simulation
         key = (id(simulation), simulation.step, simulation.version)
         if key != self._key:
             self._key = key
             self._cache.clear()
         return simulation
+
+    def pieces(self) -> Iterator[Fields]:
+        """The fields of all points, so many points at a time, in the order of their ids."""
+        for piece in self._simulation.pieces():
+            yield Fields(self.hub, piece)
 
     def _cached(self, name: str, make) -> Any:
         simulation = self._simulation
@@ -90,6 +99,11 @@ class Fields:
     def count(self) -> int:
         """Number of points."""
         return self._simulation.count
+
+    @property
+    def present(self) -> np.ndarray:
+        """(N,) False for points that were deleted."""
+        return self._simulation.present
 
     @property
     def node_count(self) -> int:
@@ -119,7 +133,7 @@ class Fields:
     @property
     def reference_volume(self) -> np.ndarray:
         """(N,) volumes before the first step."""
-        return np.concatenate([s.volume0 for s in self.hub.solids.values()])
+        return self._simulation.volume0
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
@@ -219,7 +233,7 @@ class Fields:
     def _particle(self, name: str) -> np.ndarray:
         simulation = self._simulation
         if name == "id":
-            return np.arange(1, simulation.count + 1)
+            return np.arange(1, simulation.count + 1) + simulation.first
         if name == "type":
             return simulation.solid_of + 1
         if name in AXES:
@@ -296,7 +310,7 @@ def _of_points(simulation: Any, filler: Callable, *columns: int) -> np.ndarray:
         if fill := filler(block.laws):
             rows = np.zeros((len(block.points.id), *columns))
             fill(s.kin, s.nodes.sums[0, MASS], block.points, block.laws, rows)
-            out[block.points.id] = rows
+            out[block.points.id - simulation.first] = rows
     return out
 
 

@@ -367,14 +367,14 @@ def resumed(block: Block, previous: State) -> Block:
         take(one.array, previous.fields.get(type(one)))
     present = np.ones(len(points.id), np.bool_)
     present[old] = previous.present[ids]
-    return block if present.all() else chosen(block, present)
+    return block if present.all() else chosen(block, np.flatnonzero(present))
 
 
-def chosen(block: Block, keep: np.ndarray) -> Block:
-    """The block with the points where `keep` (n,) is true; they are to be sorted anew."""
+def chosen(block: Block, rows: np.ndarray) -> Block:
+    """The block with the points in these rows, in this order; they are to be sorted anew."""
     points = block.points
     # Contiguous: another layout would be compiled for.
-    kept = {name: np.compress(keep, a, axis=-1) for name, a in own_arrays_of(points)}
-    declared = tuple(type(one)(np.compress(keep, one.array, axis=-1)) for one in points.fields)
+    kept = {name: np.take(a, rows, axis=-1) for name, a in own_arrays_of(points)}
+    declared = tuple(type(one)(np.take(one.array, rows, axis=-1)) for one in points.fields)
     rest = {name: kept.get(name) for name in points._fields if name != "fields"}
     return block._replace(points=Points(**rest, fields=declared))

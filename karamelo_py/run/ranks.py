@@ -23,6 +23,7 @@ from karamelo_py.kernels.arrays import Block, Nodes, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import BOXES, CALL, HEAT, NUMBER, REPORTS, TOTALS, Linked
 from karamelo_py.kernels.totals import WORK, rounded
+from karamelo_py.run.by_id import ById, Ordered, Piece
 from karamelo_py.run.crew import ENDING, FAILED, Crew
 from karamelo_py.run.lowering import State, lower
 from karamelo_py.run.shares import SharedTiles, joined, sized
@@ -54,6 +55,7 @@ class Ranks(Simulation):
         self._at_work = False  # steps are taken
         self._joint = False  # all processes do the same, and wait for each other
         self._kept: dict[str, np.ndarray] = {}
+        self._ordered: list[Ordered] = []  # own points, while pieces of all are looked at
         self._prepared = False
         self._bare = False
         super().__init__(hub, previous)
@@ -328,6 +330,28 @@ class Ranks(Simulation):
             self._spread()
         if parts is not None:
             self._join(parts)
+
+    def pieces(self) -> Iterator[ById]:
+        """All points, so many at a time: not even the first needs the memory of all."""
+        if self._shown or not self._leading:
+            yield from super().pieces()
+            return
+        for first, end in self.ranges():
+            parts = self._together("give_piece", first, end)
+            blocks = zip(self._part.blocks, zip(*parts, strict=True), strict=True)
+            yield Piece(
+                self, first, end, self._part,
+                (b._replace(points=joined(b.points, found)) for b, found in blocks),
+            )  # fmt: skip
+
+    def give_piece(self, first: int, end: int) -> list | None:
+        """Own points with ids from `first` to before `end`, for the first process those of all."""
+        if first == 0:
+            self._ordered = list(map(Ordered, self._part.blocks))
+        own = [one.between(first, end) for one in self._ordered]
+        if end == self.count:
+            self._ordered = []
+        return self.crew.gathered([[a for _, a in arrays_of(b.points)] for b in own])
 
     def _line_up(self, parts: list[dict] | None) -> None:
         """Put the points of all into the whole of the first, one process after another."""

@@ -45,9 +45,11 @@ from karamelo_py.kernels.step import (
 )
 from karamelo_py.kernels.sweep import Serial, Threaded, Visit, sweep_nodes
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat
+from karamelo_py.output.fields import PIECE
 from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, law_kind, with_stress
 from karamelo_py.points.laws.plastic_rate import without_rate
+from karamelo_py.run.by_id import ById
 from karamelo_py.run.hooks import lower_hooks
 from karamelo_py.run.lowering import (
     State,
@@ -65,8 +67,6 @@ from karamelo_py.run.watch import internal_energy, unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
 from karamelo_py.script.errors import ScriptError
-
-PIECE = 1 << 18  # points that a fix looks at together before the first step
 
 
 def scene_key(hub: Hub) -> tuple:
@@ -168,7 +168,7 @@ def _(hooks, s):
         hooks.act(_on_points, s, SUPPLY_HEAT, 0)
 
 
-class Simulation:
+class Simulation(ById):
     """The arrays of a scene, and how they go forward in time."""
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
@@ -178,15 +178,10 @@ class Simulation:
         self.setup, self.tiles = self._lowered(state)
         self.control = self.setup.control
         try_parts(hub, self.setup)
-        self.count = sum(len(s.x0) for s in hub.solids.values())
+        self.count = sum(s.count for s in hub.solids.values())
         self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
         if state is not None:
             self.present[: state.count] = state.present
-        places = [s.x0 for s in hub.solids.values()]
-        self.x0 = places[0] if len(places) == 1 else np.concatenate(places)
-        self.solid_of = np.concatenate(
-            [np.full(len(s.x0), k, np.int32) for k, s in enumerate(hub.solids.values())]
-        )
         self.threads = thread_count(hub, self.count)
         self.mode = Threaded() if self.threads > 1 else Serial()
         self.version = 0  # grows when fields change without a step
@@ -229,64 +224,11 @@ class Simulation:
     # --- fields by id -------------------------------------------------------------------------
 
     @property
-    def now(self) -> int:
-        """Which of the two position arrays is the present one."""
-        return int(self.control.clock[0].now)
-
-    def by_id(self, field: Callable) -> np.ndarray:
-        """A field of all points in the order of their ids; `field` takes it from `Points`.
-
-        It is zero for points that were deleted.
-        """
-        blocks = self.setup.blocks
-        first = field(blocks[0].points)
-        out = np.zeros((*first.shape[:-1], self.count), first.dtype)
-        for block in blocks:
-            out[..., block.points.id] = field(block.points)
-        return out
-
-    def declared(self, kind: type) -> np.ndarray | None:
-        """A declared field (N, components) by id, None where the scene does not have it.
-
-        Where only some laws have it, the others show what it starts from.
-        """
-        blocks = self.setup.blocks
-        if all(field(block.points.fields, kind) is None for block in blocks):
-            return None
-        out = fields.at_points(kind, self.setup.kin, self.count, float).array
-        for block in blocks:
-            array = field(block.points.fields, kind)
-            if array is not None:
-                out[:, block.points.id] = array
-        return out.T
-
-    @property
     def point_fields(self) -> tuple[type, ...]:
         """The declared fields of the points, of all blocks."""
         return tuple(
             dict.fromkeys(type(one) for block in self.setup.blocks for one in block.points.fields)
         )
-
-    def members(self, group: Any) -> np.ndarray:
-        """Ids (0-based) of a particle group, without deleted points."""
-        ids = np.arange(self.count) if group.all else group.ids
-        return ids if self.present.all() else ids[self.present[ids]]
-
-    @property
-    def x(self) -> np.ndarray:
-        """(N, d) present positions by id."""
-        d = self.setup.kin.dimension
-        return self.by_id(lambda points: points.x[self.now][:d]).T
-
-    @property
-    def v(self) -> np.ndarray:
-        """(N, d) velocities by id."""
-        return self.by_id(lambda points: points.v).T
-
-    @property
-    def mass(self) -> np.ndarray:
-        """(N,) masses by id."""
-        return self.by_id(lambda points: points.mass)
 
     def state(self) -> State:
         """All that a new lowering takes over."""
@@ -330,7 +272,10 @@ class Simulation:
     def remove(self, ids: np.ndarray) -> None:
         """Take points out of the run; the ids of the others stay."""
         self.present[ids] = False
-        blocks = tuple(chosen(block, self.present[block.points.id]) for block in self.setup.blocks)
+        blocks = tuple(
+            chosen(block, np.flatnonzero(self.present[block.points.id]))
+            for block in self.setup.blocks
+        )
         self.setup = self.setup._replace(blocks=blocks)
         self.control.clock[0].drift = np.inf
         self.version += 1

@@ -26,12 +26,7 @@ class Binary:
     def _snapshot(self) -> Iterator[bytes]:
         hub = self.hub
         domain, update = hub.domain, hub.update
-        ids, types = self.ids()
-        names = ["id", "type", *self.columns]
-        rows = np.empty((len(ids), len(names)), "<f8")
-        rows[:, 0], rows[:, 1] = ids, types
-        for k, name in enumerate(self.columns, 2):
-            rows[:, k] = self.field(name)
+        count, names = self.extent()[0], ["id", "type", *self.columns]
         bounds = []
         for axis in range(3):
             # A box of no thickness is degenerate to viewers, as in the text format.
@@ -39,9 +34,10 @@ class Binary:
             bounds += (domain.lo[axis], domain.hi[axis]) if used else (-domain.h / 2, domain.h / 2)
         line = " ".join(names).encode("ascii")
         yield struct.pack("<q", -len(MAGIC)) + MAGIC + struct.pack("<ii", ENDIAN, REVISION)
-        yield struct.pack("<qqi", update.step, len(ids), 0)  # 0: the box is not skewed
+        yield struct.pack("<qqi", update.step, count, 0)  # 0: the box is not skewed
         yield struct.pack("<6i6d", *[SHRUNK, AT_LEAST] * 3, *bounds)
         yield struct.pack("<iibd", len(names), 0, 1, update.time)  # no units, but a time
         yield struct.pack("<i", len(line)) + line
-        yield struct.pack("<ii", 1, rows.size)  # all in one piece
-        yield rows.tobytes()
+        yield struct.pack("<ii", 1, count * len(names))  # all in one piece
+        for ids, types, columns in self.tables():
+            yield np.column_stack([ids, types, *columns]).astype("<f8", copy=False).tobytes()

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.output.fields import PIECE
 from karamelo_py.output.files import whole
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.dumps.table import OfPoints, TableDump
+from karamelo_py.styles.dumps.table import OfPoints, Table, TableDump
 
 # The least compression: with the bytes of like order together, more takes twice the time for a few
 # per cent.
@@ -21,14 +22,13 @@ STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 16
 
 
-class Rows(NamedTuple):
-    """One snapshot: a number in each column for each id."""
+class Snapshot(NamedTuple):
+    """The rows of one moment, in pieces; `last` is the largest id."""
 
     time: float
     step: int
-    ids: np.ndarray
-    types: np.ndarray
-    columns: dict[str, np.ndarray]
+    last: int
+    tables: Iterable[Table]
 
 
 class Hdf5Dump(TableDump):
@@ -46,29 +46,32 @@ class Hdf5Dump(TableDump):
     def write(self) -> None:
         """Write one snapshot."""
         update = self.hub.update
-        ids, types = self.ids()
-        columns = {name: self.field(name) for name in self.columns}
-        rows = Rows(update.time, update.step, ids, types, columns)
-        self._add(self.path(), self._snapshots, rows)
+        snapshot = Snapshot(update.time, update.step, self.extent()[1], self.tables())
+        self._add(self.path(), self._snapshots, snapshot)
         self._snapshots += 1
 
-    def _add(self, path: Path, k: int, rows: Rows) -> None:
+    def _add(self, path: Path, k: int, snapshot: Snapshot) -> None:
         """Write snapshot `k`: to a file of its own, or after those before it."""
         import h5py
 
         if k == 0 or self.one_file_per_step:
             # In memory at first: HDF5 cannot close a file for which there is no room.
             with h5py.File("new", "w", driver="core", backing_store=False, libver="latest") as root:
-                self._prepare(root, rows.ids)
-                self._append(root, 0, rows)
+                self._prepare(root, snapshot.last)
                 root.flush()
                 image = root.id.get_file_image()
             with whole(path) as file:
                 file.write(image)
+                file.flush()
+                self._go_on(Path(file.name), 0, snapshot)
             return
+        self._go_on(path, k, snapshot)
+
+    def _go_on(self, path: Path, k: int, snapshot: Snapshot) -> None:
+        """Write snapshot `k` into a file, after those before it."""
         with _reported(path), _opened_to_append(path) as root:
             try:
-                self._append(root, k, rows)
+                self._append(root, k, snapshot)
             except BaseException:
                 for name in ("time", "step", *self.columns):
                     root[name].resize(k, axis=0)
@@ -98,19 +101,32 @@ class Hdf5Dump(TableDump):
             self.warn_of_absence()
             self._snapshots = 0
 
-    def _past(self, old: Any, k: int) -> Rows:
+    def _past(self, old: Any, k: int) -> Snapshot:
         """Snapshot `k` of a file; rows that hold NaN alone were not there."""
-        columns = {name: old[name][k] for name in self.columns}
-        at = np.flatnonzero(~np.all([np.isnan(row) for row in columns.values()], axis=0))
-        kept = {name: row[at] for name, row in columns.items()}
-        time, step = float(old["time"][k]), int(old["step"][k])
-        return Rows(time, step, old["id"][:][at], old["type"][:][at], kept)
 
-    def _prepare(self, root: Any, ids: np.ndarray) -> None:
+        def tables(begins: Iterable[int]) -> Iterator[Table]:
+            for begin in begins:
+                own = slice(begin, begin + PIECE)
+                columns = [old[name][k, own] for name in self.columns]
+                at = np.flatnonzero(~np.isnan(columns).all(axis=0))
+                ids, types = old["id"][own][at], old["type"][own][at]
+                yield Table(ids, types, [column[at] for column in columns])
+
+        begins = range(0, len(old["id"]), PIECE)
+        there = (int(table.ids[-1]) for table in tables(reversed(begins)) if len(table.ids))
+        time, step = float(old["time"][k]), int(old["step"][k])
+        return Snapshot(time, step, next(there, self._first - 1), tables(begins))
+
+    @property
+    def _first(self) -> int:
+        """The least id: points are numbered from 1 and nodes from 0."""
+        return int(self.rows_are == "points")
+
+    def _prepare(self, root: Any, last: int) -> None:
         """Make the empty arrays, with names of their axes, as xarray reads them."""
         root.attrs["title"] = f"{self.rows_are} of a scene of karamelo-py"
         root.attrs["domain"] = np.array([self.hub.domain.lo, self.hub.domain.hi])
-        rows = max(int(ids.max(initial=0)), 1)
+        rows = max(last, 1)
         for name, kind in (("time", float), ("step", np.int64)):
             root.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(1024,))
         for name in ("id", "type"):
@@ -134,27 +150,40 @@ class Hdf5Dump(TableDump):
             for axis, scale in enumerate(scales):
                 root[name].dims[axis].attach_scale(root[scale])
 
-    def _append(self, root: Any, k: int, rows: Rows) -> None:
-        """Write snapshot `k`. Points are numbered from 1 and nodes from 0: rows go by their id."""
-        first = int(self.rows_are == "points")
-        at = rows.ids - first
-        count = max(int(at.max(initial=-1)) + 1, len(root["id"]))
+    def _append(self, root: Any, k: int, snapshot: Snapshot) -> None:
+        """Write snapshot `k`. Rows go by their id."""
+        first = self._first
+        count = max(snapshot.last + 1 - first, len(root["id"]))
         if count > len(root["id"]):
             for name in ("id", "type"):
                 root[name].resize((count,))
-            root["id"][:] = np.arange(first, first + count)
-        known = root["type"][:]
-        if (known[at] != rows.types).any():
-            known[at] = rows.types
-            root["type"][:] = known
-        for name, number in (("time", rows.time), ("step", rows.step)):
+            for begin in range(0, count, PIECE):
+                end = min(begin + PIECE, count)
+                root["id"][begin:end] = np.arange(first + begin, first + end)
+        for name, number in (("time", snapshot.time), ("step", snapshot.step)):
             root[name].resize((k + 1,))
             root[name][k] = number
-        row = np.full(count, np.nan)
         for name in self.columns:
-            row[at] = rows.columns[name]
             root[name].resize((k + 1, count))
-            root[name][k] = row
+        for table in snapshot.tables:
+            at = table.ids - first
+            # Always the same pieces, so that a file has the same bytes however its rows come.
+            for begin in range(0, count, PIECE):
+                own, here = (
+                    slice(begin, min(begin + PIECE, count)),
+                    slice(*np.searchsorted(at, (begin, begin + PIECE))),
+                )
+                if here.start == here.stop:
+                    continue
+                rows = at[here] - begin
+                known = root["type"][own]
+                if (known[rows] != table.types[here]).any():
+                    known[rows] = table.types[here]
+                    root["type"][own] = known
+                row = np.full(len(known), np.nan)
+                for name, column in zip(self.columns, table.columns, strict=True):
+                    row[rows] = column[here]
+                    root[name][k, own] = row
 
 
 @contextmanager

@@ -111,9 +111,9 @@ class LammpsDump(TableDump):
 
     def _snapshot(self) -> Iterator[bytes]:
         """The text of the present state, piece by piece."""
-        ids, types = self.ids()
-        yield header(self.hub, len(ids), ["id", "type", *self.columns])
-        yield from rows([ids, types, *(self.field(name) for name in self.columns)])
+        yield header(self.hub, self.extent()[0], ["id", "type", *self.columns])
+        for ids, types, columns in self.tables():
+            yield from rows([ids, types, *columns])
 
 
 class Gzipped:

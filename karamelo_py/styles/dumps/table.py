@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,14 @@ POSITIONS = ("x", "y", "z")
 # Written with every row, so asking for them again adds nothing. `tag` is Karamelo's second name of
 # the id.
 LEADING = ("id", "type", "tag")
+
+
+class Table(NamedTuple):
+    """Some rows, in the order of their ids: identities and types, (n,) whole numbers; columns."""
+
+    ids: np.ndarray
+    types: np.ndarray
+    columns: list[np.ndarray]
 
 
 class TableDump(Dump):
@@ -63,13 +72,22 @@ class TableDump(Dump):
         """Names of the columns that can be written."""
         raise NotImplementedError
 
-    def ids(self) -> tuple[np.ndarray, np.ndarray]:
-        """Integers (n,): identity and type of each row, in the order of the ids."""
+    def extent(self) -> tuple[int, int]:
+        """Number of rows, and the largest id."""
         raise NotImplementedError
 
-    def field(self, name: str) -> np.ndarray:
-        """(n,) values of a column."""
+    def tables(self) -> Iterator[Table]:
+        """All rows in the order of their ids, in pieces whose columns fit into memory."""
         raise NotImplementedError
+
+    def table(self) -> Table:
+        """All rows."""
+        parts = list(self.tables())
+        if len(parts) == 1:
+            return parts[0]
+        ids, types, columns = zip(*parts, strict=True)
+        joined = (np.concatenate(same) for same in zip(*columns, strict=True))
+        return Table(np.concatenate(ids), np.concatenate(types), list(joined))
 
 
 class OfPoints:
@@ -93,13 +111,17 @@ class OfPoints:
         """Columns that are 0 because no point keeps them."""
         return self.hub.fields.absent_at_points()
 
-    def ids(self) -> tuple[np.ndarray, np.ndarray]:
-        """Number and solid of each point."""
-        return tuple(self.field(name).astype(np.int64, copy=False) for name in ("id", "type"))
+    def extent(self) -> tuple[int, int]:
+        """Number of the points that there are, and the last of them."""
+        present = self.hub.fields.present
+        count = int(np.count_nonzero(present))
+        return count, len(present) - int(present[::-1].argmax()) if count else 0
 
-    def field(self, name: str) -> np.ndarray:
-        """(n,) values of a particle field."""
-        return self.hub.fields.particle(name)
+    def tables(self) -> Iterator[Table]:
+        """Number and solid of each point, and its columns."""
+        for fields in self.hub.fields.pieces():
+            ids, types = (fields.particle(name).astype(np.int64) for name in ("id", "type"))
+            yield Table(ids, types, [fields.particle(name) for name in self.columns])
 
 
 class OfNodes:
@@ -128,7 +150,6 @@ class OfNodes:
     ):
         super().__init__(hub, every, file, *columns)
         self.occupied = occupied
-        self._rows: np.ndarray | slice = slice(None)
 
     @property
     def absent(self) -> Sequence[str]:
@@ -140,14 +161,17 @@ class OfNodes:
         """Names of the columns that can be written."""
         return hub.fields.node_names()
 
-    def ids(self) -> tuple[np.ndarray, np.ndarray]:
-        """Number and grid of each node."""
-        ids = np.arange(self.hub.fields.node_count)
-        if self.occupied:
-            self._rows = np.flatnonzero(self.hub.fields.node("mass") > 0)
-            ids = ids[self._rows]
-        return ids, self.field("type")
+    def extent(self) -> tuple[int, int]:
+        """Number of the nodes that are written, and the last of them."""
+        rows = np.arange(self.hub.fields.node_count)[self._rows()]
+        return len(rows), int(rows.max(initial=-1))
 
-    def field(self, name: str) -> np.ndarray:
-        """Values of a node field, of the nodes that are written."""
-        return self.hub.fields.node(name)[self._rows]
+    def tables(self) -> Iterator[Table]:
+        """Number and grid of each node, and its columns, of all nodes at once."""
+        node, rows = self.hub.fields.node, self._rows()
+        ids = np.arange(self.hub.fields.node_count)[rows]
+        yield Table(ids, node("type")[rows], [node(name)[rows] for name in self.columns])
+
+    def _rows(self) -> np.ndarray | slice:
+        """Which nodes are written."""
+        return np.flatnonzero(self.hub.fields.node("mass") > 0) if self.occupied else slice(None)

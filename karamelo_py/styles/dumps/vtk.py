@@ -65,8 +65,8 @@ class VtkDump(TableDump):
         """Write one snapshot, then the list of all."""
         import meshio
 
-        ids, types = self.ids()
-        columns: dict[str, Any] = {name: self.field(name) for name in self.columns}
+        ids, types, found = self.table()
+        columns: dict[str, Any] = dict(zip(self.columns, found, strict=True))
         x = np.column_stack([columns.pop(name) for name in POSITIONS])
         mesh = meshio.Mesh(x, self.cells(ids), {"id": ids, "type": types, **columns})
         path = self.path()
