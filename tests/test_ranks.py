@@ -67,8 +67,8 @@ def test_dumps_in_pieces(state_interpreted, tmp_path, monkeypatch):
     HDF5 puts its rows into the file in pieces: what it holds is the same.
     """
     script = block(
-        2, "boundary(delete)", *DUMPS, MOVING[0].replace("0.9", "9"), *MOVING[1:], "run(28)",
-        ppc=3, size=(0.3, 0.1),
+        2, "boundary(delete)", *DUMPS, MOVING[0].replace("0.9", "9"), *MOVING[1:], "run(34)",
+        ppc=3, size=(0.3, 0.2),
     )  # fmt: skip
     state_interpreted(script, boxes=True, out="at once")
     for module in ("run.by_id", "styles.dumps.hdf5"):
