@@ -21,9 +21,9 @@ from karamelo_py.language.unknown import (
     unknown_name,
     unknown_statement,
 )
-from karamelo_py.script import expressions
+from karamelo_py.script import evaluation
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError, nearest
-from karamelo_py.script.expressions import SEEDS, Expression, Formula, Value, mark
+from karamelo_py.script.expressions import SEEDS, Expression, Value
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
 from karamelo_py.script.parser import parse, parse_expression, parse_text
 from karamelo_py.script.reading import read_script
@@ -492,11 +492,9 @@ class Interpreter:
         except ScriptError as error:
             error.place = error.place or place
             raise
-        if isinstance(value, Expression):
-            value = value.formula
         if isinstance(value, (bool, int, float)):
             return float(value)
-        if isinstance(value, (str, Formula)):
+        if isinstance(value, (str, Expression)):
             return value
         raise no_value(name, place)
 
@@ -504,7 +502,7 @@ class Interpreter:
 
     def evaluate(self, node: Node, raw: Raw) -> Value:
         """What an expression stands for now: a number, a text or a formula."""
-        return expressions.evaluate(node, raw, self)
+        return evaluation.evaluate(node, raw, self)
 
     def knows(self, name: str) -> bool:
         """Whether a name means something in an expression."""
@@ -519,21 +517,21 @@ class Interpreter:
     def name(self, name: str, node: Name, raw: Raw) -> Value:
         """What a name in an expression stands for."""
         if name in SEEDS:
-            return Formula.seed(name)
+            return Expression.seed(name)
         if name in self.variables:
             return self.variables[name]
         if name in CONSTANTS:
             return CONSTANTS[name]
         if name in self.hub.values:
-            return Formula.seed(name)
-        raise unknown_name(self, name, mark(raw, node))
+            return Expression.seed(name)
+        raise unknown_name(self, name, evaluation.mark(raw, node))
 
 
 def shown(value: Value) -> str:
     """A value as a script would say it."""
     if isinstance(value, str):
         return f'"{value}"'
-    if isinstance(value, Formula):
+    if isinstance(value, Expression):
         return value.text
     return number_text(value)
 
