@@ -18,7 +18,8 @@ import numpy as np
 
 from karamelo_py.app.shown import Picture, Table
 from karamelo_py.language import registry, signature
-from karamelo_py.language.interpreter import Interpreter, shown
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.language.meanings import shown
 from karamelo_py.output.console import Console
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from karamelo_py.language.interpreter import shown
+from karamelo_py.language.meanings import shown
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit

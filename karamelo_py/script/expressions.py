@@ -7,6 +7,7 @@ the time, a published value), the result is a formula, with the numbers folded i
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +48,16 @@ class Expression:
     def seed(cls, name: str) -> Expression:
         """The formula that is nothing but a name."""
         return cls(Term("name", (), name))
+
+    @classmethod
+    def from_script(cls, hub: Any, argument: Any) -> Expression:
+        """The expression that a script's argument stands for."""
+        value = argument.value(hub)
+        if isinstance(value, str):
+            raise ScriptError(
+                f"'{value}' is text", place=argument.place, expected="a number or a formula"
+            )
+        return cls(value)
 
     def minus(self, other: Expression) -> Expression:
         """The formula of the difference."""
