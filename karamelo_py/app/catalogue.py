@@ -1,7 +1,5 @@
 """karamelo-py styles and karamelo-py help: what a script can say, and what each word means."""
 
-from __future__ import annotations
-
 import inspect
 import sys
 import textwrap

@@ -1,7 +1,5 @@
 """Functions of groups in expressions: centre of mass and forces, as Karamelo calls them."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from karamelo_py.scene.domain import require_domain

@@ -1,7 +1,5 @@
 """Commands of the language itself: print, value (or evaluate), include, quit."""
 
-from __future__ import annotations
-
 import math
 
 from karamelo_py.language.meanings import shown

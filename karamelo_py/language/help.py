@@ -1,7 +1,5 @@
 """Help about commands and styles, from their signatures and docstrings."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

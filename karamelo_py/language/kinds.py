@@ -1,7 +1,5 @@
 """Kinds of arguments: what an annotation asks for, how to say it, how to make it."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import os

@@ -1,7 +1,5 @@
 """What names and calls in expressions mean: variables, published values, functions, commands."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from karamelo_py.language import registry, signature

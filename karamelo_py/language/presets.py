@@ -1,7 +1,5 @@
 """Variables from the command line, which win over those that a script assigns."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from contextlib import suppress

@@ -13,8 +13,6 @@ are added with Annotated. ``*args`` take any number, keyword-only parameters are
 ``name=value``.
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable, Sequence

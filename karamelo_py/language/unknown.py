@@ -1,7 +1,5 @@
 """Names that nothing answers to, or that cannot be given: what may have been meant."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from typing import Any, Protocol

@@ -1,7 +1,5 @@
 """Fields of points and nodes for output, in the order of their ids."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """The look that all plots share."""
 
-from __future__ import annotations
-
 from math import floor, log10
 from typing import Any
 

@@ -4,8 +4,6 @@ A view hands out arrays with a row for each node or point of the group. What a h
 by assignment or in place, is written back when it returns; what cannot be changed is read-only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """From the trees of expressions to what they stand for: numbers, texts and formulas."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import Any, Protocol

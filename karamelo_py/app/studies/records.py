@@ -1,7 +1,5 @@
 """The table of a study: one row a run, as CSV, and what it was made with beside it."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

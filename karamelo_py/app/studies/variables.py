@@ -1,7 +1,5 @@
 """Variables of a study: their values, which go together, and whether a script reads them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import product

@@ -1,7 +1,5 @@
 """Meshes from files: read by meshio, and made by Gmsh where the file is a geometry."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import tempfile

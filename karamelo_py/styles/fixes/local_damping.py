@@ -1,7 +1,5 @@
 """fix local_damping: forces against the motion, as large as what is out of balance."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from karamelo_py.language.signature import In
