@@ -4,8 +4,6 @@ Scenes that are not named keep what the table said about them before. Runs work 
 folder, or below ``--folder``, where their logs and dumps stay.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

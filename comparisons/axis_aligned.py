@@ -1,7 +1,5 @@
 """Manufactured solution of a vibrating square: order of the displacement."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.row import Row

@@ -1,7 +1,5 @@
 """Billet pressed flat between platens that hold it, in space: load and shape beside axisymmetry."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.row import Row

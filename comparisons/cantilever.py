@@ -1,7 +1,5 @@
 """Beam that sinks under a sudden weight: its lowest point, by CPDI and cpgimp."""
 
-from __future__ import annotations
-
 from comparisons.exact import minimum
 from comparisons.row import Row
 

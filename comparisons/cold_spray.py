@@ -1,7 +1,5 @@
 """Copper ball on copper at 500 m/s, a quarter in space: strain and heat beside axisymmetry."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.pictures import coloured

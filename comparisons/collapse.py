@@ -1,7 +1,5 @@
 """Heap of aluminium bars let go on one side: what is left, against the experiment of Bui et al."""
 
-from __future__ import annotations
-
 from math import atan, degrees
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Column under its own weight: how the stress converges, by CPDI."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.row import Row

@@ -1,7 +1,5 @@
 """Column of water that falls down: its front against Martin & Moyce, and its density."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

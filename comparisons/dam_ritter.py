@@ -1,7 +1,5 @@
 """Long reservoir whose dam goes at once: depths against the solution of Ritter."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.lines import surface

@@ -1,7 +1,5 @@
 """Steel disk into aluminium, 1160 m/s, plane strain: path of the disk as in a published program."""
 
-from __future__ import annotations
-
 from math import sqrt
 from pathlib import Path
 

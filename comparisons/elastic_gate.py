@@ -1,7 +1,5 @@
 """Water that pushes an elastic gate open: a stiff gate at rest as a beam; outflow and energy."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.row import Row

@@ -9,8 +9,6 @@ in plane strain (2D) or uniaxial strain (1D). tests/test_exact.py derives every 
 by numerical differentiation, and holds the rest against independent numbers.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import atan, cos, exp, log, pi, sin, sqrt, tan
 from pathlib import Path

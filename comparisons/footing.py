@@ -1,7 +1,5 @@
 """Rigid strip that is pressed into clay: the load when it yields, against Prandtl."""
 
-from __future__ import annotations
-
 from math import radians
 
 from comparisons.exact import prandtl_load

@@ -1,7 +1,5 @@
 """Collapse of a column of sand on a rough floor: how far it runs out, by its aspect ratio."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.exact import granular_runout

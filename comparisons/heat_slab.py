@@ -1,7 +1,5 @@
 """Heat that flows into a slab, against the error function."""
 
-from __future__ import annotations
-
 from math import erfc, pi, sqrt
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Elastic disk on a rigid plane: force and stress below the contact against Hertz."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.exact import hertz_load, hertz_stress

@@ -1,7 +1,5 @@
 """Elastic disk on an incline: it slides, or it rolls."""
 
-from __future__ import annotations
-
 from math import radians
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Thick cylinder widened from inside: pressure, displacement and stress by Lame."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.row import Row

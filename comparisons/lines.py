@@ -1,7 +1,5 @@
 """Distances between measured and computed lines."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

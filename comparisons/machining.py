@@ -1,7 +1,5 @@
 """Tool that cuts steel at 50 m/s: force of the cut beside Merchant's, energy, chip."""
 
-from __future__ import annotations
-
 from math import atan, cos, pi, sin, sqrt
 
 import numpy as np

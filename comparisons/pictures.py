@@ -1,7 +1,5 @@
 """How pictures of comparisons look: as charts of studies do, also in grey."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from cycler import cycler

@@ -1,7 +1,5 @@
 """Lead ball through a lead plate at 6.58 km/s: shock, momentum, energy, speed of the debris."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.pictures import coloured

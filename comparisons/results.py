@@ -1,7 +1,5 @@
 """What a run leaves behind, read back: the table of its log and the snapshots of its dumps."""
 
-from __future__ import annotations
-
 import gzip
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One number of a scene beside the number that somebody else found."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

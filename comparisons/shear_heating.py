@@ -1,7 +1,5 @@
 """Adiabatic heating of a sheared block: temperature by the plastic work, in closed form."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

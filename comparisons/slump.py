@@ -1,7 +1,5 @@
 """Slope that slides down under its weight: surface and slip surface against Huang et al. 2015."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

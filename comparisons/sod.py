@@ -1,7 +1,5 @@
 """Sod's shock tube: plateaus and shock against the exact solution."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Disk that spins freely: angular momentum and energy after a turn."""
 
-from __future__ import annotations
-
 from math import pi
 
 from comparisons.row import Row

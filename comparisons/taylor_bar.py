@@ -1,7 +1,5 @@
 """Copper bar against a wall, 190 m/s, in three dimensions: final shape against the experiment."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from comparisons.row import Row

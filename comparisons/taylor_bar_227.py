@@ -1,7 +1,5 @@
 """Copper rod against a wall, 227 m/s, axisymmetric: final shape against finite element codes."""
 
-from __future__ import annotations
-
 from comparisons.pictures import coloured
 from comparisons.row import Row
 

@@ -1,7 +1,5 @@
 """Tensile test of a steel bar to failure: closed forms to the neck, finite elements beyond."""
 
-from __future__ import annotations
-
 from math import exp
 from pathlib import Path
 

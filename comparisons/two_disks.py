@@ -1,7 +1,5 @@
 """Two elastic disks that bounce: energies beside Karamelo's, contact beside the exact time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

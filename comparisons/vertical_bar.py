@@ -1,7 +1,5 @@
 """Cube that hangs from its upper face under a sudden weight, in three dimensions."""
 
-from __future__ import annotations
-
 from comparisons.row import Row
 
 SMALL = None  # with fewer cells it is another bar

@@ -1,7 +1,5 @@
 """Bar that vibrates in its first mode: frequency and energy over ten periods."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

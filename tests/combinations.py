@@ -1,7 +1,5 @@
 """Every combination of method, basis, transfer, scheme and kinematics, as a tiny scene."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import meshio

@@ -1,7 +1,5 @@
 """What the tests share: scripts run through the real command line, and read back."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

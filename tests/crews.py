@@ -1,7 +1,5 @@
 """Processes that share a scene, as threads of one: what MPI does, without it."""
 
-from __future__ import annotations
-
 import copy
 import threading
 from collections.abc import Callable, Sequence

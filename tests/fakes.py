@@ -1,7 +1,5 @@
 """A small hub for tests of output: a cloud of points and a grid with made-up, well-known values."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from types import SimpleNamespace

@@ -5,8 +5,6 @@ of comparisons/exact.py, lumped masses, explicit central differences. It shares 
 package.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import product
 

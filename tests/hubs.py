@@ -1,7 +1,5 @@
 """A hub with a domain and a material, and arguments as a script has them."""
 
-from __future__ import annotations
-
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console

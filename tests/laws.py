@@ -1,7 +1,5 @@
 """One point of a law, driven through strains; numbers of the tests of laws."""
 
-from __future__ import annotations
-
 import numpy as np
 from tensors import flat, symmetric_matrix
 

@@ -1,7 +1,5 @@
 """Plug-ins put into a folder as pip would install them, without building anything."""
 
-from __future__ import annotations
-
 import shutil
 import tomllib
 from pathlib import Path

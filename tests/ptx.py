@@ -3,8 +3,6 @@
 Needs numba-cuda and NVIDIA's compiler libraries, but neither a GPU nor a driver.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from types import SimpleNamespace

@@ -3,8 +3,6 @@
 Without a GPU: that scenes run on one, and how fast, nobody has seen.
 """
 
-from __future__ import annotations
-
 import re
 from inspect import getmodule, isfunction, signature
 

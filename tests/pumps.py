@@ -1,7 +1,5 @@
 """Functions for fix python that keep something from step to step."""
 
-from __future__ import annotations
-
 import numpy as np
 
 remembers = ("strokes", "sent", "log")

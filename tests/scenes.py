@@ -1,7 +1,5 @@
 """Small scenes for tests of the engine, as scripts."""
 
-from __future__ import annotations
-
 TRANSFERS = {
     "PIC": "PIC, linear",
     "FLIP": "FLIP, linear, 1",

@@ -1,7 +1,5 @@
 """Which of many combinations run always; ``pytest -m full`` runs the others, too."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from itertools import combinations
 from random import Random

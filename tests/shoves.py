@@ -1,7 +1,5 @@
 """Functions for fix python that remember nothing."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """The exact state at the end of a script: every bit of what the points carry."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from tempfile import mkdtemp

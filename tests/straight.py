@@ -8,8 +8,6 @@ question that only a value can answer (`if x > 0`) is answered as it was at firs
 is stored, what was written asks again, and leaves it to a function written for the other answer.
 """
 
-from __future__ import annotations
-
 import builtins
 import operator
 import re

@@ -1,7 +1,5 @@
 """Flat tuples of a kinematics as NumPy matrices (3, 3), and back; strategies for Hypothesis."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 

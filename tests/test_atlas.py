@@ -1,7 +1,5 @@
 """The atlas: entries run by their commands, go on where they stopped, and become a page."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

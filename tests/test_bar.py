@@ -4,8 +4,6 @@ L 25, E 100, rho 1, nu 0, v0 = 0.1 sin(pi x / 2L): the mean velocity is 0.2/pi c
 omega = pi / (2L) sqrt(E / rho), a period of 10, and the energy m v^2 / 2 = 0.1^2 L / 4 stays.
 """
 
-from __future__ import annotations
-
 from math import pi, sqrt
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Basis functions: partition of unity, linear functions reproduced, up to every wall."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """karamelo-py bench: its scenes, and what it says of them. No speed is asserted."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

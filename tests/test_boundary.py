@@ -1,7 +1,5 @@
 """boundary: points that reach the edge of the domain end the run, are deleted, or come back."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

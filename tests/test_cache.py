@@ -1,7 +1,5 @@
 """Kernels on disk: compiled again when what is in them has changed, and never in the way."""
 
-from __future__ import annotations
-
 import errno
 import io
 import os

@@ -1,7 +1,5 @@
 """karamelo-py check: what a scene needs, without running it."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

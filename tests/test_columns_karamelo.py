@@ -1,7 +1,5 @@
 """Columns of Karamelo with their values: the rate of plastic strain, and those of nodes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scenes import block

@@ -4,8 +4,6 @@ Interpreted: each combination with one of the kinematics in turn, with the other
 Compiled: two, and a pairwise selection if ``-m full``.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every scene that has a published number meets it, at a small size (``-m full``: at its own)."""
 
-from __future__ import annotations
-
 import matplotlib.pyplot as plt
 import pytest
 from verification import run_scene

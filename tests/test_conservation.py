@@ -1,7 +1,5 @@
 """What transfers and schemes conserve: momentum, angular momentum, energy."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """method ulmpm/contacts: solids with velocity fields of their own that touch on the grid."""
 
-from __future__ import annotations
-
 from textwrap import dedent
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fixes contact/hertz and contact/minimize_penetration: points of two solids push each other."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Convected domains: weights and gradients, how domains move, what is refused."""
 
-from __future__ import annotations
-
 from textwrap import dedent
 from types import SimpleNamespace
 

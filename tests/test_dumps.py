@@ -1,7 +1,5 @@
 """Dumps: their text, what OVITO reads back, whole files, rhythm, pictures."""
 
-from __future__ import annotations
-
 import gzip
 import shutil
 

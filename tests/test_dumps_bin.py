@@ -1,7 +1,5 @@
 """dump particle/bin and grid/bin: read back by the layout in the manual of LAMMPS."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

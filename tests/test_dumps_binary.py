@@ -1,7 +1,5 @@
 """Dumps for other programs: what h5py, xarray, meshio and VTK read back."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """First steps, walls, nodes between outputs, hooks that move points: where a run could slip."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """load_path and element: one point of a material against closed forms, and what is refused."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Laws of an equation of state and a strength: one point against closed forms, and in scripts."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

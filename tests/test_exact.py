@@ -1,7 +1,5 @@
 """The exact solutions themselves: body forces derived again, tables found again."""
 
-from __future__ import annotations
-
 import re
 from math import atan, pi, radians
 

@@ -6,7 +6,7 @@ import pytest
 
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import Expression, Formula
+from karamelo_py.script.expressions import Expression
 from karamelo_py.script.values import CAPACITY, Values
 
 
@@ -35,7 +35,7 @@ def run(hub, text, **presets):
 def test_constants_are_numbers_and_seeds_make_formulas(hub):
     v = run(hub, "a = 2*3\nb = a*time\nc = b + a\nd = x0")
     assert v["a"] == 6.0
-    assert isinstance(v["b"], Formula)
+    assert isinstance(v["b"], Expression)
     assert v["b"].text == "6*time"
     assert v["c"].text == "6*time + 6"
     assert v["c"].names == {"time"}
@@ -99,8 +99,8 @@ def test_a_formula_of_positions_has_no_single_number(hub):
         run(hub, "f = x + time")["f"].evaluate(hub.values)
 
 
-def test_expression_wraps_numbers_and_formulas(hub):
-    constant, formula = Expression(3), Expression(Formula.seed("time"))
+def test_expressions_are_numbers_or_formulas(hub):
+    constant, formula = Expression(3), Expression.seed("time")
     assert constant.is_constant
     assert constant.constant == 3.0
     assert constant.evaluate(hub.values) == 3.0

@@ -3,8 +3,6 @@
 Interpreted; the compiled loop finds the same things in the same places.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

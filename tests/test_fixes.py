@@ -1,7 +1,5 @@
 """What fixes do, each against a calculation by hand."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

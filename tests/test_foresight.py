@@ -1,7 +1,5 @@
 """What is known to fail is told before the first step, with its cure."""
 
-from __future__ import annotations
-
 import pytest
 from conftest import INPUTS
 

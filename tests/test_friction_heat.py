@@ -1,7 +1,5 @@
 """The work of friction becomes heat."""
 
-from __future__ import annotations
-
 import pytest
 
 from karamelo_py.points.laws.linear import LinearElastic

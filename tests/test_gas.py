@@ -1,7 +1,5 @@
 """Gases take as heat the kinetic energy that a transfer takes."""
 
-from __future__ import annotations
-
 import pytest
 from conftest import INPUTS
 

@@ -1,7 +1,5 @@
 """Centre of mass, forces of groups, mean stress and reactions, against sums by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scenes import block

@@ -1,7 +1,5 @@
 """Heat that flows between points, against solutions of the heat equation."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

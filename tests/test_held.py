@@ -1,7 +1,5 @@
 """Tuples of arrays in kernels: held in memory, passed as one pointer."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numba

@@ -3,8 +3,6 @@
 Nothing here compares with a formula; the other tests do.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is always inlined in its callers is not compiled on its own; what of Numba that leans on."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 

@@ -1,7 +1,5 @@
 """leq and geq in velocity_nodes, and fixes that hold the same nodes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scenes import SCHEMES, block

@@ -1,7 +1,5 @@
 """Johnson and Cook without a rate, as scripts for Karamelo write it: epsdot0 = 0 where C = 0."""
 
-from __future__ import annotations
-
 import pytest
 from scenes import block
 

@@ -1,7 +1,5 @@
 """Names in scripts for Karamelo: which are free, and what further ones stand for."""
 
-from __future__ import annotations
-
 import math
 from statistics import NormalDist
 

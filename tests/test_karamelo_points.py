@@ -1,7 +1,5 @@
 """delete_particles and translate_particles, and the forms of 2020."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scenes import block

@@ -1,7 +1,5 @@
 """Scripts as they are written for Karamelo run, but for what docs/from-karamelo.md lists."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from textwrap import dedent

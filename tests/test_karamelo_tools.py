@@ -1,7 +1,5 @@
 """Forces of tools, walls and tractions on points, against their formulas point by point."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scenes import block

@@ -1,7 +1,5 @@
 """What may be meant, and is said: temperatures, plots of nothing, numbers that are none."""
 
-from __future__ import annotations
-
 import pytest
 from scenes import block
 

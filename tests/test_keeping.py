@@ -1,7 +1,5 @@
 """The energy table: words for logs, and the one command that makes it, reduced."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

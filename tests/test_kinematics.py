@@ -3,8 +3,6 @@
 Tolerances of 1e-12 are round-off of a dozen operations on numbers of order one.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Several points at once: each lane gives the bits of a point alone; nothing is beyond the last."""
 
-from __future__ import annotations
-
 from math import log1p, sin
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Damage: failure strain as published, D to 1 and beyond, and what is left of the stress."""
 
-from __future__ import annotations
-
 from math import exp, log
 
 import numpy as np

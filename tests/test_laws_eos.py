@@ -1,7 +1,5 @@
 """Equations of state: one point against the Hugoniot relations, adiabats and Tait's curve."""
 
-from __future__ import annotations
-
 from math import log, sqrt
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Flow stresses of metals by other laws than Johnson's, and of grains: against closed forms."""
 
-from __future__ import annotations
-
 from math import exp, log, sqrt
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Strengths of metals and their heating: one point against closed forms and integrations."""
 
-from __future__ import annotations
-
 from math import log, sqrt
 
 import numpy as np

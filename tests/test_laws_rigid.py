@@ -1,7 +1,5 @@
 """Rigid bodies: they keep the velocity they are given, and push what they meet."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

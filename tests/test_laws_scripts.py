@@ -1,7 +1,5 @@
 """Laws in scripts: what a scene carries, columns and computes, UL and TL, mistakes."""
 
-from __future__ import annotations
-
 import re
 from math import cos, radians, sin
 

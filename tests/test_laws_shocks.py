@@ -1,7 +1,5 @@
 """A shock in a scene: copper driven by a piston."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Strengths of soils: yield surfaces, edges and apex, triaxial strength, dilatancy, softening."""
 
-from __future__ import annotations
-
 from math import cos, log, radians, sin, sqrt, tan
 
 import numpy as np

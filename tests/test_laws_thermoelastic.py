@@ -1,7 +1,5 @@
 """Elastic laws with a temperature: free and hindered expansion, in every kinematics."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

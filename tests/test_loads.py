@@ -1,7 +1,5 @@
 """Forces on points, tractions and pressure on the edge of a region, and coming to rest."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scenes import block

@@ -1,7 +1,5 @@
 """The log: table, rhythm, columns; and what the terminal and a pipe show."""
 
-from __future__ import annotations
-
 import io
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Constitutive laws of one point: stress against energy, speed against the acoustic tensor."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

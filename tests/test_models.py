@@ -1,7 +1,5 @@
 """The same body by axisymmetric, quarter and full models (inputs/models)."""
 
-from __future__ import annotations
-
 import pytest
 from conftest import INPUTS
 

@@ -5,8 +5,6 @@ Every pair of dimension, transfer, scheme and law; with ``-m full`` every combin
 Tiny scenes, interpreted: what is compiled is the same source (test_identical.py).
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Processes of MPI that carry out a script together: the bytes of one, and one end for all."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

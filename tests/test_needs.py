@@ -1,7 +1,5 @@
 """No more than a scene needs: fields, memory, and what check says could be left out."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """dump, log, plot and their kin as a script says them: what they accept and how they refuse."""
 
-from __future__ import annotations
-
 import io
 import re
 

@@ -3,8 +3,6 @@
 At full size they are compared in comparisons/ (``pytest -m full``, docs/comparison.md).
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import INPUTS

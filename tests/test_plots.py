@@ -1,7 +1,5 @@
 """plot and save_plot: what is collected and that it is drawn."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """compute probe: means, points, places."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -4,8 +4,6 @@ Numba keeps one way of lowering an intrinsic for all targets: a process that has
 may not find that of the processor any more.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

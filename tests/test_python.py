@@ -1,7 +1,5 @@
 """Scenes made in Python: the same numbers, messages and files as those of the command line."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -3,8 +3,6 @@
 Here they are threads that talk as processes do, interpreted; the last tests start processes.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import h5py

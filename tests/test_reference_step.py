@@ -1,7 +1,5 @@
 """Steps against the reference step of the documentation, which is written from the equations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from reference_step import Body, linear, quadratic, step, stress, vibrating_bar

@@ -3,8 +3,6 @@
 Nothing here compares with a formula; the other tests do.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

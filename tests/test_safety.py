@@ -1,7 +1,5 @@
 """What is written and run only where the user says so: files of others, programs of geometries."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -3,8 +3,8 @@
 import pytest
 from hubs import SmallHub
 
+from karamelo_py.language.help import describe
 from karamelo_py.language.interpreter import Interpreter
-from karamelo_py.language.signature import describe
 from karamelo_py.script.errors import ScriptError
 
 SCENE = """

@@ -1,7 +1,5 @@
 """Several mistakes of a script in one go, and mistakes in scripts that others include."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

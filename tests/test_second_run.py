@@ -1,7 +1,5 @@
 """The second run of a script compiles nothing: each run is a process of its own."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import pytest
 
 from karamelo_py.language import registry, signature
+from karamelo_py.language.help import describe
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.language.signature import (
     Argument,
@@ -274,7 +275,7 @@ def test_records_need_no_hub(hub):
     with pytest.raises(ScriptError, match="argument 1 'a' must be a number above 0, not -1"):
         call(hub, Pair, "-1")
     assert call(hub, Moduli, "6, 0.25") == Moduli(4.0, 2.4)
-    first, _ = signature.describe(Moduli, "m").parameters
+    first, _ = describe(Moduli, "m").parameters
     assert first.description == "Young's modulus."
     with pytest.raises(ScriptError, match="too stiff") as caught:
         call(hub, Moduli, "1e9, 0")
@@ -306,7 +307,7 @@ def test_syntax(hub):
 
 
 def test_help():
-    text = signature.describe(Style, "style")
+    text = describe(Style, "style")
     assert text.summary == "Do a thing."
     assert text.text == "And more of it."
     assert text.example == "style(1, 2)"
@@ -323,7 +324,7 @@ def test_every_command_and_style_has_help():
             target = registry.find(family, name)
             if family in ("command", "fix", "compute", "region", "material", "dump"):
                 shown = name if family == "command" else f"{family} {name}"
-                described = signature.describe(target, shown)
+                described = describe(target, shown)
                 assert described.summary.endswith("."), shown
                 assert described.example, shown
                 assert described.syntax.startswith(shown.split()[0] + "("), shown

@@ -1,7 +1,5 @@
 """Time steps: the stable step, fixed steps, exact ends of runs, runs that follow each other."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

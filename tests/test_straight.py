@@ -1,7 +1,5 @@
 """What is interpreted on straight functions has the bits of what is interpreted plainly."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

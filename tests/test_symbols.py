@@ -1,7 +1,5 @@
 """Formulas on symbols: the flat function that is written does the formula's operations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numba import njit

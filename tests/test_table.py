@@ -1,7 +1,5 @@
 """A scheme's table: what shares a visit, and what does not."""
 
-from __future__ import annotations
-
 from karamelo_py.kernels.g2p import Move, Strain, StrainInMove
 from karamelo_py.kernels.nodes import Update
 from karamelo_py.kernels.p2g import InternalForce, MassMomentum

@@ -3,8 +3,6 @@
 Few points give straight to the nodes, which cannot go wrong: that is what boxes are held against.
 """
 
-from __future__ import annotations
-
 from math import inf
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Totals: sums without rounding, whatever the order of their terms."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import fsum
 

@@ -1,7 +1,5 @@
 """Transfers of velocity: definitions, and what they conserve when a point meets the grid."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

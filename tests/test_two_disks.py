@@ -3,8 +3,6 @@
 That of inputs/in.two_disks itself is in comparisons/two_disks.py.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import INPUTS

@@ -1,7 +1,5 @@
 """Names of consistent sets of units."""
 
-from __future__ import annotations
-
 import pytest
 
 from karamelo_py.output.units import ENERGY, FORCE, STRESS, VELOCITY, Powers, Units

@@ -4,8 +4,6 @@ Places belong to the ends of steps, velocities to their middles (leapfrog). With
 acts for (dt_(n-1) + dt_n)/2. Kicks of dt_n would be of first order and feed vibrations.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import cos, factorial, log, pi, sqrt
 

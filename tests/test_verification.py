@@ -3,8 +3,6 @@
 What a scene shows as it is written, comparisons/ say.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 What is published about them is in comparisons/.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

@@ -3,8 +3,6 @@
 Each has a number that follows from the method, or bounds that separate the failure from the cure.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import h5py

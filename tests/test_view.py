@@ -1,7 +1,5 @@
 """karamelo-py view and plot, and where the files of a run go: what a person does after a run."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from fakes import FakeHub

@@ -1,7 +1,5 @@
 """Friction at walls that fix velocity_nodes makes: the momentum that it takes, and sticking."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

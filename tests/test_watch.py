@@ -1,7 +1,5 @@
 """The watch over energy and temperatures: what it counts, what it tells, where it stops a run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -5,8 +5,6 @@ before Numba is imported). Tells where its package lies, then reads one JSON req
 answers with one JSON line.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -4,8 +4,6 @@ A `Way` is a method as a script of inputs/ takes it from the command line. A tab
 the parameters of a test.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -1,15 +1,14 @@
 """karamelo-py styles and karamelo-py help: what a script can say, and what each word means."""
 
-from __future__ import annotations
-
 import inspect
 import sys
 import textwrap
 from collections.abc import Iterable, Sequence
 from io import TextIOWrapper
 
-from karamelo_py.language import registry, signature
-from karamelo_py.language.signature import Help, Parameter
+from karamelo_py.language import registry
+from karamelo_py.language.help import Help, describe
+from karamelo_py.language.signature import Parameter
 from karamelo_py.script.errors import ScriptError, meant
 
 COMMAND = "command"
@@ -36,7 +35,7 @@ def help_of(family: str, name: str) -> Help:
     """
     target = registry.find(family, name)
     try:
-        return signature.describe(target, name if family == COMMAND else f"{family} {name}")
+        return describe(target, name if family == COMMAND else f"{family} {name}")
     except TypeError as error:
         raise ScriptError(
             f"{family} '{name}' of {registry.origin(family, name)} has a signature that cannot be "

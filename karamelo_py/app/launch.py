@@ -5,8 +5,6 @@ the terminal, or whatever output and errors go to, and the signals that come; th
 they know that it does not. What mpiexec says is shown only where no process was started.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -1,7 +1,5 @@
 """Options of the command line that say where the files of a run go."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """karamelo-py plot: columns of the log of an earlier run against each other."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a simulation in Python shows: columns by name, and pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path

@@ -18,12 +18,13 @@ import numpy as np
 
 from karamelo_py.app.shown import Picture, Table
 from karamelo_py.language import registry, signature
-from karamelo_py.language.interpreter import Interpreter, shown
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.language.meanings import shown
 from karamelo_py.output.console import Console
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Pause, Quit, ScriptError, nearest
-from karamelo_py.script.expressions import Formula
+from karamelo_py.script.expressions import Expression
 from karamelo_py.script.parser import parse, parse_text
 
 _folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
@@ -186,7 +187,7 @@ class Simulation:
         try:
             raw, node = parse_text(expression, "evaluate")
             found = self._interpreter.evaluate(node, raw)
-            if isinstance(found, Formula):
+            if isinstance(found, Expression):
                 self.hub.refresh_values()
                 return found.evaluate(self.hub.values)
             return found

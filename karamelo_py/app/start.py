@@ -4,8 +4,6 @@ An interrupt in the midst of an import can come out as any error; while nothing 
 program just ends.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 

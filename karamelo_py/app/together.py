@@ -1,7 +1,5 @@
 """One of several processes that carry out a script: what it may say, and how all end together."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """karamelo-py view: pictures or a movie from the dumps of an earlier run."""
 
-from __future__ import annotations
-
 import argparse
 import glob
 from collections.abc import Iterable

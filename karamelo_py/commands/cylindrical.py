@@ -1,7 +1,5 @@
 """Command populate_cylindrical_coordinates: points of a solid in rings about an axis."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Commands about space: dimension, create_domain, axisymmetric, region."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from karamelo_py.language import registry, signature

@@ -1,7 +1,5 @@
 """Commands that show a material before it is used: load_path, element."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Commands that define what acts and what is measured: fix, compute."""
 
-from __future__ import annotations
-
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument

@@ -1,13 +1,11 @@
 """Functions of groups in expressions: centre of mass and forces, as Karamelo calls them."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import AnyGroup, Group, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.expressions import Expression, Formula
+from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.computes.center_of_mass import CenterOfMass
 from karamelo_py.styles.fixes import measuring
 
@@ -40,7 +38,7 @@ def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
     ID = f"xcm({group.id})"
     if ID not in hub.computes:
         _file(hub, hub.computes, ID, CenterOfMass(hub, group), "center_of_mass")
-    return _component(hub, Formula.seed(f"{ID}_{direction}"), direction)
+    return _component(hub, Expression.seed(f"{ID}_{direction}"), direction)
 
 
 def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
@@ -111,7 +109,7 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
     return _component(hub, total.minus(inner), direction)
 
 
-def _total(hub: Hub, name: str, style: type, group: Group, direction: str) -> Formula:
+def _total(hub: Hub, name: str, style: type, group: Group, direction: str) -> Expression:
     """The value of the fix that measures it, which is made when first asked for."""
     ID = f"{name}({group.id})"
     if ID not in hub.fixes:
@@ -120,7 +118,7 @@ def _total(hub: Hub, name: str, style: type, group: Group, direction: str) -> Fo
             hub.fixes.clear()
         _file(hub, hub.fixes, ID, style(hub, group), name)
         hub.fixes.update(others)
-    return Formula.seed(f"{ID}_{direction}")
+    return Expression.seed(f"{ID}_{direction}")
 
 
 def _file(hub: Hub, catalogue: Any, ID: str, item: Any, style: str) -> None:
@@ -129,7 +127,7 @@ def _file(hub: Hub, catalogue: Any, ID: str, item: Any, style: str) -> None:
     hub.values.publish_vector(ID, item.published)
 
 
-def _component(hub: Hub, formula: Formula, direction: str) -> Expression:
+def _component(hub: Hub, formula: Expression, direction: str) -> Expression:
     """`formula`, or 0 in a direction that the domain does not have."""
     d = require_domain(hub).dimension
     return Expression(formula if "xyz".index(direction) < d else 0.0)

@@ -1,14 +1,12 @@
 """Commands of the language itself: print, value (or evaluate), include, quit."""
 
-from __future__ import annotations
-
 import math
 
-from karamelo_py.language.interpreter import shown
+from karamelo_py.language.meanings import shown
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit
-from karamelo_py.script.expressions import POINT_SEEDS, SEEDS, Expression, Formula
+from karamelo_py.script.expressions import POINT_SEEDS, SEEDS, Expression
 
 
 def print_(hub: Hub, first: Argument, *more: Argument) -> None:
@@ -38,7 +36,7 @@ def print_(hub: Hub, first: Argument, *more: Argument) -> None:
             parts.append(value)
             continue
         parts.append(f"{argument.text} = {shown(value)}")
-        if isinstance(value, Formula) and not value.names.intersection(POINT_SEEDS):
+        if isinstance(value, Expression) and not value.names.intersection(POINT_SEEDS):
             _refresh(hub, value)
             if value.text != argument.text:
                 parts[-1] += f" = {value.evaluate(hub.values):.10g}"
@@ -76,7 +74,7 @@ def value(hub: Hub, expression: Expression) -> float:
         if hub.interpreter.replay is not None:
             found = hub.interpreter.replay.value()
         else:
-            _refresh(hub, expression.formula)
+            _refresh(hub, expression)
             found = expression.evaluate(hub.values)
         hub.interpreter.record.note(found)
         return found
@@ -108,7 +106,7 @@ def quit_(hub: Hub) -> None:
     raise Quit
 
 
-def _refresh(hub: Hub, formula: Formula) -> None:
+def _refresh(hub: Hub, formula: Expression) -> None:
     """Let fixes and computes measure anew if the formula reads what they publish."""
     if formula.names - SEEDS and not hub.rehearsing:
         hub.refresh_values()

@@ -1,7 +1,5 @@
 """Commands about materials and the parts of composed ones: eos, strength, damage, temperature."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from karamelo_py.language import registry, signature

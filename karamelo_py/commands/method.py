@@ -1,7 +1,5 @@
 """Commands about the method: method, scheme, precision, anti_volumetric_locking."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
 from itertools import groupby

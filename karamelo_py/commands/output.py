@@ -1,7 +1,5 @@
 """Commands about output: dump, log, plot and what belongs to them."""
 
-from __future__ import annotations
-
 import re
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Commands that write the whole scene to a file, and go on from one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from karamelo_py.language.signature import Argument, OutputFile

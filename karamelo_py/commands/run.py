@@ -1,7 +1,5 @@
 """Commands that let time go on."""
 
-from __future__ import annotations
-
 from math import isnan
 from typing import Annotated, Literal
 

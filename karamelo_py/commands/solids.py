@@ -1,7 +1,5 @@
 """Commands that fill the scene: solid and group."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Sequence
 from typing import Literal

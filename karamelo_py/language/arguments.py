@@ -8,7 +8,8 @@ from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import Place, ScriptError, meant
-from karamelo_py.script.expressions import Formula, Value, evaluate
+from karamelo_py.script.evaluation import evaluate
+from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.parser import parse_expression
 from karamelo_py.script.syntax import Raw
 
@@ -164,7 +165,7 @@ class _Seeds:
     def name(self, name: str, node: Any, raw: Raw) -> Value:
         """What a name stands for; one that means nothing is told with those that do here."""
         if name in self.seeds:
-            return Formula.seed(name)
+            return Expression.seed(name)
         try:
             return self.outer.name(name, node, raw)
         except ScriptError as error:

@@ -4,8 +4,6 @@ A signature says which kinds of arguments a style takes; which *names* they have
 is said here once, and every error shows the form for the dimension in use.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

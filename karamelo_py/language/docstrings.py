@@ -1,7 +1,5 @@
 """Docstrings in NumPy's form: their head, sections, and descriptions of parameters."""
 
-from __future__ import annotations
-
 import inspect
 import re
 

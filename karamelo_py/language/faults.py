@@ -1,7 +1,5 @@
 """Exceptions in code of a style or plug-in, told with the place in the script that uses it."""
 
-from __future__ import annotations
-
 import inspect
 import linecache
 import re

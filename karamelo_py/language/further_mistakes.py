@@ -4,8 +4,6 @@ The rest of the script is tried, and what a wrong statement would have defined i
 that name it are passed over, and what they would define is noted in turn.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

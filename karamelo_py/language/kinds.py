@@ -1,7 +1,5 @@
 """Kinds of arguments: what an annotation asks for, how to say it, how to make it."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import os
@@ -17,7 +15,7 @@ from karamelo_py.language import registry
 from karamelo_py.language.arguments import NULL, NUMBER, Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import Place, ScriptError, meant
-from karamelo_py.script.expressions import Expression, Formula, Value
+from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import WORDS
 from karamelo_py.script.terms import number_text
 
@@ -159,7 +157,7 @@ class Kind:
 def _shown(value: Value) -> str:
     if isinstance(value, str):
         return f"the text '{value}'"
-    if isinstance(value, Formula):
+    if isinstance(value, Expression):
         return f"the formula {value.text}"
     return number_text(value)
 
@@ -168,7 +166,7 @@ def _to_number(hub: Any, argument: Argument) -> float:
     if argument.text.lstrip("+-") in WORDS and argument.text not in argument._interpreter.variables:
         raise Unfit(argument.text)
     value = argument.value(hub)
-    if isinstance(value, Formula):
+    if isinstance(value, Expression):
         raise Unfit(
             f"a formula of {', '.join(sorted(value.names))}",
             hint=f"value({argument.text}) is its present value",

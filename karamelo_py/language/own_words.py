@@ -1,7 +1,5 @@
 """What to write in the place of older forms of Karamelo, in the words of the script at hand."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -8,8 +8,6 @@ A package offers a style with a line in its pyproject.toml, for example::
 Nothing is imported before it is used.
 """
 
-from __future__ import annotations
-
 import tomllib
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points

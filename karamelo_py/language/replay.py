@@ -1,7 +1,5 @@
 """A script gone through once more, up to the place where an earlier run of it left off."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from math import nan

@@ -1,7 +1,5 @@
 """What parts below the hub may ask of the scene that they belong to."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Protocol
 

@@ -13,16 +13,14 @@ are added with Annotated. ``*args`` take any number, keyword-only parameters are
 ``name=value``.
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal, get_type_hints
 
-from karamelo_py.language import docstrings, registry
+from karamelo_py.language import registry
 from karamelo_py.language.arguments import NULL, Argument, with_gap
 from karamelo_py.language.faults import told
 from karamelo_py.language.kinds import (
@@ -352,54 +350,3 @@ def documented(target: Callable) -> list[Parameter]:
     kind = kind_of(Literal[tuple(variants)])
     variant = Parameter("variant", kind, optional=not needed, default=default)
     return [variant, *parameters(target)] if needed else [*parameters(target), variant]
-
-
-# ---- help ---------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Help:
-    """What there is to say about a command or style.
-
-    Attributes
-    ----------
-    syntax
-        How it is called.
-    summary, text
-        First line and the rest of the docstring's head.
-    parameters
-        With kinds, defaults and descriptions.
-    sections
-        The other sections of the docstring: Example, Notes, See Also.
-    """
-
-    name: str
-    syntax: str
-    summary: str
-    text: str
-    parameters: list[Parameter]
-    sections: dict[str, str] = field(default_factory=dict)
-
-    @property
-    def example(self) -> str:
-        """Lines of script."""
-        return self.sections.get("Example", "")
-
-
-def describe(target: Callable, name: str) -> Help:
-    """Help about a command or style, from its signature and docstring, and those of its bases."""
-    head, sections = docstrings.sections(target.__doc__ or "")
-    summary, _, text = head.partition("\n\n")
-    descriptions: dict[str, str] = {}
-    # What a base class describes holds for the styles made from it.
-    for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
-        for doc in (getattr(vars(owner).get("__init__"), "__doc__", None), owner.__doc__):
-            inner = docstrings.sections(doc or "")[1]
-            descriptions |= docstrings.descriptions(inner.pop("Parameters", ""))
-            if owner is target:
-                sections = inner | sections
-    sections.pop("Parameters", None)
-    described = [replace(p, description=descriptions.get(p.name, "")) for p in documented(target)]
-    return Help(
-        name, syntax(target, name), " ".join(summary.split()), text.strip(), described, sections
-    )

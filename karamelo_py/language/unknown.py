@@ -1,15 +1,13 @@
 """Names that nothing answers to, or that cannot be given: what may have been meant."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from typing import Any, Protocol
 
 from karamelo_py.language import registry
 from karamelo_py.language.own_words import in_own_words
-from karamelo_py.script import expressions
 from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.evaluation import usage
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.other_programs import KARAMELO_COMMANDS, instead
@@ -99,7 +97,7 @@ def unknown_name(script: Names, name: str, place: Any) -> ScriptError:
         return ScriptError(
             f"'{name}' is a function and needs parentheses",
             place=place,
-            expected=expressions.usage(name),
+            expected=usage(name),
         )
     other = _not_published(script, name, place)
     if other:

@@ -4,8 +4,6 @@ On a terminal Rich draws a live bar; into a pipe or a file go the same facts as 
 line is flushed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import sys

@@ -1,7 +1,5 @@
 """Fields of points and nodes for output, in the order of their ids."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
@@ -84,7 +82,7 @@ class Fields:
             self._cache.clear()
         return simulation
 
-    def pieces(self) -> Iterator[Fields]:
+    def pieces(self) -> Iterator["Fields"]:
         """The fields of all points, so many points at a time, in the order of their ids."""
         for piece in self._simulation.pieces():
             yield Fields(self.hub, piece)

@@ -1,18 +1,13 @@
 """Files that are whole or not there at all."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import Any, BinaryIO
 
 from karamelo_py.script.errors import ScriptError
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 FORMATS = ("png", "pdf", "svg")
 
@@ -79,8 +74,8 @@ def picture_format(path: Path) -> str:
     return ending
 
 
-def savefig(figure: Figure, path: Path) -> None:
-    """Save a figure in the format of its name; the same figure gives the same bytes."""
+def savefig(figure: Any, path: Path) -> None:
+    """Save a figure of Matplotlib as its name says; the same figure gives the same bytes."""
     import matplotlib
 
     ending = picture_format(path)

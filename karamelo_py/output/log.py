@@ -1,7 +1,5 @@
 """The log: one line of numbers per output, in log.mpm (or log.csv) and on the terminal."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,7 +1,5 @@
 """Movies from pictures: GIF through Pillow, MP4 through ffmpeg where there is one."""
 
-from __future__ import annotations
-
 import io
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Columns of nodes that no step keeps: made when a dump asks for them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

@@ -1,17 +1,11 @@
 """The look that all plots share."""
 
-from __future__ import annotations
-
 from math import floor, log10
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from typing import Any
 
 
-def blank_figure(width: float, height: float) -> Figure:
-    """An empty figure, in inches, that needs no display."""
+def blank_figure(width: float, height: float) -> Any:
+    """An empty figure of Matplotlib, in inches, that needs no display."""
     # Matplotlib takes a third of a second to import: only scenes with plots pay it.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -49,7 +43,7 @@ def real_ticks(axis: Any) -> None:
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))  # few digits
 
 
-def tidy(axes: Axes) -> None:
+def tidy(axes: Any) -> None:
     """A light grid, no frame on the far sides, and real numbers at the ticks."""
     real_ticks(axes.xaxis)
     real_ticks(axes.yaxis)

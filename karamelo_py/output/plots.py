@@ -1,7 +1,5 @@
 """Plots of logged quantities against each other, drawn with Matplotlib when a run ends."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

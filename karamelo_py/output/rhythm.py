@@ -1,7 +1,5 @@
 """How often something is written: every so many steps, or whenever so much time has passed."""
 
-from __future__ import annotations
-
 import re
 from math import ceil, floor, isfinite
 from typing import Annotated

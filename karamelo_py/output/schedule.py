@@ -1,7 +1,5 @@
 """Output: what is written when. The log, the dumps and the plots share one rhythm."""
 
-from __future__ import annotations
-
 import os
 import re
 from contextlib import nullcontext

@@ -1,7 +1,5 @@
 """Dumps of points read back: LAMMPS text (gzipped or not), HDF5, VTU."""
 
-from __future__ import annotations
-
 import gzip
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Names of the units of a scene: what the numbers of a consistent set mean, for labels."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from math import isclose, log10

@@ -1,7 +1,5 @@
 """Which part of a scene an exception comes from, where a plug-in brought that part."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """What becomes of points that reach the edge of the domain (command boundary)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

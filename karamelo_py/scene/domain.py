@@ -1,7 +1,5 @@
 """The domain: the box that holds everything, and the background grid laid over it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

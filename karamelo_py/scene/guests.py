@@ -3,8 +3,6 @@
 Built-in parts go through the same checks.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterator
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """Lattices: the nodes of the regular grids of a scene, and how they are numbered."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any

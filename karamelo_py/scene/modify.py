@@ -22,8 +22,6 @@ A hook is either a method, called with a view of the group (Python comes back at
 step), or the result of :func:`node_hook` or :func:`point_hook`, which is compiled into the loop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from typing import Any

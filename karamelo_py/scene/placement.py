@@ -1,7 +1,5 @@
 """Where the points of a filled region are put: cell by cell, as many in each as asked for."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """How the scene goes forward: method, scheme, transfer, step size, clock (Karamelo's Update)."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from karamelo_py.language import registry

@@ -4,9 +4,6 @@ A view hands out arrays with a row for each node or point of the group. What a h
 by assignment or in place, is written back when it returns; what cannot be changed is read-only.
 """
 
-from __future__ import annotations
-
-import re
 from collections.abc import Callable
 from typing import Any
 
@@ -14,13 +11,11 @@ import numpy as np
 
 from karamelo_py.compiler.fields import field, name_of
 from karamelo_py.kernels.arrays import (
-    DT,
     MASS,
     POST_PARTICLES_TO_GRID,
     POST_UPDATE_GRID_HEAT,
     POST_UPDATE_GRID_STATE,
     POST_VELOCITIES_TO_GRID,
-    TIME,
     of_change,
     of_force,
     of_momentum,
@@ -30,111 +25,10 @@ from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.step import corners_that_move
 from karamelo_py.points.transfers import Moment
-from karamelo_py.script.errors import NoItem, nearest
+from karamelo_py.scene.view import Shown, View
 
 
-class Shown:
-    """A field of a view: how it is read and, unless it is read-only, written."""
-
-    def __init__(self, read: Callable):
-        self.read = read
-        self.write: Callable | None = None
-        self.__doc__ = read.__doc__
-
-    def writer(self, write: Callable) -> Callable:
-        """Decorate the function that writes the field."""
-        self.write = write
-        return write
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
-
-    def __get__(self, view: _View | None, owner: type) -> Any:
-        if view is None:
-            return self
-        if self.name not in view._handed_out:
-            array = np.array(self.read(view))
-            array.flags.writeable = self.write is not None
-            view._handed_out[self.name] = array, array.copy() if self.write else array
-        return view._handed_out[self.name][0]
-
-    def __set__(self, view: _View, value: Any) -> None:
-        if self.write is None:
-            raise AttributeError(f"{self.name} is read-only")
-        now = self.__get__(view, type(view))
-        value = np.asarray(value)
-        if value.ndim and value.shape != now.shape:
-            raise ValueError(f"{self.name} has the shape {now.shape}, not {value.shape}")
-        now[...] = value
-
-
-# Columns of dumps, by the letters around the direction, and the arrays that hold them.
-_COLUMN = re.compile("([vfb]?)([xyz])(0?)")
-_VECTORS = {
-    ("", ""): "position",
-    ("", "0"): "reference_position",
-    ("v", ""): "velocity",
-    ("f", ""): "force",
-    ("b", ""): "force",
-}
-
-
-class _View:
-    """A view whose fields are the only attributes, and take only what fits."""
-
-    _fields: tuple[str, ...] = ()
-
-    def __init__(self) -> None:
-        self._handed_out: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-
-    def _take_times(self, control: Any) -> None:
-        self.dt = float(control.values[DT])
-        self.kick = float(control.clock[0].kick)
-        self.time = float(control.values[TIME])
-
-    def write_back(self) -> None:
-        """Write what a hook has changed; called when it returns."""
-        for name, (now, before) in self._handed_out.items():
-            write = getattr(type(self), name).write
-            if write is not None and not np.array_equal(now, before, equal_nan=True):
-                write(self, now)
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        known = name in self._fields or name.startswith("_")
-        if not known and not isinstance(getattr(type(self), name, None), Shown):
-            raise self._unknown(name)
-        object.__setattr__(self, name, value)
-
-    def __getattr__(self, name: str) -> Any:
-        raise self._unknown(name)
-
-    def __getitem__(self, name: Any) -> Any:
-        raise self._no_column(name)
-
-    def __setitem__(self, name: Any, value: Any) -> None:
-        raise self._no_column(name)
-
-    def _no_column(self, name: Any) -> KeyError:
-        """The error for a column in brackets, which says the attribute."""
-        kind = type(self).__name__
-        split = _COLUMN.fullmatch(str(name))
-        attribute = _VECTORS.get((split[1], split[3])) if split else name
-        if isinstance(getattr(type(self), str(attribute), None), Shown):
-            place = f"[:, {'xyz'.index(split[2])}]" if split else ""
-            return NoItem(f"{kind} has no ['{name}']: write .{attribute}{place}")
-        names = ", ".join(n for n in dir(type(self)) if isinstance(getattr(type(self), n), Shown))
-        return NoItem(f"{kind} has no ['{name}']; its attributes are {names}")
-
-    def _unknown(self, name: str) -> AttributeError:
-        names = [*self._fields, *(n for n in dir(type(self)) if not n.startswith("_"))]
-        close = nearest(name, names)
-        return AttributeError(
-            f"{type(self).__name__} has no {name}; "
-            + (f"did you mean {close}?" if close else f"it has {', '.join(sorted(names))}")
-        )
-
-
-class NodesView(_View):
+class NodesView(View):
     """The nodes of a group that carry mass, at one stage of a step::
 
         nodes.force += nodes.mass[:, None] * self.gravity
@@ -239,7 +133,7 @@ class NodesView(_View):
         nodes.update[change] = nodes.update[star] - old
 
 
-class PointsView(_View):
+class PointsView(View):
     """The points of a group, at one stage of a step, in the order of their ids."""
 
     _fields = ("dt", "kick", "time", "ids", "moved")
@@ -423,7 +317,7 @@ class PieceView(PointsView):
     """
 
     def __init__(self, simulation: Any, block: Any, rows: np.ndarray):
-        _View.__init__(self)
+        View.__init__(self)
         self._simulation = simulation
         self._then = False
         self._block, self._rows = block, rows

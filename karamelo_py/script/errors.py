@@ -1,7 +1,5 @@
 """What goes wrong in a script, said with its place in the text and a remedy."""
 
-from __future__ import annotations
-
 import difflib
 import re
 import unicodedata

@@ -3,8 +3,6 @@
 The same functions for many points at once are in :mod:`karamelo_py.compiler.formula`.
 """
 
-from __future__ import annotations
-
 import math
 import statistics
 from collections.abc import Callable

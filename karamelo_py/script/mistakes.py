@@ -4,8 +4,6 @@ Lark's parser, fed token by token, tells where it stopped, what it had read and 
 what the user did follows from these.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Words of other programs, above all of LAMMPS, and what says the same here."""
 
-from __future__ import annotations
-
 _FILL = "solid(ID, region, regionID, ppc, material, h, 0) fills a region with points"
 _LAW = "material(ID, linear, rho, E, nu) makes a material, and solid(...) uses it"
 _COLUMNS = "log_modify(custom, step, time, ...) names the columns of the log"

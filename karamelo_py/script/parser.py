@@ -1,7 +1,5 @@
 """From text to statements. The grammars are in script.lark and expression.lark."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache, lru_cache

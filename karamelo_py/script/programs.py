@@ -5,8 +5,6 @@ users are computed first, each into a row of its own; so are operands that would
 stack. What remains are trees without branches that meet again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Files of scripts become text."""
 
-from __future__ import annotations
-
 import difflib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a script looks like once it is read: statements, raw arguments, expression trees."""
 
-from __future__ import annotations
-
 import re
 from bisect import bisect_right
 from dataclasses import dataclass, field

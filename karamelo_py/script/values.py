@@ -1,7 +1,5 @@
 """Published values: the numbers that formulas, logs and plots read by name while a scene runs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

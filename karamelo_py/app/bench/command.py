@@ -4,8 +4,6 @@ Speeds are of the fastest of several repetitions; they are meant for comparison 
 this command, since machines are shared and their clocks change.
 """
 
-from __future__ import annotations
-
 import re
 from argparse import ArgumentTypeError, Namespace
 from math import inf

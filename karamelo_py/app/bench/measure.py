@@ -1,7 +1,5 @@
 """How fast a scene runs: its speed, the time of its stages, the bytes it moves, the bandwidth."""
 
-from __future__ import annotations
-
 import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """What a run of karamelo-py bench leaves in a file, and how two of them compare."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from collections.abc import Mapping, Sequence

@@ -4,8 +4,6 @@ Each is measured by processes of its own, started as those of a run. This module
 too: ``python -m karamelo_py.app.bench.scaling`` with a `Part` in JSON.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

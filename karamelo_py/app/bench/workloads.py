@@ -1,7 +1,5 @@
 """The scenes that karamelo-py bench times."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 DISKS = """

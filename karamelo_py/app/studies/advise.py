@@ -1,7 +1,5 @@
 """karamelo-py advise: the cheapest variant of a script that is accurate enough."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """karamelo-py atlas: makes again what a page shows, each picture by commands for everybody."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """One run of a study: a process of its own in a folder of its own, and what is read from it."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """karamelo-py chart: what accuracy costs, how errors fall, where two variables lead."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a table of runs shows: lines of ever finer runs, their orders, the Pareto front."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite

@@ -1,7 +1,5 @@
 """What the next finer runs will show: errors by their order, times by steps and points."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Finds where a plane of cases changes with few runs, by halves along rows and columns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from itertools import pairwise
 from math import ceil

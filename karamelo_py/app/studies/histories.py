@@ -1,7 +1,5 @@
 """Columns of the logs of a study against each other, a curve for each run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Whether a log column, such as an energy, stays what it was: a cell for each run of a study."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How charts of studies look: the same colour for the same method everywhere, also in grey."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from math import ceil, floor, log10

@@ -1,7 +1,5 @@
 """Options that the subcommands of studies share."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A chart of a study as one page (HTML) that needs no server: a point shows its run."""
 
-from __future__ import annotations
-
 import base64
 import html
 import io

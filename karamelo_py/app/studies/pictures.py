@@ -1,7 +1,5 @@
 """Charts of studies as pictures (PNG, SVG, PDF), drawn with Matplotlib."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The table of a study: one row a run, as CSV, and what it was made with beside it."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os
@@ -20,7 +18,7 @@ from karamelo_py.app.studies.case import COLUMNS, Outcome, read_log
 from karamelo_py.app.studies.variables import Scope, number
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, nearest
-from karamelo_py.script.expressions import evaluate
+from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse_text
 

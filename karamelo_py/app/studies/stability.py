@@ -1,7 +1,5 @@
 """karamelo-py stability: where a script is stable, where its energy grows, where it fails."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections import Counter

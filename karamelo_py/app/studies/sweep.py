@@ -1,7 +1,5 @@
 """karamelo-py sweep: every combination of values of variables, run and put into one table."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Variables of a study: their values, which go together, and whether a script reads them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import product
@@ -10,7 +8,7 @@ from typing import Any
 
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, nearest
-from karamelo_py.script.expressions import evaluate
+from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text
 from karamelo_py.script.syntax import Assignment, Call

@@ -1,7 +1,5 @@
 """Two values of a variable side by side, scene by scene: gain and cost."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

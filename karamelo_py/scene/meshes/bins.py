@@ -1,7 +1,5 @@
 """Which of many boxes may hold a position: boxes filed in the cells of a coarse grid."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

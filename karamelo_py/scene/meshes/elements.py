@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+import meshio
 import numpy as np
 
 from karamelo_py.scene.meshes.reading import chosen_cells
 from karamelo_py.script.errors import ScriptError
-
-if TYPE_CHECKING:
-    import meshio
 
 # A shape of this part of size^dimension is flat: its volume is rounding.
 _FLAT = 1e-12

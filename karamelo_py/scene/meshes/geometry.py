@@ -1,7 +1,5 @@
 """What a geometry in Gmsh's language does beside describing a shape."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,22 +1,17 @@
 """Meshes from files: read by meshio, and made by Gmsh where the file is a geometry."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import tempfile
 import warnings
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import meshio
 import numpy as np
 
 from karamelo_py.scene.meshes.geometry import refuse_commands
 from karamelo_py.script.errors import ScriptError, nearest
-
-if TYPE_CHECKING:
-    import meshio
 
 GEOMETRIES = (".geo", ".geo_unrolled")
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
@@ -61,8 +56,6 @@ def _read(path: Path, dimension: int, _state: tuple[int, int]) -> meshio.Mesh:
 
 
 def _by_meshio(path: Path, name: str | None = None) -> meshio.Mesh:
-    import meshio
-
     said = io.StringIO()
     try:
         # It prints what it has to say, and ends the process where no format fits.

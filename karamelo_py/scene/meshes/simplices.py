@@ -1,7 +1,5 @@
 """Triangles and tetrahedra (lines, too): which positions lie in one of them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.meshes.bins import Bins

@@ -1,7 +1,5 @@
 """Closed surfaces of triangles: which positions lie inside."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.meshes.bins import Bins

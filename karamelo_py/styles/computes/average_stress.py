@@ -1,7 +1,5 @@
 """compute average_stress."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.modify import Compute

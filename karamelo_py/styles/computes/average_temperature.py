@@ -1,7 +1,5 @@
 """compute average_temperature."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.modify import Compute
 from karamelo_py.styles.computes.columns import of_group
 

@@ -1,7 +1,5 @@
 """compute average_velocity."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.modify import Compute
 
 

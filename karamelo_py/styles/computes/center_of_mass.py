@@ -1,7 +1,5 @@
 """compute center_of_mass."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.group import AnyGroup, ParticleGroup

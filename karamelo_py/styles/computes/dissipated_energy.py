@@ -1,7 +1,5 @@
 """compute dissipated_energy."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.modify import Compute
 
 

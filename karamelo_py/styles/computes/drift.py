@@ -1,7 +1,5 @@
 """How far what should be conserved has moved from where it was at first."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

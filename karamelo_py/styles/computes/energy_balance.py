@@ -1,7 +1,5 @@
 """compute energy_balance: whether energy appears from nowhere or gets lost."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute

@@ -1,7 +1,5 @@
 """compute error: how far a field of points is from a formula."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """compute linear_momentum."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.group import ParticleGroup

@@ -1,7 +1,5 @@
 """compute max_plastic_strain."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.modify import Compute
 from karamelo_py.styles.computes.columns import of_group
 

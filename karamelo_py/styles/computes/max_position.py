@@ -1,7 +1,5 @@
 """compute max_position."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.modify import Compute
 
 

@@ -1,7 +1,5 @@
 """compute position_quantile."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

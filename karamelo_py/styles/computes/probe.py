@@ -1,7 +1,5 @@
 """compute probe."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

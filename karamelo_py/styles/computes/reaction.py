@@ -1,7 +1,5 @@
 """compute reaction."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.group import NodeGroup

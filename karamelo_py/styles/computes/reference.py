@@ -1,7 +1,5 @@
 """compute reference: how far a value or a field is from a curve in a file."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every dump has: a rhythm, a file name with the step in it, checked columns."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

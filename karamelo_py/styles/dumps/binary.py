@@ -1,7 +1,5 @@
 """The LAMMPS binary format of dumps, which OVITO opens (LAMMPS manual, dump, second revision)."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 

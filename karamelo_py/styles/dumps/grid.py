@@ -1,7 +1,5 @@
 """dump grid: the nodes, as text."""
 
-from __future__ import annotations
-
 from karamelo_py.styles.dumps.lammps import LammpsDump
 from karamelo_py.styles.dumps.table import OfNodes
 

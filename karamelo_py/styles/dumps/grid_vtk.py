@@ -1,7 +1,5 @@
 """dump grid/vtk: the cells of the grids as a series of files for ParaView."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.styles.dumps.table import OfNodes

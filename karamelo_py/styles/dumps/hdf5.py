@@ -1,7 +1,5 @@
 """dump hdf5: the material points in one binary file, as arrays over time and id."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """dump movie: the pictures of dump pyplot, one after the other in one file."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 from karamelo_py.output.movies import Frames, movie_format

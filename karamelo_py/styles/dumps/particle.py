@@ -1,7 +1,5 @@
 """dump particle: the material points, as text."""
 
-from __future__ import annotations
-
 from karamelo_py.styles.dumps.lammps import LammpsDump
 from karamelo_py.styles.dumps.table import OfPoints
 

@@ -1,7 +1,5 @@
 """dump pyplot: pictures of the points, drawn with Matplotlib."""
 
-from __future__ import annotations
-
 import re
 from typing import Annotated, Any, BinaryIO
 

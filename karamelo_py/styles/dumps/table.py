@@ -1,7 +1,5 @@
 """Dumps of tables: a row for each point or node, and the columns asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """dump vtk: the material points as a series of files for ParaView."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr

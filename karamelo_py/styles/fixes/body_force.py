@@ -1,7 +1,5 @@
 """fix body_force: a force proportional to mass."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, node_hook

@@ -1,7 +1,5 @@
 """fix check_solution: the distance between the displacement and a given solution."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.group import ParticleGroup

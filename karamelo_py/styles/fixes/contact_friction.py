@@ -1,7 +1,5 @@
 """fix contact/friction: Coulomb friction between two solids with velocity fields of their own."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """fix contact/hertz: points of two solids push each other as elastic spheres do."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.kernels.laws import elastic_law

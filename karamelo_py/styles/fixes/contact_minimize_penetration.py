@@ -1,7 +1,5 @@
 """fix contact/minimize_penetration: points of two solids undo their penetration, with friction."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import NonNegative

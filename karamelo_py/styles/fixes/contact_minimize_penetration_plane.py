@@ -1,7 +1,5 @@
 """fix contact/minimize_penetration/plane: a wall that points do not enter, with friction."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

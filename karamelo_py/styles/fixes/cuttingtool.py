@@ -1,7 +1,5 @@
 """fix cuttingtool: a wedge that points do not enter."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

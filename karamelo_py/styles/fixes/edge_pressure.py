@@ -1,7 +1,5 @@
 """fix edge_pressure: a pressure on the whole edge of a region."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.group import ParticleGroup

@@ -1,7 +1,5 @@
 """fix edge_traction: a force per area on one side of a region."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

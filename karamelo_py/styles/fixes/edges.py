@@ -1,7 +1,5 @@
 """What fixes share that load the edge of a region: the faces that points show there."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """fix force_nodes: a total force shared by nodes."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, node_hook

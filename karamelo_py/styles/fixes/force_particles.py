@@ -1,7 +1,5 @@
 """fix force_particles: a total force shared by points."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.kernels.p2g import Force

@@ -1,7 +1,5 @@
 """What fixes that act by a formula for each component have in common."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What fixes that act on heat have in common."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from karamelo_py.scene.hub import Hub

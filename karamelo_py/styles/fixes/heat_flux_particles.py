@@ -1,7 +1,5 @@
 """fix heat_flux_particles: heat that flows into points."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import heat_hook

@@ -1,7 +1,5 @@
 """fix impenetrablesurface: an elastic wall."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

@@ -1,7 +1,5 @@
 """fix indent: a ball that pushes points away."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 import numpy as np

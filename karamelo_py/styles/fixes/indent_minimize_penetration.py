@@ -1,7 +1,5 @@
 """fix indent/minimize_penetration: a ball that points do not enter, with friction."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """fix initial_stress: stress of points before the first step."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.kernels.laws import elastic_law

@@ -1,7 +1,5 @@
 """fix initial_velocity_nodes: velocity of nodes in the first step."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, NodesView

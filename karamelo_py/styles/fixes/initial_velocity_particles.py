@@ -1,7 +1,5 @@
 """fix initial_velocity_particles: velocity of points before the first step."""
 
-from __future__ import annotations
-
 from functools import partial
 
 from karamelo_py.scene.group import ParticleGroup

@@ -1,7 +1,5 @@
 """fix kinetic_energy: the compute of that name, as the 2020 language has it."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.modify import Fix
 from karamelo_py.styles.computes.kinetic_energy import KineticEnergy as Measure
 

@@ -1,7 +1,5 @@
 """fix local_damping: forces against the motion, as large as what is out of balance."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from karamelo_py.language.signature import In
@@ -68,8 +66,7 @@ class LocalDamping(Fix):
 
     def __init__(self, hub: Hub, group: NodeGroup, alpha: Annotated[Expression, In(0, 1)] = 0.8):
         super().__init__(hub, group)
-        share = alpha if isinstance(alpha, Expression) else Expression(alpha)
-        self.formulas = (share,) * hub.domain.dimension
+        self.formulas = (Expression(alpha),) * hub.domain.dimension
 
     def defined(self) -> None:
         """Warn where rest would not be that without damping."""

@@ -1,7 +1,5 @@
 """Fixes that change nothing and measure forces for the functions of groups in expressions."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.group import Group

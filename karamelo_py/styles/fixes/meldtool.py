@@ -1,7 +1,5 @@
 """fix meldtool: a turning cylinder with a square channel."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 import numpy as np

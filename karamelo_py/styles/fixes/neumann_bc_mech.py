@@ -1,7 +1,5 @@
 """fix neumann_bc_mech: a traction on points at a surface."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.group import ParticleGroup

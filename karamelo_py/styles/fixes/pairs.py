@@ -1,7 +1,5 @@
 """What fixes between two solids share."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """fix python: a function in Python acts on points or nodes."""
 
-from __future__ import annotations
-
 import inspect
 import pickle
 import sys

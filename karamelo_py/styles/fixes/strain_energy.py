@@ -1,7 +1,5 @@
 """fix strain_energy: the compute of that name, as the 2020 language has it."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.modify import Fix
 from karamelo_py.styles.computes.strain_energy import StrainEnergy as Measure
 

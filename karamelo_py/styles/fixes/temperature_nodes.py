@@ -1,7 +1,5 @@
 """fix temperature_nodes: a given temperature at nodes."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import node_hook

@@ -1,7 +1,5 @@
 """fix temperature_particles: a given temperature of points."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import heat_hook

@@ -1,7 +1,5 @@
 """What fixes share that put forces on points: tools, walls and tractions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any

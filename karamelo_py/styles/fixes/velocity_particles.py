@@ -1,7 +1,5 @@
 """fix velocity_particles: a given velocity of points."""
 
-from __future__ import annotations
-
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, point_hook

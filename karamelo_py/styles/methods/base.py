@@ -1,7 +1,5 @@
 """What the methods share: which grids there are, what points keep, what a step is made of."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, ClassVar, Literal, NamedTuple
 

@@ -1,7 +1,5 @@
 """What the methods with convected domains share: their variants, and what they refuse."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import numpy as np

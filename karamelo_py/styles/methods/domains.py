@@ -4,8 +4,6 @@ A solid has `half_size` (n, d), of the box around each point, and, where it come
 `corners` (n, c, d), of the element around each point.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.points.basis.cpdi import Element

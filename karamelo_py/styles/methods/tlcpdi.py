@@ -1,7 +1,5 @@
 """method tlcpdi: convected domains, weights in the reference configuration."""
 
-from __future__ import annotations
-
 from karamelo_py.points.frames import Total
 from karamelo_py.styles.methods.base import OwnGrids
 from karamelo_py.styles.methods.cpdi import Convected

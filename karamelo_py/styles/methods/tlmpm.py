@@ -1,7 +1,5 @@
 """method tlmpm: total Lagrangian, a grid for each solid."""
 
-from __future__ import annotations
-
 from karamelo_py.points.frames import Total
 from karamelo_py.styles.methods.base import OwnGrids
 

@@ -1,7 +1,5 @@
 """method ulcpdi: convected domains on one grid for the whole scene."""
 
-from __future__ import annotations
-
 from karamelo_py.styles.methods.cpdi import Convected
 from karamelo_py.styles.methods.ulmpm import ULMPM
 

@@ -1,7 +1,5 @@
 """method ulmpm: updated Lagrangian, one grid for the whole domain."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

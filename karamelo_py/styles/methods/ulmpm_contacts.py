@@ -1,7 +1,5 @@
 """method ulmpm/contacts: a velocity field for each solid, and contact on the grid."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Region style block."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Region style cylinder."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Region style intersection."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.styles.regions.union import Union

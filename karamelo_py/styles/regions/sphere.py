@@ -1,7 +1,5 @@
 """Region style sphere."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.language.by_dimension import Forms, place_of

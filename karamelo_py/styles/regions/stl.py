@@ -1,7 +1,5 @@
 """Region style stl."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

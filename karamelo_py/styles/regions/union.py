@@ -1,7 +1,5 @@
 """Region style union."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.scene.domain import require_domain

@@ -1,7 +1,5 @@
 """Solid style mesh."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

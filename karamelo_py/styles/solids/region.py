@@ -1,7 +1,5 @@
 """Solid style region."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from karamelo_py.language.signature import AtLeast, Positive

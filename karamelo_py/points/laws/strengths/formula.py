@@ -24,7 +24,7 @@ from karamelo_py.points.laws.numbers import Numbers
 from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
 from karamelo_py.points.laws.temperatures import temperature_or
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import Formula
+from karamelo_py.script.expressions import Expression
 
 SEEDS = ("ep", "epdot", "T")
 DEPTH = 8  # of the stack, a tuple
@@ -44,7 +44,7 @@ class FlowFormula:
         value = argument.value_with(SEEDS)
         if isinstance(value, str):
             raise ScriptError(f"'{value}' is text", place=argument.place)
-        formula = Formula.of(value)
+        formula = Expression(value)
         others = formula.names.difference(SEEDS)
         if others:
             raise ScriptError(

@@ -1,0 +1,115 @@
+"""Variables from the command line, which win over those that a script assigns."""
+
+import re
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from karamelo_py.language.replay import spelled
+from karamelo_py.language.unknown import check_name, listed
+from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.expressions import Value
+from karamelo_py.script.parser import parse, parse_text
+from karamelo_py.script.reading import read_script
+from karamelo_py.script.syntax import Assignment, Call, Statement
+
+_WORD = r"[^\W\d]\w*"
+
+
+class Presets(dict[str, str]):
+    """Text by name, as it was given; the script's own assignment of such a name is passed over.
+
+    Raises
+    ------
+    ScriptError
+        For a name that no variable can have.
+    """
+
+    def __init__(self, script: Any, given: Mapping[str, str]):
+        super().__init__(given)
+        self._script = script
+        self._texts: dict[str, str] = {}  # those that may have to be numbers
+        for name in given:
+            if not name.isidentifier():
+                raise ScriptError(
+                    f"-var: '{name}' is not the name of a variable",
+                    expected="letters, digits and _, as in -var h 0.05",
+                )
+            try:
+                check_name(name)
+            except ScriptError as error:
+                raise ScriptError(f"-var: {error.message}", hint=error.hint) from None
+            script.variables[name] = self._value(name)
+
+    def _value(self, name: str) -> Value:
+        variables = self._script.variables
+        present = variables.pop(name, None)
+        try:
+            raw, node = parse_text(self[name], "-var " + name)
+            return self._script.evaluate(node, raw)
+        except ScriptError as error:
+            if error.message.startswith("division by zero"):
+                raise
+            return self[name]
+        finally:
+            if present is not None:
+                variables[name] = present
+
+    def stand_for(self, statement: Assignment) -> None:
+        """Take the place of what a script assigns."""
+        name, variables = statement.name, self._script.variables
+        # What was a word at first may have become an expression of variables.
+        if isinstance(variables.get(name), str):
+            variables[name] = self._value(name)
+        if isinstance(variables[name], str):
+            # A method may take a text for a number; a mistake is told where it is used.
+            with suppress(ScriptError):
+                if isinstance(self._script.evaluate(statement.node, statement.right), float):
+                    self._texts[name] = statement.right.code.strip()
+
+    def blame(self, statement: Statement, error: ScriptError) -> None:
+        """Say so where a mistake may come from a text in the place of a number."""
+        for name, own in self._texts.items():
+            if re.search(rf"\b{name}\b", spelled(statement)):
+                error.hint = (
+                    f"-var {name} {self[name]} is a text, and the script has a number there, as in "
+                    f"-var {name} {own}"
+                )
+
+    def refuse_unused(self, statements: list[Statement]) -> None:
+        """A variable of the command line that nothing reads or assigns is a slip of the pen."""
+        words = set(re.findall(_WORD, " ".join(self.values())))
+        assigned: dict[str, None] = {}
+        if not self or not self._collect(statements, self._script.folder, words, assigned, []):
+            return
+        for name in self:
+            if name not in words:
+                raise ScriptError(
+                    f"-var {name}: the script has no variable '{name}'",
+                    expected=f"one of those that it assigns ({listed(assigned)})",
+                    hint=meant(name, assigned),
+                )
+
+    def _collect(
+        self, statements: list[Statement], folder: Path, words: set, assigned: dict, seen: list
+    ) -> bool:
+        """Add the words and assigned names of statements and of all scripts that they include.
+
+        False where a script that is included cannot be told before it is.
+        """
+        code = statements[0].raw.source.text if statements else ""
+        words.update(re.findall(_WORD, re.sub(r'"[^"\n]*"|#[^\n]*', " ", code)))
+        for statement in statements:
+            if isinstance(statement, Assignment):
+                assigned[statement.name] = None
+            elif isinstance(statement, Call) and statement.name == "include":
+                if not statement.arguments:
+                    return False
+                path = self._script.included(statement.arguments[0].code.strip(' "'), folder)
+                if path in seen or not path.is_file():
+                    return False
+                inner = parse(read_script(path), str(path))
+                if not self._collect(inner, path.parent, words, assigned, [*seen, path]):
+                    return False
+        return True
