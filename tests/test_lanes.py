@@ -424,6 +424,21 @@ def test_edges_that_reflect():
     assert 0 < alone[8:].sum() < 2 * n
 
 
+@kernel
+def _parameters_in_lanes(table, material, out, n):
+    for q in range(0, n, 4):
+        p = group(Fours(), q, min(4, n - q))
+        store(out, p, (table[material[p]],))
+
+
+def test_parameters_of_one_material_and_of_several():
+    table = np.array([0.5, 1.5, 2.5])
+    material = np.array([1, 1, 1, 1, 0, 2, 1, 0, 2, 2], np.int32)
+    out = np.zeros((1, len(material)))
+    _parameters_in_lanes(table, material, out, len(material))
+    assert out[0].tolist() == table[material].tolist()
+
+
 class Alone(NamedTuple):
     """A task that does nothing and knows no lanes."""
 

@@ -458,6 +458,18 @@ def index(i: int) -> int:
 of_numbers(index)(lambda i: lambda i: numba.uint64(i))
 
 
+def beside(first: int, steps: int) -> int:
+    """`first` + `steps` as the number of a node: an array index, as `index` makes it.
+
+    Of lanes it keeps the two apart: what is `steps` from the first node of each is found from the
+    places of these.
+    """
+    return first + steps
+
+
+of_numbers(beside)(lambda first, steps: lambda first, steps: numba.uint64(first + steps))
+
+
 def over_blocks(per_block: Callable) -> Callable:
     """Make ``f(setup, ...)`` that calls ``per_block(block, setup, ...)`` for each of setup.blocks.
 

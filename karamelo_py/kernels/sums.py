@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.compile import index, shared, subkernel
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.lanes.arrays import move_record
+from karamelo_py.compiler.lanes.records import move_record
 from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels.arrays import ADD, CLEAR, Nodes
 

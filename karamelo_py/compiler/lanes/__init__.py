@@ -13,7 +13,7 @@ the first point, and nothing is stored or given to nodes for them.
 Only compiled kernels know lanes; interpreted ones take the points one by one.
 """
 
-from karamelo_py.compiler.lanes import apart  # noqa: F401
+from karamelo_py.compiler.lanes import apart, records  # noqa: F401
 from karamelo_py.compiler.lanes.arrays import Eights, Fours, group, lanes_for, spread
 from karamelo_py.compiler.lanes.numbers import Lanes
 

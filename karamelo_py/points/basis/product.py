@@ -12,10 +12,10 @@ from math import prod
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import (
+    beside,
     choose,
     define,
     first_lane,
-    index,
     is_one,
     point_function,
     real,
@@ -141,7 +141,7 @@ def _written(kin: type, width: int) -> dict[Callable, Callable]:
     if axisymmetric:
         gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
     first = node_number(grid.first, [line.first for line in lines])
-    node = call(index, node_number(first, at))
+    node = call(beside, first, node_number(0, at))
     arms = [call(_arm, basis, grid, *pair) for pair in zip(lines, at, strict=True)]
     seen = "basis, kin, grid, stencil, k"
     return {

@@ -1,0 +1,200 @@
+"""Records of nodes, (nodes, components), read and written in lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from karamelo_py.compiler.compile import accumulate, by_type, lanes_of
+from karamelo_py.compiler.lanes.arrays import Beside, at_lane, pointer_to
+from karamelo_py.compiler.lanes.numbers import (
+    Lanes,
+    element,
+    lane,
+    pack,
+    shuffle,
+    splat,
+    vector_of,
+)
+from karamelo_py.compiler.tuples import row
+
+
+def _transposed(builder: Any, rows: list) -> list:
+    """Four vectors of four numbers, or of two, transposed: lanes from records."""
+    if rows[0].type.count == 2:
+        ab = shuffle(builder, rows[0], rows[1], [0, 2, 1, 3])
+        cd = shuffle(builder, rows[2], rows[3], [0, 2, 1, 3])
+        return [shuffle(builder, ab, cd, order) for order in ([0, 1, 4, 5], [2, 3, 6, 7])]
+    low = [shuffle(builder, rows[k], rows[k + 1], [0, 4, 2, 6]) for k in (0, 2)]
+    high = [shuffle(builder, rows[k], rows[k + 1], [1, 5, 3, 7]) for k in (0, 2)]
+    return [
+        shuffle(builder, *pair, order)
+        for order in ([0, 1, 4, 5], [2, 3, 6, 7])
+        for pair in (low, high)
+    ]
+
+
+def _record(builder: Any, kind: Any, pointer: Any, components: int) -> Any:
+    """Address of so many components of a record, as a vector."""
+    vector = ir.VectorType(element(kind.dtype), components)
+    return builder.bitcast(pointer, vector.as_pointer())
+
+
+def _chunks(count: int) -> list[tuple[int, int]]:
+    """Components in chunks as wide as registers: (first, number), 4, 2 or 1; 3 are 4.
+
+    Records are as wide as that: what lies behind their last component belongs to them.
+    """
+    out, first = [], 0
+    while first < count:
+        left = count - first
+        out.append((first, 4 if left >= 3 else left))
+        first += 4 if left >= 3 else left
+    return out
+
+
+def _gathered(builder: Any, of: Callable, lanes: Lanes, count: int) -> list:
+    """Lanes of `count` components from the records of different nodes."""
+    size = lanes.scalar.bitwidth // 8
+    rows = [builder.load(of(k), align=size) for k in range(lanes.width)]
+    if count == 1:
+        return [pack(builder, [lane(builder, row, 0) for row in rows], lanes)]
+    parts = [_transposed(builder, rows[k : k + 4]) for k in range(0, lanes.width, 4)]
+    if len(parts) == 1:
+        return parts[0]
+    return [shuffle(builder, *pair, list(range(8))) for pair in zip(*parts, strict=True)]
+
+
+@intrinsic
+def _gather_row(typing_context, array, nodes, first, like):
+    """Components of the records of nodes, as many as `like` has."""
+    lanes = Lanes(array.dtype, nodes.width)
+    made = types.UniTuple(lanes, len(like))
+
+    def codegen(context, builder, sig, arguments):
+        found = []
+        for begin, count in _chunks(len(like)):
+            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
+
+            def of(k, column=column, count=count):
+                pointer = at_lane(
+                    context, builder, array, arguments[0], nodes, arguments[1], k, column
+                )
+                return _record(builder, array, pointer, count)
+
+            found += _gathered(builder, of, lanes, count)
+        return context.make_tuple(builder, made, found[: len(like)])
+
+    return made(array, nodes, types.int64, like), codegen
+
+
+@by_type(row)
+def _row(array, i, first, like):
+    if isinstance(i, Lanes | Beside):
+        return lambda array, i, first, like: _gather_row(array, i, first, like)
+    return None
+
+
+@intrinsic
+def _scatter(typing_context, array, nodes, first, values):
+    """Add to components of the records of nodes, lane after lane; summed before to one node."""
+    width = max(lanes_of(value) for value in values)
+    lanes = Lanes(array.dtype, width)
+
+    def codegen(context, builder, sig, arguments):
+        size = array.dtype.bitwidth // 8
+        parts = cgutils.unpack_tuple(builder, arguments[3])
+        parts = [
+            part if isinstance(kind, Lanes) else splat(builder, part, lanes)
+            for kind, part in zip(values, parts, strict=True)
+        ]
+        zero = ir.Constant(vector_of(lanes), None)
+        for begin, count in _chunks(len(parts)):
+            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
+            chosen = [*parts[begin : begin + count], *[zero] * 4][:count]
+            rows = []
+            for k in range(0, width, 4):
+                four = chosen
+                if width == 8:
+                    four = [shuffle(builder, v, v, list(range(k, k + 4))) for v in chosen]
+                rows += _records(builder, four)
+            if not lanes_of(nodes):
+                while len(rows) > 1:
+                    rows = [builder.fadd(*pair) for pair in zip(rows[::2], rows[1::2], strict=True)]
+            for k, number in enumerate(rows):
+                given = context, builder, array, arguments[0]
+                if lanes_of(nodes):
+                    pointer = at_lane(*given, nodes, arguments[1], k, column)
+                else:
+                    pointer = pointer_to(*given, [arguments[1], column])
+                at = _record(builder, array, pointer, count)
+                total = builder.fadd(builder.load(at, align=size), number)
+                builder.store(total, at, align=size)
+        return context.get_dummy_value()
+
+    at = nodes if lanes_of(nodes) else types.int64
+    return types.void(array, at, types.int64, values), codegen
+
+
+def move_record(array, i, other, j, first, like, keep):
+    """Add components of the record of a node of another array, as many as `like` has.
+
+    They are zero there then. If not `keep`, they take the place of what was here.
+    """
+    for k in range(first, first + len(like)):
+        array[i, k] = (array[i, k] if keep else 0) + other[j, k]
+        other[j, k] = 0
+
+
+@intrinsic
+def _move_record(typing_context, array, i, other, j, first, like, keep):
+    def codegen(context, builder, sig, arguments):
+        size = array.dtype.bitwidth // 8
+        to, of = (
+            _record(
+                builder,
+                kind,
+                pointer_to(context, builder, kind, arguments[k], [arguments[k + 1], arguments[4]]),
+                len(like),
+            )
+            for k, kind in ((0, array), (2, other))
+        )
+        there = builder.load(to, align=size)
+        zero = ir.Constant(there.type, None)
+        kept = builder.select(arguments[6], there, zero)
+        builder.store(builder.fadd(kept, builder.load(of, align=size)), to, align=size)
+        builder.store(zero, of, align=size)
+        return context.get_dummy_value()
+
+    signature = types.void(array, types.int64, other, types.int64, types.int64, like, types.boolean)
+    return signature, codegen
+
+
+by_type(move_record)(
+    lambda *arguments: (
+        lambda array, i, other, j, first, like, keep: _move_record(
+            array, i, other, j, first, like, keep
+        )
+    )
+)
+
+
+def _records(builder: Any, parts: list) -> list:
+    """Four records from the lanes of their components: four, two, or one."""
+    if len(parts) == 4:
+        return _transposed(builder, parts)
+    if len(parts) == 2:
+        return [shuffle(builder, *parts, [k, 4 + k]) for k in range(4)]
+    return [shuffle(builder, parts[0], parts[0], [k]) for k in range(4)]
+
+
+@by_type(accumulate)
+def _accumulate(array, i, first, values):
+    if isinstance(array, types.Array) and (lanes_of(i) or lanes_of(values)):
+        return lambda array, i, first, values: _scatter(array, i, first, values)
+    return None
