@@ -65,14 +65,21 @@ def test_bounds_that_cannot_be(run_interpreted, line, says):
 
 @pytest.mark.parametrize(
     ("second", "warns"),
-    [("1, NULL", True), ("NULL, 0", False), ("0, NULL", False), ("leq1, NULL", False)],
-)
+    [
+        ("1, NULL", True), ("NULL, 0", False), ("leq1, NULL", False),
+        ("x0*(0.1*time + 2)", False), ("(2 + time*0.1)*x0", False), ("x0*(0.1*time + 3)", True),
+        ("x0*(0.1 - time + 2)", True),
+    ],
+)  # fmt: skip
 def test_fixes_that_do_not_agree(run_interpreted, second, warns):
-    """Of the block, 4 x 3 nodes have mass; all 13 x 13 belong to both groups."""
+    """Of the block, 4 x 3 nodes have mass; all 13 x 13 belong to both groups.
+
+    The same product or sum, written in another order, is no other velocity.
+    """
     err = run_interpreted(
         block(
-            2, *EVERY, "fix(one, velocity_nodes, nodes, 0, NULL)",
-            f"fix(two, velocity_nodes, all, {second})",
+            2, *EVERY, "fix(one, velocity_nodes, nodes, x0*(0.1*time + 2), NULL)",
+            f"fix(two, velocity_nodes, all, {second}{', NULL' * (',' not in second)})",
         )
     ).err  # fmt: skip
     assert ("gives 169 nodes of this group another vx: this fix decides there" in err) == warns

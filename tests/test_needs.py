@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tracemalloc
 from contextlib import suppress
+from math import inf
 from types import SimpleNamespace
 
 import pytest
@@ -239,7 +240,9 @@ def advice(lowered):
 
     def say(script, dt=1.0, limit=1.0, **variables) -> str:
         hub = lowered(script, **variables)
-        found = savings(hub, SimpleNamespace(dt=dt, limit=limit))
+        clock = SimpleNamespace(courant=1, spacing=limit, rate=1, heat_limit=inf)
+        control = SimpleNamespace(clock=[clock])
+        found = savings(hub, SimpleNamespace(dt=dt, limit=limit, control=control))
         return "\n".join(f"{saving.cost} / {saving.instead}" for saving in found)
 
     return say

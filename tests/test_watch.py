@@ -1,11 +1,13 @@
 """The watch over energy and temperatures: what it counts, what it tells, where it stops a run."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes import SCHEMES, block
 
+from karamelo_py.app.cli import main
 from karamelo_py.kernels.arrays import new_control
 from karamelo_py.kernels.watch import LOOKS, judge
 
@@ -74,34 +76,49 @@ material(m, linear, 2, 0.01, 0.3, 0.5, 1)
 solid(slab, region, slab, {ppc}, m, 0.1, 300)
 region(end, block, -1, 0.05{whole})
 group(end, nodes, region, end, all)
-fix(hot, temperature_nodes, end, 301)
+group(first, particles, region, end, all)
+{end}
 set_output(10)
 set_dt({dt})
-run(30)
+run(30{words})
 """
+ENDS = {
+    "fix(hot, temperature_nodes, end, 301)": "allow 300 to 301",
+    # However much heat it brings to points that swing, nobody is colder than the air.
+    "fix(air, convection_particles, first, 1000, 200)": "allow 200 to 300",
+}
 
 
+@pytest.mark.parametrize("end", ENDS, ids=["wall", "air"])
 @pytest.mark.parametrize("kind", ["ulmpm", "tlmpm"])
 @pytest.mark.parametrize(("d", "ppc"), [(1, 1), (1, 2), (2, 1), (3, 1)])
-def test_temperatures_that_swing_stop_the_run(run_interpreted, kind, d, ppc):
+def test_temperatures_that_swing_stop_the_run(run_interpreted, kind, d, ppc, end):
     """A step far above that of conduction, h^2 rho cp/(4 d kappa); a little above it none swing.
 
-    What nodes do not show of the points' temperatures is levelled, whatever the step: up to five
+    What nodes do not show of the points' temperatures is levelled, whatever the step: up to four
     times the stable step temperatures stay between those that are given.
     """
     limit = 0.1**2 / (4 * d)
     box = "0, 0.6" + ", 0, 0.2" * (d - 1)
 
-    def scene(times):
+    def scene(times, words=""):
         whole = ", INF, INF" * (d - 1)
-        return CONDUCTION.format(kind, d=d, ppc=ppc, box=box, whole=whole, dt=times * limit)
+        dt = times * limit
+        return CONDUCTION.format(
+            kind, d=d, ppc=ppc, box=box, whole=whole, end=end, dt=dt, words=words
+        )
 
-    assert "temperatures have" not in run_interpreted(scene(3), folder="little").err
-    result = run_interpreted(scene(40), status=1)
-    assert "step 10, time" in result.err and "temperatures have come to be between" in result.err
-    assert "allow 300 to 301: the step is 40 times the stable one of conduction" in result.err
-    assert f"set_dt({0.9 * limit:.3g})" in result.err
-    assert list(result.folder.glob("last_good.*"))
+    little = run_interpreted(scene(3), folder="little").err
+    assert "temperatures have" not in little
+    assert "beyond 4 times that temperatures swing" in little
+    refused = run_interpreted(scene(4.1), status=1, folder="refused")
+    assert "4.1 times the stable one of conduction: temperatures would swing" in refused.err
+    assert f"set_dt({0.9 * limit:.3g})" in refused.err and not list(refused.folder.glob("log*"))
+    # Who asks for halves gets them: the watch stops what swings.
+    halved = run_interpreted(scene(40, ", on_trouble=halve"))
+    assert "step 10, time" in halved.err and ENDS[end] in halved.err
+    assert "the step is 40 times the stable one of conduction" in halved.err
+    assert "with 1/32 of the step" in halved.err
 
 
 def test_the_limit_has_a_name(run_interpreted):
@@ -126,3 +143,18 @@ def test_a_law_in_rate_form_is_named(run_script):
         text = text.replace(old, new)
     result = run_script(text, status=1)
     assert "material linear at large strain" in result.err
+
+
+def test_all_advise_the_same_step(tmp_path, capsys, run_interpreted):
+    """What `check`, the warning before a run and the error that ends it say to write instead."""
+    words = [TRAVEL, "set_dt({})", "set_output(100)", "run(400)"]
+    script = block(2, *words, size=(0.3, 0.3))
+    path = tmp_path / "in.script"
+    path.write_text(script.format(1e-9), encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    own = re.search(r"set_dt\(1e-09\).*?(set_dt\(\S+\))", capsys.readouterr().out, re.S)[1]
+    limit = float(own[len("set_dt(") : -1]) / 0.4  # the share of FLIP 1, linear, musl
+    result = run_interpreted(script.format(2.1 * limit), status=1)
+    warned, ended = result.err.split("error: ")
+    assert f"hint: {own} or less" in warned
+    assert "above the stable limit" in ended

@@ -19,7 +19,7 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     ----------
     dt
         Time step. Above the stable limit (cell size over wave speed plus velocity; less with scheme
-        usl) a run warns.
+        usl) a run warns; above four times that of conduction it does not begin.
 
     Example
     -------

@@ -17,7 +17,8 @@ Point function ``(mass, v, x_old, x, value, before, dt, kick) -> (v, x, total)``
 Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``
     acts on points where heat flows: `value` and `other` are the first and the second formula,
     `face` is the area that the point shows, `supply` the heat it gets per time, `share` how much it
-    takes of the change of the nodes' temperature. The total is of what it supplies.
+    takes of the change of the nodes' temperature. The total is of what it supplies. Of a hook that
+    holds, `other` is the temperature that points are brought to.
 The node functions of heat see capacity, temperature before and after the step, and heat flow.
 """
 
@@ -104,7 +105,7 @@ class CompiledHook(NamedTuple):
     publishes: bool  # its totals become ID_x, ID_y, ID_z
     uses_before: bool  # needs the formulas one step earlier as well
     uses_share: bool  # needs one over the number of members with mass
-    holds: bool  # sets v_star, or bounds it: one of several decides
+    holds: bool  # sets v_star, or bounds it: one of several decides; leads a temperature
 
     @property
     def on_nodes(self) -> bool:
@@ -144,9 +145,9 @@ def point_hook(
     return CompiledHook(function, "points", publishes, uses_before, False, False)
 
 
-def heat_hook(function: Callable, *, publishes: bool = False) -> CompiledHook:
+def heat_hook(function: Callable, *, publishes: bool = False, holds: bool = False) -> CompiledHook:
     """A compiled hook for ``supply_heat``: `function` as described at the head of this file."""
-    return CompiledHook(function, "heated points", publishes, False, False, False)
+    return CompiledHook(function, "heated points", publishes, False, False, holds)
 
 
 @shared
@@ -503,10 +504,14 @@ def _(what, kin, hooks, control, dt, h, count):
         what.temperature[0, p] = T
         if slot >= 0:
             add_to(control.totals, slot, supply - before)
-        # What the fastest point takes, another may have got before.
-        rate = supply / what.capacity[0, p] if what.capacity[0, p] > 0 else 0.0
-        clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
-        if share == 0:
+        # What a temperature is led to bounds it: what it has come to be says nothing.
+        if hooks.table[h].holds > 0:
+            T = hooks.scratch[BEFORE, q]
+        elif what.capacity[0, p] > 0:
+            # What the fastest point takes, another may have got before.
+            rate = supply / what.capacity[0, p]
+            clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
+        if share == 0 or hooks.table[h].holds > 0:
             clock.coldest, clock.hottest = min(clock.coldest, T), max(clock.hottest, T)
 
 

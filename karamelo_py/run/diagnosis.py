@@ -18,6 +18,7 @@ from karamelo_py.kernels.watch import sum_energies
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.stable import own_step_instead
 from karamelo_py.run.tiles import in_tiles
 from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain, grown_little
 from karamelo_py.scene.hub import Hub
@@ -106,7 +107,7 @@ def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     speeds = np.abs(simulation.v).max(axis=1)
     fastest = int(np.argmax(speeds))
     message += f" ({_named(hub, simulation, fastest)} moves at {speeds[fastest]:.4g})"
-    return message, f"set_dt({0.5 * limit:.3g}) or less, or leave set_dt out"
+    return message, own_step_instead(hub)
 
 
 def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
@@ -124,16 +125,16 @@ def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 
 def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     clock = simulation.control.clock[0]
-    message = (
-        f"step {simulation.step}, time {simulation.time:.6g}: temperatures have come to be between "
-        f"{clock.T_low:.4g} and {clock.T_high:.4g}, where initial state, fixes and sources allow "
-        f"{clock.coldest:.4g} to {clock.hottest + clock.own_heat:.4g}"
-    )
-    share = simulation.dt / clock.heat_limit
+    share = clock.last_dt / clock.heat_limit
+    message = f"step {simulation.step}, time {simulation.time:.6g}: "
     if share > 1:
-        message += f": the step is {share:.3g} times the stable one of conduction"
-        return message, f"set_dt({0.9 * clock.heat_limit:.3g}) or less, or leave set_dt out"
-    return message, _smaller_step(hub, simulation)
+        message += f"the step is {share:.3g} times the stable one of conduction, and "
+    message += (
+        f"temperatures have come to be between {clock.T_low:.4g} and {clock.T_high:.4g}, where "
+        f"initial state, fixes and sources allow {clock.coldest:.4g} to "
+        f"{clock.hottest + clock.own_heat:.4g}"
+    )
+    return message, own_step_instead(hub) if share > 1 else _smaller_step(hub, simulation)
 
 
 def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language import registry
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpgimp import CPGIMPDiagonal
@@ -29,12 +30,13 @@ from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.stable import one_a_cell, sparse
+from karamelo_py.run.stable import one_a_cell, own_step_instead, sparse
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.musl import MUSL
 from karamelo_py.schemes.usf import USF
 from karamelo_py.schemes.usl import USL
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.body_force import BodyForce
 
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
@@ -360,10 +362,16 @@ RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
 )
 
 
-def warn(hub: Hub, simulation: Simulation, duration: float) -> None:
-    """Tell what will go wrong in a run of `duration`; each failure once in a script."""
+def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
+    """Tell what will go wrong in a run of `duration`; each failure once in a script.
+
+    Raises
+    ------
+    ScriptError
+        If temperatures would swing, in a run that does not halve its step then.
+    """
     _warn_about_groups(hub)
-    _warn_about_step(hub, simulation)
+    _warn_about_step(hub, simulation, halves)
     _warn_about_precision(hub, simulation)
     scene = Foreseen(hub, simulation, duration)
     for rule in RULES:
@@ -399,18 +407,23 @@ def _warn_about_groups(hub: Hub) -> None:
             hub.warn(f"group '{group.id}' holds no nodes; {NOTHING_THERE}", place=group.place)
 
 
-def _warn_about_step(hub: Hub, simulation: Simulation) -> None:
+def _warn_about_step(hub: Hub, simulation: Simulation, halves: bool) -> None:
     """Say so before the first step when the step is above the stable limit."""
     update, limit = hub.update, simulation.limit
-    if update.fixed_dt is not None and update.fixed_dt > limit * (1 + 1e-12):
-        hub.warn(
-            f"the step {update.fixed_dt:g} of set_dt is above the stable limit {limit:.4g}: "
-            "the run will most likely blow up, and be stopped then",
-            hint=f"set_dt({0.9 * limit:.3g}) or less, or leave set_dt out",
+    asked = update.fixed_dt or (update.dt_factor or 0) * limit
+    if not asked > limit * (1 + 1e-12):
+        return
+    of_heat = float(simulation.control.clock[0].heat_limit)
+    words = f"the step {asked:.4g} of {'set_dt' if update.fixed_dt else 'dt_factor'} is "
+    if asked > BORNE * of_heat and not halves:
+        words += (
+            f"{asked / of_heat:.3g} times the stable one of conduction: temperatures would swing"
         )
-    elif update.fixed_dt is None and (update.dt_factor or 0) > 1:
-        hub.warn(
-            f"dt_factor {update.dt_factor:g} puts the step above the stable limit {limit:.4g}: "
-            "the run will most likely blow up, and be stopped then",
-            hint="dt_factor(0.9) or less",
-        )
+        raise ScriptError(words, hint=own_step_instead(hub))
+    words += f"above the stable limit {limit:.4g}"
+    words += (
+        f" of conduction; beyond {BORNE:g} times that temperatures swing"
+        if limit == of_heat
+        else ": the run will most likely blow up, and be stopped then"
+    )
+    hub.warn(words, hint=own_step_instead(hub))

@@ -68,7 +68,11 @@ class _Builder:
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         with told(f"fix {fix.style}", moment, hook.function, fix.place):
             address = address_of(hook.function, hook.signature)
-        uses = int(hook.uses_before), int(hook.uses_share), int(hook.holds and slot >= 0)
+        uses = (
+            int(hook.uses_before),
+            int(hook.uses_share),
+            int(hook.holds and (slot >= 0 or not hook.on_nodes)),
+        )
         formulas = [f for f in (*fix.formulas, fix.wall_friction) if f is not None]
         uses_place = any(f.names & set(POINT_SEEDS) for f in formulas)
         row = (address, STAGES[moment], begin, end, slot, *uses, int(uses_place))
@@ -77,7 +81,7 @@ class _Builder:
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
         self.programs.append([*programs, self._program(fix.wall_friction)])
         self.on_points |= not hook.on_nodes
-        if hook.holds:
+        if hook.holds and hook.on_nodes:
             self.holding.append(fix)
 
     def shared_nodes(self) -> int:

@@ -90,7 +90,7 @@ class Runner:
         hub.rehearse()
         if hub.checking:
             report(hub, self.end_time)
-            foresight.warn(hub, hub.simulation, self.duration)
+            foresight.warn(hub, hub.simulation, self.duration, self.halve)
             raise Quit
         replay = hub.interpreter.replay
         if replay is not None and not replay.at_end:
@@ -163,7 +163,7 @@ class Runner:
             self._tell_of_no_step_left(file, simulation, first_step)
         else:
             simulation.begin(self.end_time)
-            foresight.warn(hub, simulation, self.duration)
+            foresight.warn(hub, simulation, self.duration, self.halve)
         simulation.compile()
         began = simulation.step
         self._banner(simulation, going_on)

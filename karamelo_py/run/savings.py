@@ -12,7 +12,7 @@ import numpy as np
 from karamelo_py.points.laws import Absent, can, plastic_strain
 from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
 from karamelo_py.points.laws.thermoelastic import Thermoelastic
-from karamelo_py.run.stable import keeping_share
+from karamelo_py.run.stable import own_step
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.regions.cylinder import Cylinder
 
@@ -55,15 +55,16 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
         dt = share * limit  # not what the end of a short run makes of it
     else:
         return  # the program's own
-    keeping = keeping_share(hub)
-    if not 0 < dt < SMALL_STEP * keeping * limit < np.inf:
+    best = own_step(hub, simulation)
+    if not 0 < dt < SMALL_STEP * best < np.inf:
         return
-    times = f"{keeping * limit / dt:.3g} times as many steps as the program's own step asks for"
+    times = f"{best / dt:.3g} times as many steps as the program's own step asks for"
     if hub.update.fixed_dt is not None:
-        best = keeping * limit
         yield Saving(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
     else:
-        yield Saving(f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({keeping:g})")
+        yield Saving(
+            f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
+        )
 
 
 # --- what nobody reads ---------------------------------------------------------------------------

@@ -54,12 +54,27 @@ def shares_of_limits(hub: Hub) -> tuple[float, float]:
     return (keeping_share(hub), USUAL) if asked is None else (asked, asked)
 
 
+def own_step(hub: Hub, simulation: Any) -> float:
+    """The step that the program would take of itself now."""
+    clock = simulation.control.clock[0]
+    waves = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
+    return float(min(keeping_share(hub) * waves, USUAL * clock.heat_limit))
+
+
+def own_step_instead(hub: Hub) -> str:
+    """What to write in the place of a step that is too large."""
+    if hub.update.fixed_dt is not None:
+        return f"set_dt({own_step(hub, hub.simulation):.3g}) or less, or leave set_dt out"
+    share = own_step(hub, hub.simulation) / hub.simulation.limit
+    return f"dt_factor({share:.3g}) or less, or leave dt_factor out"
+
+
 def words_of_share(hub: Hub) -> str:
     """What the share of the stable step is, and what it means."""
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
     if hub.update.fixed_dt is not None:
         share = hub.update.fixed_dt / hub.simulation.limit
-        words = f"{share:.3g} of the stable step, by set_dt"
+        words = f"{share:.3g} of the stable step"
     elif asked is None:
         keeping = USUAL if ruling_limit(hub.simulation) == "conduction" else keeping
         return f"{keeping:g} of the stable step, the program's own"

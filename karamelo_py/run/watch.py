@@ -8,6 +8,7 @@ import numpy as np
 
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
 from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
@@ -167,6 +168,8 @@ def tell_of_growth(hub: Hub, simulation: Any) -> bool:
 
 
 def grown_little(simulation: Any) -> bool:
-    """Whether the present state is a good one, as far as its energy tells."""
+    """Whether the present state is a good one, as far as its energy and its last step tell."""
     clock = simulation.control.clock[0]
+    if clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit:
+        return False
     return not clock.watch_energy or (clock.windows < TOLD and clock.grown < IN_ALL)

@@ -15,7 +15,7 @@ from karamelo_py.compiler.formula import GLOBAL, POINT, Program
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import compute_quietly
 from karamelo_py.script.programs import in_order, program
-from karamelo_py.script.terms import Term, applied, constant, is_short, text_of
+from karamelo_py.script.terms import Term, alike, applied, constant, is_short, text_of
 from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
@@ -88,6 +88,10 @@ class Expression:
 
     def __repr__(self) -> str:
         return f"Expression({self.text})"
+
+    def is_like(self, other: Expression) -> bool:
+        """Whether it is the same number as another everywhere, for all that can be seen."""
+        return alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
         """The number it has now.

@@ -127,6 +127,19 @@ def _inverse_normal(p: Term) -> Term:
     return applied("if", near, applied("*", q, middle), side)
 
 
+def alike(one: Term, other: Term) -> bool:
+    """Whether two terms are the same number everywhere: those of + and * may change places."""
+    known: dict[tuple, int] = {}
+    kinds: dict[int, int] = {}
+    for term in (*in_order(one), *in_order(other)):
+        operands = [kinds[id(t)] for t in term.operands]
+        if term.operation in ("+", "*"):
+            operands.sort()
+        key = (term.operation, term.value, *operands)
+        kinds[id(term)] = known.setdefault(key, len(known))
+    return kinds[id(one)] == kinds[id(other)]
+
+
 # ---- as text -------------------------------------------------------------------------------------
 
 

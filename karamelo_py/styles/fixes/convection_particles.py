@@ -48,7 +48,8 @@ class ConvectionParticles(HeatFix):
     heat_flux_particles, temperature_nodes, temperature_particles, method
     """
 
-    supply_heat = heat_hook(exchange, publishes=True)
+    acts_last = True  # what others supply bounds the temperatures that the watch allows
+    supply_heat = heat_hook(exchange, publishes=True, holds=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):
         super().__init__(hub, group, h, T_inf)

@@ -195,7 +195,7 @@ class VelocityNodes(Fix):
             axes = [
                 axis
                 for axis, mine, its in zip(AXES, self.formulas, other.formulas, strict=False)
-                if mine is not None and its is not None and mine.text != its.text
+                if mine is not None and its is not None and not mine.is_like(its)
             ]
             shared = np.intersect1d(self.group.members, other.group.members) if axes else ()
             if len(shared):
