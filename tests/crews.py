@@ -45,8 +45,12 @@ class Threads(Crew):
     def handed_out(self, things: Sequence | None) -> Any:
         return self.everyone(things)[0][self.rank]
 
-    def swapped(self, things: Sequence) -> list:
-        return [of[self.rank] for of in self.everyone(things)]
+    def traded(self, things: dict[int, Any]) -> dict[int, Any]:
+        of_all = self.everyone(things)
+        return {rank: of_all[rank][self.rank] for rank in things}
+
+    def swapped(self, numbers: np.ndarray) -> np.ndarray:
+        return np.array([of[self.rank] for of in self.everyone(numbers)])
 
     def added(self, array: np.ndarray) -> np.ndarray:
         return sum(self.everyone(array))

@@ -13,6 +13,13 @@ from scenes import SCHEMES, block
 from states import same_bits
 from test_restart import CURVE, SCENES, same_files, ways, with_files
 
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.run import tiles
+from karamelo_py.run.curve import along_curve
+from karamelo_py.run.plan import bytes_of_node, plan
+from karamelo_py.scene.hub import Hub
+
 MOVING = (
     "fix(v, initial_velocity_particles, all, 0.9+sin(40*x0), 0.5*cos(70*y0))",
     "log_modify(custom, step, time)",
@@ -78,3 +85,35 @@ def test_dumps_in_pieces(state_interpreted, tmp_path, monkeypatch):
     with h5py.File(one / "h.h5") as a, h5py.File(other / "h.h5") as b:
         assert np.isnan(a["x"][-1]).any() and len(a["id"]) > 32
         assert all(np.array_equal(a[name], b[name], equal_nan=True) for name in a)
+
+
+@pytest.mark.parametrize("shape", [(7,), (8, 8), (4, 4, 4), (5, 3), (3, 7, 2)])
+def test_a_curve_through_all_places(shape):
+    """Each number once; in a full cube from each place to the next beside it, as Hilbert's does."""
+    number = along_curve(shape)
+    assert sorted(number) == list(range(np.prod(shape)))
+    places = np.stack(np.unravel_index(np.argsort(number), shape), axis=1)
+    if shape in {(7,), (8, 8), (4, 4, 4)}:
+        assert (np.abs(np.diff(places, axis=0)).sum(axis=1) == 1).all()
+
+
+def test_what_two_pass_on(monkeypatch):
+    """A bar from cell 4 to 20 in tiles of 4 cells, two points a cell, linear functions.
+
+    The last point before the border is at 11.75 cells, and may go one further: it sees node 13 at
+    most. The first one behind it, at 12.25, sees node 11 at least. Three nodes are in use by both.
+    """
+    monkeypatch.setattr(tiles, "TILES", {1: 4})
+    monkeypatch.setattr(tiles, "DIRECT_UP_TO", 0)
+    lines = (
+        "method(ulmpm, FLIP, linear, 1)", "dimension(1, 0, 2.4, 0.1)",
+        "region(bar, block, 0.4, 2)", "material(a, linear, 1, 1, 0.3)",
+        "solid(bar, region, bar, 2, a, 0.1, 0)",
+    )  # fmt: skip
+    hub = Hub(Console(quiet=True))
+    hub.interpreter = Interpreter(hub)
+    hub.interpreter.run_text("\n".join(lines), "bar")
+    hub.simulation.sort()
+    first, second = plan(hub.simulation, 2)
+    assert (first.points, first.tiles, first.others) == (16, 2, 1)
+    assert first.given == second.given == 3 * bytes_of_node(hub.simulation)

@@ -133,9 +133,19 @@ class Crew:
         """The own one of the things that the first has for each."""
         return self.world.scatter(things)
 
-    def swapped(self, things: Sequence) -> list:
-        """What each has for this one, where this one has `things` for each."""
-        return self.world.alltoall(things)
+    def traded(self, things: dict[int, Any]) -> dict[int, Any]:
+        """What some others have for this one, by rank, where it has `things` for the same."""
+        sent = [self.world.isend(thing, rank) for rank, thing in things.items()]
+        found = {rank: self.world.recv(source=rank) for rank in things}
+        for one in sent:
+            one.wait()
+        return found
+
+    def swapped(self, numbers: np.ndarray) -> np.ndarray:
+        """The number that each has for this one, where this one has `numbers` for each."""
+        out = np.empty_like(numbers)
+        self.world.Alltoall(numbers, out)
+        return out
 
     def added(self, array: np.ndarray) -> np.ndarray:
         """The sum of whole numbers over all: for such, order does not matter."""

@@ -14,7 +14,7 @@ from karamelo_py.run.crew import Crew
 from karamelo_py.run.shares import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import sparse
-from karamelo_py.run.tiles import chosen_of
+from karamelo_py.run.tiles import Boxes, chosen_of, numbers
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 
@@ -64,11 +64,16 @@ def _(mode, quantities, s, due):
 class _Pretended(Crew):
     """One of several processes that are not there."""
 
-    def __init__(self, rank: int, boxes: list):
-        self.rank, self.size, self.boxes = rank, len(boxes), boxes
+    def __init__(self, rank: int, size: int, others: list[tuple[SharedTiles, Boxes]] | None = None):
+        self.rank, self.size, self.others = rank, size, others
 
-    def everyone(self, thing: Any) -> list:
-        return self.boxes
+    def everyone(self, hull: Any) -> list:
+        self.hulls = [tiles.hull(boxes) for tiles, boxes in self.others]
+        return self.hulls
+
+    def traded(self, things: dict[int, Any]) -> dict[int, Any]:
+        parts = {rank: self.others[rank] for rank in things}
+        return {r: tiles.near(own, self.hulls)[self.rank] for r, (tiles, own) in parts.items()}
 
 
 def bytes_of_node(simulation: Simulation) -> int:
@@ -97,46 +102,38 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
             crew, lattices, s.basis, simulation.count, sparse(simulation.hub), one_place=one_place
         )
 
-    first = tiles_of(_Pretended(0, [None] * ranks))
-    first.share_out(first.points_in(s.blocks))
-    cuts, d = first.cuts, first.dimension
-    parts = [[_part(b.tiling, *cuts[r : r + 2]) for b in s.blocks] for r in range(ranks)]
-    boxes = []
-    for part in parts:
-        block = np.repeat(np.arange(len(part)), [one.count[0] for one in part])
-        grid, box = (
-            np.concatenate([getattr(t, name)[: t.count[0]] for t in part])
-            for name in ("grid", "box")
-        )
-        boxes.append((block, grid, box[:, :d], box[:, d:]))
-    return [
-        _share(s, tiles_of(_Pretended(rank, boxes)), part, per_node)
-        for rank, part in enumerate(parts)
-    ]
+    of_all = [tiles_of(_Pretended(rank, ranks)) for rank in range(ranks)]
+    of_all[0].share_out(of_all[0].points_in(s.blocks))
+    parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
+    boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
+    for tiles in of_all:
+        tiles.crew.others = boxes
+    return [_share(part, tiles, per_node) for part, tiles in zip(parts, of_all, strict=True)]
 
 
-def _share(s: Setup, tiles: SharedTiles, part: list[Tiling], per_node: int) -> Share:
-    spans = np.zeros((1, 2), np.int64)
-    blocks = tuple(b._replace(tiling=t) for b, t in zip(s.blocks, part, strict=True))
+def _share(s: Setup, tiles: SharedTiles, per_node: int) -> Share:
     none = s.nodes._replace(
         sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
     )  # boxes of nothing: only their places matter
-    mine = s._replace(blocks=blocks, spans=spans, heat=None, buffers=tiles.empty_buffers(none))
-    tiles.lay_out(mine)
-    points = sum(int(occupied(one)[1].sum()) for one in part)
-    used = spans[1 : 1 + spans[0, 0]]
+    tiles.lay_out(s._replace(buffers=tiles.empty_buffers(none)))
+    tilings = [block.tiling for block in s.blocks]
+    points = sum(int(occupied(one)[1].sum()) for one in tilings)
     rows = sum(map(len, tiles.given.values()))
-    count = sum(int(one.count[0]) for one in part)
-    nodes = int(np.diff(used, axis=1).sum())
+    count = sum(int(one.count[0]) for one in tilings)
+    nodes = len(numbers(s.spans))
     return Share(points, count, nodes, len(tiles.given), rows * per_node)
 
 
-def _part(tiling: Tiling, low: int, high: int) -> Tiling:
-    """The tiles from `low` to `high`."""
-    a, b = np.searchsorted(tiling.number[: tiling.count[0]], (low, high))
-    rows = {name: getattr(tiling, name)[a : b + 1].copy() for name in Tiling._fields}
-    return tiling._replace(**{**rows, "count": np.array([b - a, tiling.count[1]]),
-                              "share": tiling.share})  # fmt: skip
+def _part(s: Setup, own: np.ndarray) -> Setup:
+    """Those tiles of which `own` says so."""
+    blocks = []
+    for block in s.blocks:
+        tiling = block.tiling
+        which = np.flatnonzero(own[occupied(tiling)[0]])
+        rows = {name: getattr(tiling, name)[which] for name in Tiling._fields[2:]}
+        rows |= {"count": np.array([len(which), tiling.count[1]]), "share": tiling.share}
+        blocks.append(block._replace(tiling=tiling._replace(**rows)))
+    return s._replace(blocks=tuple(blocks), spans=np.zeros((1, 2), np.int64), heat=None)
 
 
 def told(simulation: Simulation, ranks: int) -> list[str]:

@@ -26,11 +26,20 @@ from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.by_id import ById, Ordered, Piece
 from karamelo_py.run.crew import ENDING, FAILED, Crew
 from karamelo_py.run.lowering import State, lower
-from karamelo_py.run.shares import SharedTiles, joined, sized
+from karamelo_py.run.shares import SharedTiles, joined, occupied, sized
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.state import changing, of_nodes, remembered_at, take_points, take_tiling
-from karamelo_py.run.tiles import DIRECT_UP_TO, Tiles, in_tiles, in_use, numbers, shares_of, used
+from karamelo_py.run.tiles import (
+    DIRECT_UP_TO,
+    Tiles,
+    between,
+    in_tiles,
+    in_use,
+    numbers,
+    shares_of,
+    used,
+)
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
@@ -263,19 +272,23 @@ class Ranks(Simulation):
         tiles.share_out(tiles.points_in(whole.blocks))
         nodes = numbers(whole.spans)
         memory = [one[nodes] for one in self._memory()]
-        shares = [
-            [_share(k, block, *tiles.cuts[rank : rank + 2]) for k, block in enumerate(whole.blocks)]
+        self._together("take", tiles.cuts, nodes, memory, shares=self._shares())
+        self._handed_out = self.version
+
+    def _shares(self) -> list[list[dict[str, np.ndarray]]]:
+        """What each process has of the whole, block by block."""
+        owner = self._parted.tiles.owner
+        return [
+            [_share(k, block, owner == rank) for k, block in enumerate(self._whole.blocks)]
             for rank in range(self.crew.size)
         ]
-        self._together("take", tiles.cuts, nodes, memory, shares=shares)
-        self._handed_out = self.version
 
     def take(
         self, cuts: np.ndarray, nodes: np.ndarray, memory: list, shares: list | None = None
     ) -> None:
         """Take the own tiles from what the first hands out."""
         found = self.crew.handed_out(shares)
-        self._parted.tiles.cuts[:] = cuts
+        self._parted.tiles.cut(cuts)
         self._parted.tiles.empty_nodes(self._part)
         for one, rows in zip(self._memory(), memory, strict=True):
             one[nodes] = rows
@@ -312,7 +325,7 @@ class Ranks(Simulation):
             "counts": [block.points.mass.size for block in s.blocks],
             "tiling": [
                 {name: getattr(b.tiling, name)[:rows] for name, rows in in_use(b.tiling)}
-                | {"report": b.tiling.report[: max(b.tiling.count[0], 1)]}
+                | {"report": b.tiling.report[: b.tiling.count[0]]}
                 for b in s.blocks
             ],
             "nodes": own,
@@ -354,15 +367,18 @@ class Ranks(Simulation):
         return self.crew.gathered([[a for _, a in arrays_of(b.points)] for b in own])
 
     def _line_up(self, parts: list[dict] | None) -> None:
-        """Put the points of all into the whole of the first, one process after another."""
+        """Put the points of all into the whole of the first, tile after tile."""
         whole = []
         for k, (block, own) in enumerate(zip(self._whole.blocks, self._part.blocks, strict=True)):
             counts = [part["counts"][k] for part in parts] if parts is not None else []
+            order = _by_tile([part["tiling"][k] for part in parts]) if parts else None
             points = sized(block.points, sum(counts)) if self.crew.leads else block.points
             rows = [array for _, array in arrays_of(points)]
             for row, (_, array) in zip(rows, arrays_of(own.points), strict=True):
                 for c in np.ndindex(array.shape[:-1]):
                     self.crew.lined_up(array[c], row[c] if self.crew.leads else None, counts)
+                    if self.crew.leads:
+                        row[c] = row[c][order]
             whole.append(block._replace(points=points))
         self._whole = self._whole._replace(blocks=tuple(whole))
 
@@ -385,6 +401,9 @@ class Ranks(Simulation):
             _join_tilings(block.tiling, [part["tiling"][k] for part in parts])
         self.tiles.empty_nodes(whole)
         self.tiles.lay_out(whole)
+        nodes = numbers(whole.spans)
+        for _, array in of_nodes(whole):
+            array[nodes] = 0  # also those that no box reaches: nobody has them
         for part in parts:
             for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):
                 array[part["nodes"]] = rows
@@ -451,12 +470,7 @@ class Ranks(Simulation):
             [array[nodes] for _, array in of_nodes(whole)],
         )  # fmt: skip
         crew.told(told)
-        cuts = self._parted.tiles.cuts
-        shares = [
-            [_share(k, block, *cuts[r : r + 2]) for k, block in enumerate(whole.blocks)]
-            for r in range(crew.size)
-        ]
-        self._take_back(*told, crew.handed_out(shares))
+        self._take_back(*told, crew.handed_out(self._shares()))
 
     def _take_back(
         self, values: np.ndarray, clock: np.ndarray, nodes: np.ndarray, rows: list, share: list
@@ -534,7 +548,7 @@ class Ranks(Simulation):
         """Copy every array of the part that a step changes."""
         self._kept = {name: array.copy() for name, array in changing(self._parted)}
         self._kept |= {
-            "values": self.control.values.copy(), "cuts": self._parted.tiles.cuts.copy()
+            "values": self.control.values.copy(), "cuts": self._parted.tiles.cuts
         }  # fmt: skip
         return self._kept
 
@@ -553,7 +567,7 @@ class Ranks(Simulation):
         s, tiles, kept = self._part, self._parted.tiles, self._kept
         spans = used(s.spans)[1:].copy()
         tiles.empty_nodes(s)
-        tiles.cuts[:] = kept["cuts"]
+        tiles.cut(kept["cuts"])
         self._put({name: array.copy() for name, array in kept.items()})
         for name, array in changing(self._parted):
             array[...] = kept[name]
@@ -568,36 +582,46 @@ def _like(nodes: Nodes) -> Nodes:
     return Nodes(*(np.zeros_like(array) for array in nodes[:-1]), fields)
 
 
-def _share(k: int, block: Block, low: int, high: int) -> dict[str, np.ndarray]:
-    """The points and tiles of the k-th block in the tiles from `low` to `high`, by name."""
+def _share(k: int, block: Block, own: np.ndarray) -> dict[str, np.ndarray]:
+    """The points and tiles of the k-th block in tiles of which `own` says so, by name."""
     tiling = block.tiling
-    count = tiling.count[0]
-    a, b = np.searchsorted(tiling.number[:count], (low, high))
-    begin, end = (tiling.range[a, 0], tiling.range[b - 1, 1]) if b > a else (0, 0)
-    found = {f"points/{k}/{name}": array[..., begin:end] for name, array in arrays_of(block.points)}
-    rows = {name: getattr(tiling, name)[a:b] for name in ROWS}
-    rows["range"] = rows["range"] - begin
-    rows["count"] = np.array([b - a, tiling.count[1]])
+    which = np.flatnonzero(own[occupied(tiling)[0]])
+    ranges = tiling.range[which]
+    points = between(*ranges.T)
+    found = {f"points/{k}/{name}": array[..., points] for name, array in arrays_of(block.points)}
+    rows = {name: getattr(tiling, name)[which] for name in ROWS}
+    rows["range"] = _one_after_another(ranges)
+    rows["count"] = np.array([len(which), tiling.count[1]])
     rows["share"] = shares_of(rows["range"], int(tiling.count[1]), len(tiling.share))
     return found | {f"tiling/{k}/{name}": array for name, array in rows.items()}
 
 
-def _join_tilings(tiling: Tiling, parts: list[dict[str, np.ndarray]]) -> None:
-    """The tiles of all processes, one after another."""
-    counts = [int(part["count"][0]) for part in parts]
-    before = np.cumsum([0, *(int(part["range"][:, 1].max(initial=0)) for part in parts)])
-    for name in (*ROWS, "report"):
-        rows = []
-        for part, count, first in zip(parts, counts, before, strict=False):
-            own = part[name][: max(count, 1) if name == "report" else count].copy()
-            if name == "range":
-                own += first
-            elif name == "report":
-                own[own[:, 2] > 0, 2] += first
-                own = own if count else own[own[:, 2] > 0]
-            rows.append(own)
-        joint = np.concatenate(rows)
-        getattr(tiling, name)[: len(joint)] = joint
-    tiling.count[0] = sum(counts)
-    ranges = tiling.range[: tiling.count[0]]
+def _one_after_another(ranges: np.ndarray) -> np.ndarray:
+    """Ranges (k, 2) as long as these, each from the end of the one before."""
+    ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
+    return np.stack([np.append(0, ends)[:-1], ends], axis=1)
+
+
+def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
+    """Rows of the tiles of all processes, one process after another."""
+    return np.concatenate([part[name][: part["count"][0]] for part in tilings])
+
+
+def _by_tile(tilings: list[dict[str, np.ndarray]]) -> np.ndarray:
+    """The order of tiles for points that stand one process after another."""
+    ranges = _one_after_another(_joint(tilings, "range"))
+    return between(*ranges[np.argsort(_joint(tilings, "number"))].T)
+
+
+def _join_tilings(tiling: Tiling, tilings: list[dict[str, np.ndarray]]) -> None:
+    """The tiles of all processes, in the order of their numbers."""
+    order = np.argsort(_joint(tilings, "number"))
+    tiling.count[0] = len(order)
+    rows = {name: _joint(tilings, name)[order] for name in (*ROWS, "report")}
+    ranges = _one_after_another(rows["range"])
+    # Points that went wrong keep their place in their tile.
+    wrong = rows["report"][:, 2] > 0
+    rows["report"][wrong, 2] += (ranges - rows["range"])[wrong, 0]
+    for name, array in (rows | {"range": ranges}).items():
+        getattr(tiling, name)[: len(order)] = array
     tiling.share[:] = shares_of(ranges, int(tiling.count[1]), len(tiling.share))

@@ -1,25 +1,27 @@
 """The tiles of a scene shared out among processes: who has which, and what they pass on.
 
-Tiles are numbered grid after grid. Each process has all points in a range of numbers, so that one
-process after another has the points in the order of a single one. Nodes that several reach are
-summed by each of them, from the same boxes in the same order.
+Each process has the points in a range of tiles along a curve. Nodes that several reach are summed
+by each of them, from the same boxes in the same order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of
 from karamelo_py.run.crew import Crew
+from karamelo_py.run.curve import along_curve
 from karamelo_py.run.tiles import (
     Boxes,
+    Reached,
     Tiles,
     between,
     buffers_of,
     chosen_of,
+    extents,
     ragged,
     rows_of,
     steps_of,
@@ -27,6 +29,21 @@ from karamelo_py.run.tiles import (
 from karamelo_py.scene.lattice import Lattice
 
 IMBALANCE = 1.1  # largest share of the points over the mean: above it they are shared out anew
+
+
+class Needs(NamedTuple):
+    """Nodes in use of a process: at each of k places of tiles of nodes, a box of them."""
+
+    place: np.ndarray  # (k,) ascending
+    lo: np.ndarray  # (k, d)
+    hi: np.ndarray  # (k, d)
+
+    def among(self, place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
+        """Of nodes (m, d) at places (m,): which have some of these; the first and last such."""
+        at = np.minimum(np.searchsorted(self.place, place), len(self.place) - 1)
+        low, high = np.maximum(begin, self.lo[at]), np.minimum(end, self.hi[at])
+        which = np.flatnonzero((self.place[at] == place) & (low <= high).all(axis=1))
+        return which, low[which], high[which]
 
 
 class SharedTiles(Tiles):
@@ -53,23 +70,37 @@ class SharedTiles(Tiles):
         super().__init__(lattices, basis, points, sparse)
         self.crew = crew
         self.one_place = one_place
-        self.cuts = np.full(crew.size + 1, self.count)
-        self.cuts[0] = 0
+        self._along = np.concatenate(
+            [
+                first + along_curve(shape)
+                for first, shape in zip(self.first, self.shapes, strict=False)
+            ]
+        )
+        self.cut(np.append(0, np.full(crew.size, self.count)))
         self.foreign = np.zeros(int(self._first_node[-1] + self._nodes[-1].prod()), np.uint8)
         self._marked = np.empty(0, np.int64)
         self.given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
         self._taken: dict[int, slice] = {}
+        self._from = np.empty(0, np.int64)  # whose the boxes of others are
 
     # --- points -----------------------------------------------------------------------------------
 
+    def cut(self, cuts: np.ndarray) -> None:
+        """Let each process have the tiles along the curve from its cut to the next."""
+        self.cuts = cuts
+        self.owner = np.searchsorted(cuts, self._along, side="right") - 1
+
     def share_out(self, per_tile: np.ndarray) -> None:
         """Cut the tiles into ranges of nearly as many points each."""
-        self.cuts[1:] = self.count
+        cuts = np.append(0, np.full(self.crew.size, self.count))
         if not self.direct:
-            ends = np.cumsum(per_tile)
+            along = np.empty_like(per_tile)
+            along[self._along] = per_tile
+            ends = np.cumsum(along)
             parts = np.arange(1, self.crew.size) * ends[-1] / self.crew.size
             # A tile is of the one that has its middle.
-            self.cuts[1:-1] = np.searchsorted(ends - 0.5 * per_tile, parts)
+            cuts[1:-1] = np.searchsorted(ends - 0.5 * along, parts)
+        self.cut(cuts)
 
     def points_in(self, blocks: Iterable[Block]) -> np.ndarray:
         """Number of the points in each tile, of blocks that are sorted."""
@@ -83,27 +114,27 @@ class SharedTiles(Tiles):
         tiles = [self._by_tile(s, block)[1] for block in s.blocks]
         here = sum(np.bincount(of, minlength=self.count) for of in tiles)
         per_tile = self.crew.added(here)
-        shares = np.diff(np.append(0, np.cumsum(per_tile))[self.cuts])
+        shares = np.bincount(self.owner, per_tile, self.crew.size)
         if shares.max() > IMBALANCE * shares.mean():
             self.share_out(per_tile)
-        own = here[self.cuts[self.crew.rank] : self.cuts[self.crew.rank + 1]].sum()
-        leaving = int(here.sum() - own)
-        if self.crew.added(np.array([leaving]))[0] == 0:
+        own, me = [self.owner[of] for of in tiles], self.crew.rank
+        going = sum(np.bincount(to, minlength=self.crew.size) for to in own)
+        going[me] = 0
+        others = np.flatnonzero(going + self.crew.swapped(going)).tolist()
+
+        def parts(rank: int) -> list[list[np.ndarray]]:
+            return [
+                [array[..., to == rank] for _, array in arrays_of(block.points)]
+                for block, to in zip(s.blocks, own, strict=True)
+            ]
+
+        come = self.crew.traded({rank: parts(rank) for rank in others})
+        if not come:
             return s
-        self.empty_nodes(s)
-        gone: list[list] = [[] for _ in range(self.crew.size)]
-        for block, of in zip(s.blocks, tiles, strict=True):
-            to = np.searchsorted(self.cuts, of, side="right") - 1
-            for rank, parts in enumerate(gone):
-                chosen = np.flatnonzero(to == rank)
-                parts.append([np.take(a, chosen, axis=-1) for _, a in arrays_of(block.points)])
-        # What stays is not packed and unpacked.
-        stay, gone[self.crew.rank] = gone[self.crew.rank], []
-        come = self.crew.swapped(gone)
-        come[self.crew.rank] = stay
+        found = [parts(me), *come.values()]
         blocks = tuple(
-            block._replace(points=joined(block.points, [parts[k] for parts in come]))
-            for k, block in enumerate(s.blocks)
+            block._replace(points=joined(block.points, list(of_all)))
+            for block, *of_all in zip(s.blocks, *found, strict=True)
         )
         return s._replace(blocks=blocks)
 
@@ -113,63 +144,104 @@ class SharedTiles(Tiles):
     # --- nodes ------------------------------------------------------------------------------------
 
     def _boxes(self, s: Setup) -> Boxes:
-        own = super()._boxes(s)
-        block = np.repeat(np.arange(len(s.blocks)), [b.tiling.count[0] for b in s.blocks])
-        all_of = self.crew.everyone((block, own.grid, own.lo, own.hi))
-        me = self.crew.rank
-        ranks = [me, *(rank for rank in range(self.crew.size) if rank != me)]
-        block, grid, lo, hi = (
-            np.concatenate(part) for part in zip(*(all_of[rank] for rank in ranks), strict=True)
-        )
-        self._of = np.repeat(ranks, [len(all_of[rank][0]) for rank in ranks])
-        order = np.empty(len(grid), np.int64)
-        order[np.lexsort((self._of, block))] = np.arange(len(grid))
-        return Boxes(order, grid, lo, hi)
+        own = self.own_boxes(s)
+        found = self.crew.traded(self.near(own, self.crew.everyone(self.hull(own))))
+        of_all = {self.crew.rank: own, **dict(sorted(found.items()))}
+        self._of = np.repeat(list(of_all), [len(boxes.grid) for boxes in of_all.values()])
+        return Boxes(*(np.concatenate(same) for same in zip(*of_all.values(), strict=True)))
 
-    def _reached(self, boxes: Boxes) -> tuple[np.ndarray, ...]:
-        box, tile, begin, end = super()._reached(boxes)
-        of, place = self._of[box], self._place(tile)
-        me = self.crew.rank
-        self._first_of_place = np.full(int(self._first_of_nodes[-1]), self.crew.size)
-        np.minimum.at(self._first_of_place, place, of)
-        mine = np.isin(place, place[of == me])
-        self._rows_for: dict[int, tuple[np.ndarray, ...]] = {}
-        for rank in np.unique(of[mine]):
-            if rank != me:
-                both = (of == me) & np.isin(place, place[of == rank])
-                self._rows_for[int(rank)] = _hulls(box[both], begin[both], end[both])
-        return box[mine], tile[mine], begin[mine], end[mine]
+    def own_boxes(self, s: Setup) -> Boxes:
+        """The boxes of the own tiles, with their place in the order of one process."""
+        order = [k * self.count + occupied(block.tiling)[0] for k, block in enumerate(s.blocks)]
+        return super()._boxes(s)._replace(order=np.concatenate(order))
+
+    def hull(self, boxes: Boxes) -> np.ndarray:
+        """(grids, 2 d) the least of the first tiles of nodes, and of the last times -1."""
+        grid, low, high = self._around(boxes)
+        found = np.full((len(self._nodes), 2 * self.dimension), self._nodes.max() + 1)
+        np.minimum.at(found, grid, np.concatenate([low, -high], axis=1))
+        return found
+
+    def near(self, boxes: Boxes, hulls: list[np.ndarray]) -> dict[int, Boxes]:
+        """Those of own boxes that may reach tiles of nodes of others with these hulls, by rank."""
+        grid, low, high = self._around(boxes)
+        d, of_all = self.dimension, np.array(hulls)
+        own = of_all[self.crew.rank]
+        # Both or neither of two see that they meet.
+        meet = _meet(own[:, :d], -own[:, d:], of_all).any(axis=1)
+        meet[self.crew.rank] = False
+        found = {}
+        for rank in np.flatnonzero(meet).tolist():
+            chosen = _meet(low, high, of_all[rank][grid])
+            found[rank] = Boxes(*(array[chosen] for array in boxes))
+        return found
+
+    def _around(self, boxes: Boxes) -> tuple[np.ndarray, ...]:
+        """The grids of boxes, or one for all at a place; the first and last tiles of nodes."""
+        grid = np.zeros_like(boxes.grid) if self.one_place else boxes.grid
+        return grid, boxes.lo // self.node_size, boxes.hi // self.node_size
 
     def _place(self, tile: np.ndarray) -> np.ndarray:
         """The number of the place of a tile of nodes."""
         return tile % int(self._first_of_nodes[1]) if self.one_place else tile
 
-    def _number(self, s: Setup, boxes: Boxes, *reached: np.ndarray) -> tuple[np.ndarray, ...]:
-        # Of others' boxes there are only the parts that reach nodes in use here.
-        box, begin, end = reached
-        other = self._of[box] != self.crew.rank
-        lo, hi = boxes.lo.copy(), boxes.hi.copy()
-        others = self._of != self.crew.rank
-        lo[others], hi[others] = 0, -1
-        found, lo[found], hi[found] = _hulls(box[other], begin[other], end[other])
-        first, steps = super()._number(s, boxes._replace(lo=lo, hi=hi), *reached)
-        if self.direct:
-            return first, steps
-        ends = np.append(0, np.cumsum(np.prod(hi - lo + 1, axis=1)))
-        self._taken = {}
-        for rank in np.unique(self._of[found]):
-            has = np.flatnonzero(self._of == rank)
-            self._taken[int(rank)] = slice(int(ends[has[0]]), int(ends[has[-1] + 1]))
+    def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
+        """What own boxes reach, and what of others' is at nodes in use here, as more boxes."""
+        _, reached = super()._reached(boxes)
+        of, place = self._of[reached.box], self._place(reached.tile)
+        me = self.crew.rank
+        self._needs = {
+            int(rank): _needs(place[here], reached.begin[here], reached.end[here])
+            for rank in np.unique(of)
+            for here in [of == rank]
+        }
+        own, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
+        self._passed, self._from = {}, of[:0]
+        if not len(own):
+            return Boxes(*(array[:0] for array in boxes)), Reached(*(a[own] for a in reached))
+        for rank, needs in self._needs.items():
+            if rank != me:
+                which, low, high = needs.among(place[own], reached.begin[own], reached.end[own])
+                self._passed[rank] = reached.box[own][which], low, high
+        which, low, high = self._needs[me].among(
+            place[others], reached.begin[others], reached.end[others]
+        )
+        pieces = others[which]
+        self._from, box = of[pieces], reached.box[pieces]
+        more = Boxes(boxes.order[box], boxes.grid[box], low, high)
+        count = np.count_nonzero(self._of == me)
+        found = Reached(*(array[np.append(own, pieces)] for array in reached))
+        found.box[len(own) :] = count + np.arange(len(pieces))
+        found.begin[len(own) :], found.end[len(own) :] = low, high
+        return Boxes(
+            *(np.append(a[:count], b, axis=0) for a, b in zip(boxes, more, strict=True))
+        ), found
+
+    def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
+        first, steps = super()._number(s, boxes)
         self.given = {
             rank: _rows(low, high, first[which], steps[which])
-            for rank, (which, low, high) in self._rows_for.items()
+            for rank, (which, low, high) in self._passed.items()
         }
+        ends = np.append(0, np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1)))
+        own = len(ends) - 1 - len(self._from)
+        self._taken = {}
+        for rank in np.unique(self._from):
+            begin, end = np.searchsorted(self._from, [rank, rank + 1])
+            self._taken[int(rank)] = slice(int(ends[own + begin]), int(ends[own + end]))
         return first, steps
 
-    def _own_nodes(self, tiles: np.ndarray, own: np.ndarray) -> None:
+    def _see_nodes(
+        self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
+    ) -> None:
+        # Of those that have a node in use the first counts it.
         self.foreign[self._marked] = 0
-        away = own[self._first_of_place[self._place(tiles)] != self.crew.rank]
-        self._marked = between(*rows_of(away))
+        found = [self._marked[:0]]
+        for rank, needs in self._needs.items():
+            if rank < self.crew.rank:
+                which, low, high = needs.among(self._place(tiles), begin, end)
+                found.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
+        self._marked = np.concatenate(found)
         self.foreign[self._marked] = 1
 
     def exchange(self, s: Setup, number: int, what: int) -> None:
@@ -217,15 +289,17 @@ def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
     return Points(**own, fields=tuple(type(one)(next(arrays)) for one in points.fields))
 
 
-def _hulls(box: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
-    """For each box that there is: the least and largest nodes of its parts (k, d)."""
-    order = np.argsort(box, kind="stable")
-    box, begin, end = box[order], begin[order], end[order]
-    starts = np.flatnonzero(np.diff(box, prepend=-1))
-    if not len(starts):
-        return box, begin, end
-    low, high = np.minimum.reduceat(begin, starts), np.maximum.reduceat(end, starts)
-    return box[starts], low, high
+def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
+    """The least and largest nodes of boxes (m, d) at each place (m,)."""
+    order = np.argsort(place, kind="stable")
+    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
+    return Needs(place[order][starts], *extents(starts, begin[order], end[order]))
+
+
+def _meet(low: np.ndarray, high: np.ndarray, hulls: np.ndarray) -> np.ndarray:
+    """(..., k) whether boxes (k, d) have something in common with hulls (..., k, 2 d)."""
+    d = low.shape[1]
+    return ((low <= -hulls[..., d:]) & (hulls[..., :d] <= high)).all(axis=-1)
 
 
 def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) -> np.ndarray:

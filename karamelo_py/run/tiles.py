@@ -46,6 +46,16 @@ class Boxes(NamedTuple):
     hi: np.ndarray  # (b, d) last nodes
 
 
+class Reached(NamedTuple):
+    """Pairs of a box and a tile of nodes that it reaches."""
+
+    box: np.ndarray  # (k,) which box
+    tile: np.ndarray  # (k,) number of the tile of nodes
+    begin: np.ndarray  # (k, d) first nodes of the box in the tile
+    end: np.ndarray  # (k, d) last nodes
+    size: np.ndarray  # (k,) number of these nodes
+
+
 class Tiles:
     """Sorts the points of a setup by tile; says what nodes the points of a tile may reach.
 
@@ -220,15 +230,14 @@ class Tiles:
 
         Everything follows from the boxes of the tiles.
         """
-        boxes = self._boxes(s)
-        box, tile, begin, end = self._reached(boxes)
-        first, steps = self._number(s, boxes, box, begin, end)
+        boxes, reached = self._reached(self._boxes(s))
+        first, steps = self._number(s, boxes)
         # The largest part first: mostly it has all the nodes that others reach.
-        order = np.lexsort((boxes.order[box], -np.prod(end - begin + 1, axis=1), tile))
-        tile, box, begin, end = tile[order], box[order], begin[order], end[order]
+        order = np.lexsort((boxes.order[reached.box], -reached.size, reached.tile))
+        box, tile, begin, end, _ = (array[order] for array in reached)
         starts = np.flatnonzero(np.diff(tile, prepend=-1))
         grid = boxes.grid[box]
-        own_begin, own_end = _extents(starts, begin, end)
+        own_begin, own_end = extents(starts, begin, end)
         more = ((begin[starts] != own_begin) | (end[starts] != own_end)).any(axis=1)
         parts = self._parts(grid, begin, end, first[box], steps[box])
         parts[:, 9] = ADD
@@ -250,7 +259,7 @@ class Tiles:
         for room, found in zip(rooms, (firsts, parts), strict=True):
             grow(room, len(found))
             room[: len(found)] = found
-        self._own_nodes(tile[starts], own)
+        self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
 
     def _boxes(self, s: Setup) -> Boxes:
         """The boxes of the tiles of all blocks."""
@@ -259,8 +268,8 @@ class Tiles:
         box = np.concatenate([one.box[: one.count[0]] for one in tilings])
         return Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:])
 
-    def _reached(self, boxes: Boxes) -> tuple[np.ndarray, ...]:
-        """Pairs of a box and a tile of nodes that it reaches; the first and last such nodes."""
+    def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
+        """What the boxes reach."""
         size = self.node_size
         low = boxes.lo // size
         across = boxes.hi // size - low + 1
@@ -269,9 +278,10 @@ class Tiles:
         grid = boxes.grid[box]
         tile = self._first_of_nodes[grid] + (places * self._tile_steps[grid]).sum(axis=1)
         begin = np.maximum(places * size, boxes.lo[box])
-        return box, tile, begin, np.minimum(places * size + size - 1, boxes.hi[box])
+        end = np.minimum(places * size + size - 1, boxes.hi[box])
+        return boxes, Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
 
-    def _number(self, s: Setup, boxes: Boxes, *reached: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
         """Give each box its rows of the buffers: its number of node 0, and steps (k, d)."""
         steps = self._steps[boxes.grid] if self.direct else steps_of(boxes.hi - boxes.lo + 1)
         ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
@@ -297,8 +307,10 @@ class Tiles:
             for array in summed(one.nodes):
                 grow(array, rows)
 
-    def _own_nodes(self, tiles: np.ndarray, own: np.ndarray) -> None:
-        """Take note of the tiles of nodes in use: their numbers, and rows of all their nodes."""
+    def _see_nodes(
+        self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
+    ) -> None:
+        """Take note of the tiles of nodes in use, and of the nodes from `begin` to `end` there."""
 
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
         """`Buffers.parts` of nodes (k, d) from `begin` to `end` of the grids.
@@ -316,7 +328,7 @@ class Tiles:
         return parts
 
 
-def _extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
+def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
     """The least and largest of the rows from each start to the next."""
     if not len(starts):
         return begin, end
