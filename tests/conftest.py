@@ -100,15 +100,19 @@ def _ask(process: subprocess.Popen, request: dict) -> dict:
 def run_interpreted(tmp_path, _interpreter) -> Callable[..., Result]:
     """As `run_script`, but interpreted: for many kinds of tiny scenes, which need no compiling.
 
-    With ``status=None`` it may end as it likes.
+    With ``status=None`` it may end as it likes; ``command="check"`` is that of the command line.
     """
 
     def run(
-        script: str | Path, *options: str, status: int | None = 0, folder: str = "run"
+        script: str | Path,
+        *options: str,
+        status: int | None = 0,
+        folder: str = "run",
+        command: str = "run",
     ) -> Result:
         place = tmp_path / folder
         place.mkdir(exist_ok=True)
-        arguments = [str(_prepared(place, script)), *options]
+        arguments = [command, str(_prepared(place, script)), *options]
         answer = _ask(_interpreter, {"folder": str(place), "arguments": arguments})
         return _checked(Result(answer["status"], answer["out"], answer["err"], place), status)
 

@@ -308,9 +308,9 @@ def test_compiled_is_the_same(run_script, run_interpreted):
         assert compiled[name] == pytest.approx(interpreted[name], rel=1e-9, abs=1e-12)
 
 
-def test_single_precision(run_script):
+def test_single_precision(run_interpreted):
     script = "precision(single)\n" + BLOCK + "solid(s, region, box, 1, steel, 0.1, 0)\n" + PULL
-    last = run_script(script).dump("end.50.LAMMPS")
+    last = run_interpreted(script).dump("end.50.LAMMPS")
     assert last.ep == pytest.approx(np.full(len(last.id), 2 / 3 * 0.0025), rel=1e-3)
 
 

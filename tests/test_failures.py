@@ -67,8 +67,8 @@ def test_a_point_that_leaves_the_domain(run_interpreted):
 
 def test_the_last_good_state_is_written_once(run_interpreted, tmp_path):
     """Not to the files of restart(...) as well; not over a file of somebody else; or not at all."""
-    lines = ("fix(v, initial_velocity_particles, all, 10, 0)", "set_dt(0.001)")
-    script = block(2, *lines, *OUTPUT, "restart(40, r.*.h5)", "run(200)")
+    lines = ("fix(v, initial_velocity_particles, all, 10)", "set_dt(0.001)")
+    script = block(1, *lines, *OUTPUT, "restart(40, r.*.h5)", "run(200)")
     result = run_interpreted(script, folder="a", status=1)
     assert "last_good.62.h5; karamelo-py SCRIPT -restart" in result.err
     assert {path.name for path in result.folder.glob("*.h5")} == {"last_good.62.h5", "r.40.h5"}
@@ -196,7 +196,7 @@ except SimulationError as error:
 
 def test_the_last_good_state_is_from_before_energy_grew(tmp_path):
     """The block leaves at step 313; growth is seen at 300, behind the first step of a run, 251."""
-    scene = block(2, "fix(v, initial_velocity_particles, all, 2, 0)", "set_dt(0.001)", *OUTPUT)
+    scene = block(1, "fix(v, initial_velocity_particles, all, 2)", "set_dt(0.001)", *OUTPUT)
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", f"SCENE = {scene!r}\n{GROWN}"], cwd=tmp_path,
         capture_output=True, text=True, env={**os.environ, "NUMBA_DISABLE_JIT": "1"},

@@ -3,8 +3,6 @@
 import pytest
 from conftest import INPUTS
 
-from karamelo_py.app.cli import main
-
 SCENE = """
     method({method})
     dimension(2, 0, 12, 0, 8, 1)
@@ -137,7 +135,7 @@ def test_each_failure_is_told_once(run_interpreted):
         ("noise of a drift", "tlmpm, FLIP, quadratic-spline, 1", "", 6000, False),
     ],
 )
-def test_failures_of_long_runs(tmp_path, capsys, name, method, more, steps, told):
+def test_failures_of_long_runs(run_interpreted, name, method, more, steps, told):
     """Two disks in a held box for 100 s: 3.5 times the energy at the end, 0.2 times with 0.3 dt.
 
     The noise of a drift: tests/test_stability.py.
@@ -146,13 +144,10 @@ def test_failures_of_long_runs(tmp_path, capsys, name, method, more, steps, told
     text = SCENE.format(**words)
     if "dt_factor" in more:
         text = text.replace("set_dt(0.01)", "")
-    path = tmp_path / "in.script"
-    path.write_text(text, encoding="utf-8")
-    assert main(["check", str(path)]) == 0
-    assert (name in capsys.readouterr().err) == told
+    assert (name in run_interpreted(text, command="check").err) == told
 
 
-def test_check_tells_too(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["check", str(INPUTS / "in.spinning_disk"), "-var", "transfer", "PIC"]) == 0
-    assert "angular momentum: " in capsys.readouterr().err
+def test_check_tells_too(run_interpreted):
+    script = INPUTS / "in.spinning_disk"
+    said = run_interpreted(script, "-var", "transfer", "PIC", command="check").err
+    assert "angular momentum: " in said

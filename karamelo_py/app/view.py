@@ -12,7 +12,7 @@ import numpy as np
 from karamelo_py.output.files import picture_format, unwarned, whole
 from karamelo_py.output.movies import Frames, movie_format
 from karamelo_py.output.snapshots import Snapshot, read
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, unknown
 
 SUMMARY = "Draw pictures or a movie of dumps of points."
 TEXT = """\
@@ -108,12 +108,8 @@ def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace
     from karamelo_py.styles.dumps.pyplot import colours_of
 
     if options.column is not None and options.column not in first.columns:
-        close = nearest(options.column, first.columns)
-        raise ScriptError(
-            f"the dump has no column '{options.column}'",
-            expected="one of " + " ".join(first.columns),
-            hint=f"did you mean '{close}'?" if close else None,
-        )
+        said = f"the dump has no column '{options.column}'"
+        raise unknown(said, options.column, first.columns)
     dimension, column = _dimension(first), _coloured_by(first, options.column)
     limits = (options.vmin, options.vmax)
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []

@@ -15,7 +15,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import evaluated, per_direction
+from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 
 class Solids(tuple):
@@ -140,9 +140,7 @@ def translate_particles(
         inside = region.inside(solid.x0)
         x = solid.x0[inside]
         step = np.zeros_like(solid.x0)
-        for k, formula in enumerate(formulas):
-            if formula is not None:
-                step[inside, k] = evaluated(formula, hub, x, x)
+        step[inside] = vector(formulas, hub, x, x)
         _move(hub, solid, step)
 
 

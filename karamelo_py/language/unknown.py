@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 from karamelo_py.language import registry
 from karamelo_py.language.own_words import in_own_words
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant, nearest
 from karamelo_py.script.evaluation import usage
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
@@ -35,13 +35,12 @@ class Names(Protocol):
 
 def unknown_statement(script: Names, name: str) -> ScriptError:
     """The error for a statement that is no more than a name nobody knows."""
-    close = nearest(name, ["quit", *registry.names("command"), *script.variables])
-    if name.lower() in ("exit", "stop", "end"):
-        close = "quit"
+    meaning = "quit" if name.lower() in ("exit", "stop", "end") else name
+    known = ["quit", *registry.names("command"), *script.variables]
     return ScriptError(
         f"'{name}' is neither a command nor a variable",
         expected="name = expression, or command(arguments)",
-        hint=instead("command", name) or _meant(close),
+        hint=instead("command", name) or meant(meaning, known),
     )
 
 
@@ -58,13 +57,12 @@ def unknown_call(script: Names, name: str, place: Any, statement: bool) -> Scrip
             hint=f"{name}*(...)",
         )
     known = [*commands, *FUNCTIONS] if statement else [*FUNCTIONS, *commands]
-    close = nearest(name, known)
     shown = commands if statement else sorted(FUNCTIONS)
     return ScriptError(
         f"unknown {what} '{name}'",
         place=place,
         expected="one of " + ", ".join(shown),
-        hint=other or _meant(close),
+        hint=other or meant(name, known),
     )
 
 
@@ -159,11 +157,10 @@ def _not_published(script: Names, name: str, place: Any) -> ScriptError | None:
                 continue
             names = [f"{ID}_{s}" if s else ID for s in item.published]
             what = ", ".join(names) or "nothing"
-            close = nearest(name, names) or (names[0] if names else None)
             return ScriptError(
                 f"{kind} {item.style} publishes {what}, not {name}",
                 place=place,
-                hint=f"did you mean '{close}'?" if close else None,
+                hint=meant(name, names) or (f"did you mean '{names[0]}'?" if names else None),
             )
     return None
 
@@ -231,10 +228,6 @@ def check_name(name: str) -> None:
         expected="a name that is free",
         hint=f"{other}; or choose {free}" if other else f"choose {free}",
     )
-
-
-def _meant(close: str | None) -> str | None:
-    return f"did you mean '{close}'?" if close else None
 
 
 def listed(names: Iterable[str]) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.script.errors import ScriptError, meant, nearest
+from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.script.expressions import POINT_SEEDS
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
@@ -47,11 +47,10 @@ class Quantity:
         if self.is_word:
             return
         if formula is None and name not in self.names(hub):
-            close = nearest(name, self.names(hub))
             raise ScriptError(
                 f"unknown quantity '{name}'",
                 expected="step, dt, time, a variable, or a value of a fix or compute",
-                hint=f"did you mean '{close}'?" if close else None,
+                hint=meant(name, self.names(hub)),
             )
         source = self._source()
         if isinstance(source, str):

@@ -14,7 +14,7 @@ from karamelo_py.output.schedule import Output
 from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.update import Update
-from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
+from karamelo_py.script.errors import Place, ScriptError, meant, render_message
 from karamelo_py.script.values import Values
 
 
@@ -45,16 +45,13 @@ class Catalogue(dict):
     def __missing__(self, ID: str) -> Any:
         always = ["all"] if self.kind == "group" else []
         known = ", ".join([*always, *self])
-        close = nearest(ID, [*always, *self])
         other = next((c.kind for c in self.hub.catalogues if ID in c and c.kind != self.kind), None)
         raise ScriptError(
             f"unknown {self.kind} '{ID}'" + (f"; '{ID}' is a {other}" if other else ""),
             expected=f"one of {known}" if known else f"no {self.kind} is defined yet",
             hint=_group_of(other, ID)
             if self.kind == "group" and other in ("region", "solid")
-            else f"did you mean '{close}'?"
-            if close
-            else None,
+            else meant(ID, [*always, *self]),
         )
 
     def remove(self, ID: str) -> None:

@@ -4,7 +4,7 @@ import difflib
 import re
 import unicodedata
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 _WIDEST_LINE = 160
 
@@ -148,6 +148,13 @@ def meant(name: str, names: Iterable[str]) -> str | None:
     """``did you mean '...'?`` with the one of `names` most like `name`; None without any."""
     close = nearest(name, names)
     return f"did you mean '{close}'?" if close else None
+
+
+def unknown(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
+    """The error for a `name` that is none of the `known`, which it lists; `where` it stands."""
+    known = list(dict.fromkeys(known))
+    expected = f"one of {' '.join(known)}"
+    return ScriptError(message, expected=expected, hint=meant(name, known), **where)
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.formula import GLOBAL, POINT, Program
+from karamelo_py.compiler.formula import BLOCK, GLOBAL, POINT, ROWS, Program, evaluate_all
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import compute_quietly
 from karamelo_py.script.programs import in_order, program
@@ -141,17 +141,16 @@ class Expression:
         """
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
-        from karamelo_py.compiler import formula as kernels
 
         out = np.empty(len(x))
-        scratch = np.empty((6 + kernels.ROWS, kernels.BLOCK))
+        scratch = np.empty((6 + ROWS, BLOCK))
         program = self.program(values)
         # Some at a time: copies with three columns of millions of points would take much memory.
         for first in range(0, len(x), CHUNK):
             some = slice(first, first + CHUNK)
             here = _three_columns(x[some])
             before = here if x0 is None else _three_columns(x0[some])
-            kernels.evaluate_all(program, values.array, here, before, out[some], scratch)
+            evaluate_all(program, values.array, here, before, out[some], scratch)
         return out
 
 

@@ -14,7 +14,7 @@ from karamelo_py.app.bench import measure, record, scaling
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.cli import add_variables, threads_option
 from karamelo_py.app.studies.options import out_file
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import ScriptError, unknown
 
 ELSEWHERE = "published, one core of another machine, a small AMD EPYC"
 
@@ -59,11 +59,7 @@ def measure_all(options: Namespace) -> int:
     """The subcommand."""
     for name in options.workloads:
         if name not in WORKLOADS:
-            raise ScriptError(
-                f"unknown workload '{name}'",
-                expected="one of " + ", ".join(WORKLOADS),
-                hint=meant(name, WORKLOADS),
-            )
+            raise unknown(f"unknown workload '{name}'", name, WORKLOADS)
     chosen = options.workloads or (scaling.USUAL if options.ranks else list(WORKLOADS))
     known = {name: set(re.findall(r"\w+", WORKLOADS[name].script)) for name in chosen}
     for variable, _ in options.var:

@@ -19,7 +19,7 @@ from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import environment
 from karamelo_py.app.studies.options import new_parser
 from karamelo_py.output.console import duration
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 
 DESCRIPTION = """\
 Makes the pictures and tables of an atlas again: a file (TOML) that lists them with the commands of
@@ -153,11 +153,10 @@ def run(options: Any) -> int:
     for name in asked:
         if name not in groups and name not in {entry.name for entry in entries}:
             known = [*groups, *(entry.name for entry in entries)]
-            close = nearest(name, known)
             raise ScriptError(
                 f"-only {name}: no such entry",
                 expected="one of " + ", ".join(sorted(groups)) + " (-list shows all)",
-                hint=f"did you mean '{close}'?" if close else None,
+                hint=meant(name, known),
             )
     chosen = [
         entry for entry in entries

@@ -10,7 +10,7 @@ import numpy as np
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.records import value
 from karamelo_py.app.studies.variables import number
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, unknown
 
 NONE = "mechanical"  # what a script says where a method has no such word
 
@@ -194,9 +194,4 @@ def require(rows: Sequence[Mapping[str, str]], option: str, name: str) -> None:
 
 def missing(option: str, name: str, known: Sequence[str], place: str = "the table") -> ScriptError:
     """The error for a column or a variable that a table does not have."""
-    close = nearest(name, known)
-    return ScriptError(
-        f"{option}: {place} has no '{name}'",
-        expected="one of " + ", ".join(known),
-        hint=f"did you mean '{close}'?" if close else None,
-    )
+    return unknown(f"{option}: {place} has no '{name}'", name, known)

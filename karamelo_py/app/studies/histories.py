@@ -11,7 +11,7 @@ from karamelo_py.app.studies.case import read_log
 from karamelo_py.app.studies.curves import Line
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tidy
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, unknown
 
 DECADES = 1e4  # curves that reach over more are drawn on a logarithmic axis
 
@@ -71,12 +71,7 @@ def histories(
             continue
         for name in (over, curve):
             if name not in columns:
-                close = nearest(name, columns)
-                raise ScriptError(
-                    f"{log} has no column '{name}'",
-                    expected="one of " + " ".join(columns),
-                    hint=f"did you mean '{close}'?" if close else None,
-                )
+                raise unknown(f"{log} has no column '{name}'", name, columns)
         label = names[k] if k < len(names) else Line({name: row[name] for name in by}).label
         stopped = row.get("status", "done") != "done"
         kept = forward(columns["Time"], stopped) if "Time" in columns else slice(None)

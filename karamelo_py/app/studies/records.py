@@ -17,7 +17,7 @@ import karamelo_py
 from karamelo_py.app.studies.case import COLUMNS, Outcome, read_log
 from karamelo_py.app.studies.variables import Scope, number
 from karamelo_py.output.quantity import KEYWORDS
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant, nearest
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse_text
@@ -147,13 +147,11 @@ def recorded(
             if headings is None or column in headings:
                 continue
             known = list(dict.fromkeys(headings))
-            close = nearest(column, known)
             raise ScriptError(
                 f"-record {item.text}: {script} does not log '{column}'",
                 expected="one of " + ", ".join(known),
-                hint=f"did you mean '{close}'?"
-                if close
-                else f"log_modify(custom, step, dt, time, {column}) in the script",
+                hint=meant(column, known)
+                or f"log_modify(custom, step, dt, time, {column}) in the script",
             )
     return found
 

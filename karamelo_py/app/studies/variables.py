@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py.output.quantity import KEYWORDS
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text
@@ -153,7 +153,7 @@ class Scope:
             f"{self.option}: unknown name '{name}'",
             expected="a variable of the study, or one of its values (in quotes where it has signs "
             'such as -): basis == "quadratic-spline"',
-            hint=_meant(nearest(name, [*self.known, *self.words])),
+            hint=meant(name, [*self.known, *self.words]),
         )
 
     def hides(self, name: str) -> bool:
@@ -171,10 +171,6 @@ def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) ->
     if not isinstance(value, float):
         raise ScriptError(f"-where {condition} is neither true nor false")
     return value != 0
-
-
-def _meant(close: str | None) -> str | None:
-    return f"did you mean '{close}'?" if close else None
 
 
 def check_script(path: Path, names: Iterable[str]) -> None:
@@ -195,7 +191,7 @@ def check_script(path: Path, names: Iterable[str]) -> None:
             raise ScriptError(
                 f"-var {name}: {path} {what}",
                 expected="one of " + ", ".join(sorted(assigned & read)),
-                hint=_meant(nearest(name, sorted((assigned & read) - {name}))),
+                hint=meant(name, sorted((assigned & read) - {name})),
             )
 
 

@@ -11,7 +11,7 @@ import meshio
 import numpy as np
 
 from karamelo_py.scene.meshes.geometry import refuse_commands
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 
 GEOMETRIES = (".geo", ".geo_unrolled")
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
@@ -189,10 +189,9 @@ def _members(mesh: meshio.Mesh, group: str | int) -> list[np.ndarray]:
         return masks
     names = [name for name in (*mesh.cell_sets, *mesh.field_data) if not name.startswith("gmsh:")]
     known = list(dict.fromkeys(names)) or sorted({str(n) for tag in tags for n in np.unique(tag)})
-    close = nearest(str(group), known)
     raise ScriptError(
         f"the mesh has no physical group '{group}' with elements",
         argument="group",
         expected="one of " + ", ".join(known) if known else "no group: the mesh has none",
-        hint=f"did you mean '{close}'?" if close else None,
+        hint=meant(str(group), known),
     )

@@ -11,8 +11,9 @@ import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
+from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ParticleGroup
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, unknown
 
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
@@ -60,20 +61,12 @@ class Field:
         known = [*hub.fields.particle_names(), *DISPLACEMENTS, *VECTORS, *TENSORS]
         name = argument.words(known)
         if name not in known:
-            close = nearest(name, known)
-            raise ScriptError(
-                f"unknown field '{name}'",
-                place=argument.place,
-                expected="one of " + " ".join(known),
-                hint=f"did you mean '{close}'?" if close else None,
-            )
+            raise unknown(f"unknown field '{name}'", name, known, place=argument.place)
         return cls(name, columns_of(hub, name))
 
 
 def columns_of(hub: Scene, name: str) -> tuple[str, ...]:
     """The columns of a field: components of vectors and tensors, a column as it is."""
-    from karamelo_py.scene.domain import require_domain
-
     if name in VECTORS:
         d = require_domain(hub).dimension
         return tuple(VECTORS[name] + axis for axis in AXES[:d])

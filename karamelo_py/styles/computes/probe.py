@@ -8,7 +8,7 @@ from karamelo_py.language.signature import Positive
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, unknown
 
 
 class Probe(Compute):
@@ -50,13 +50,7 @@ class Probe(Compute):
         known = hub.fields.particle_names()
         for k, name in enumerate(self.columns):
             if name not in known:
-                close = nearest(name, known)
-                raise ScriptError(
-                    f"unknown column '{name}'",
-                    argument=1 + k,
-                    expected="one of " + " ".join(known),
-                    hint=f"did you mean '{close}'?" if close else None,
-                )
+                raise unknown(f"unknown column '{name}'", name, known, argument=1 + k)
         self.place_xyz = (x, y, z)
         self.point = point
         if point is not None and self.at_place:

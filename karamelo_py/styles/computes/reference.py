@@ -10,7 +10,7 @@ from karamelo_py.output.quantity import Quantity
 from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, nearest, unknown
 from karamelo_py.styles.computes.columns import Norm, of_group, refuse_absent, table
 
 
@@ -87,13 +87,7 @@ class Reference(Compute):
         columns = table(file)
         name = column.text.strip('"')
         if name not in columns:
-            close = nearest(name, columns)
-            raise ScriptError(
-                f"{file} has no column '{name}'",
-                place=column.place,
-                expected="one of " + ", ".join(columns),
-                hint=f"did you mean '{close}'?" if close else None,
-            )
+            raise unknown(f"{file} has no column '{name}'", name, columns, place=column.place)
         self.along, self.column = next(iter(columns)), name
         order = np.argsort(columns[self.along], kind="stable")
         self.curve = columns[self.along][order], columns[name][order]

@@ -6,7 +6,7 @@ from pathlib import Path
 from karamelo_py.language.signature import OutputFile
 from karamelo_py.output.rhythm import Every, Rhythmic
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Place, ScriptError, nearest
+from karamelo_py.script.errors import Place, unknown
 
 
 class Dump(Rhythmic):
@@ -83,10 +83,4 @@ class Dump(Rhythmic):
         """
         for index, name in enumerate(columns):
             if name not in known:
-                close = nearest(name, known)
-                raise ScriptError(
-                    f"unknown column '{name}'",
-                    argument=first + index,
-                    expected="one of " + " ".join(dict.fromkeys(known)),
-                    hint=f"did you mean '{close}'?" if close else None,
-                )
+                raise unknown(f"unknown column '{name}'", name, known, argument=first + index)

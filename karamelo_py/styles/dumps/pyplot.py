@@ -11,7 +11,7 @@ from karamelo_py.output.files import picture_format, savefig, unwarned, whole
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.units import labelled
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.styles.dumps.base import Dump
 
 DPI = 100
@@ -197,12 +197,11 @@ def colours_of(
         from matplotlib import colormaps
 
         if cmap not in colormaps:
-            close = nearest(cmap, list(colormaps))
             raise ScriptError(
                 f"Matplotlib has no colour map '{cmap}'",
                 argument="cmap",
                 expected="viridis, coolwarm, magma, gray, jet ...",
-                hint=f"did you mean '{close}'?" if close else None,
+                hint=meant(cmap, colormaps),
             )
     # Where the user says about what the colours lie, they do not lie about 0.
     return signed and limits == (None, None), cmap or (SIGNED_MAP if signed else MAP)

@@ -9,7 +9,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.region import Region
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.edges import SIDES, EdgeFix, Faces
-from karamelo_py.styles.fixes.formulas import evaluated, per_direction
+from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 
 class EdgeTraction(EdgeFix):
@@ -63,9 +63,4 @@ class EdgeTraction(EdgeFix):
 
     def loads(self, faces: Faces) -> np.ndarray:
         """See `EdgeFix.loads`."""
-        force = np.zeros(faces.middle.shape)
-        for k, formula in enumerate(self.traction):
-            if formula is not None:
-                there = evaluated(formula, self.hub, faces.middle, faces.middle)
-                force[:, k] = faces.area * there
-        return force
+        return faces.area[:, None] * vector(self.traction, self.hub, faces.middle, faces.middle)

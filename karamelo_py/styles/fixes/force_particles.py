@@ -7,7 +7,7 @@ from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import evaluated, per_direction
+from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 
 class ForceParticles(Fix):
@@ -51,10 +51,7 @@ class ForceParticles(Fix):
             self.publish_components(np.zeros(points.position.shape[1]))
             return
         share = points.mass / points.mass.sum()
-        force = np.zeros(points.position.shape)
-        for k, formula in enumerate(self.force):
-            if formula is not None:
-                there = evaluated(formula, self.hub, points.position, points.reference_position)
-                force[:, k] = share * there
+        whole = vector(self.force, self.hub, points.position, points.reference_position)
+        force = share[:, None] * whole
         points.force = points.force + force
         self.publish_components(force.sum(axis=0))

@@ -1,9 +1,11 @@
 """What fixes that act by a formula for each component have in common."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -15,8 +17,6 @@ def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
 
     Further components are allowed when they are NULL or zero, as published inputs write them.
     """
-    from karamelo_py.scene.domain import require_domain
-
     d = require_domain(hub).dimension
     wanted = ", ".join(name + axis for axis in AXES[:d])
     if len(formulas) < d:
@@ -38,6 +38,15 @@ def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
 def evaluated(formula: Any, hub: Hub, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
     """Values (n,) of a formula at the positions `x` and reference positions `x0`, (n, d) each."""
     return formula.evaluate_points(hub.values, x, x0)
+
+
+def vector(formulas: Sequence, hub: Hub, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
+    """Values (n, d) of a formula for each direction, 0 where there is none."""
+    found = np.zeros(x.shape)
+    for k, formula in enumerate(formulas):
+        if formula is not None:
+            found[:, k] = evaluated(formula, hub, x, x0)
+    return found
 
 
 def gradient(

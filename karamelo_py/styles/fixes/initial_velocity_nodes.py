@@ -1,5 +1,7 @@
 """fix initial_velocity_nodes: velocity of nodes in the first step."""
 
+import numpy as np
+
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, NodesView
@@ -36,21 +38,16 @@ class InitialVelocityNodes(Fix):
         super().__init__(hub, group)
         self.formulas = per_direction(hub, "v", velocity)
 
-    def _impose(self, field):
-        def change(nodes: NodesView) -> None:
-            v = getattr(nodes, field)
-            x = nodes.position[:, : v.shape[1]]
-            for k, formula in enumerate(self.formulas):
-                if formula is not None:
-                    v[:, k] = evaluated(formula, self.hub, x, x)
-            setattr(nodes, field, v)
-
-        return change
+    def _impose(self, v: np.ndarray, nodes: NodesView) -> None:
+        x = nodes.position[:, : v.shape[1]]
+        for k, formula in enumerate(self.formulas):
+            if formula is not None:
+                v[:, k] = evaluated(formula, self.hub, x, x)
 
     def post_update_grid_state(self, nodes: NodesView) -> None:
         """v* is the given velocity."""
-        self._impose("velocity_update")(nodes)
+        self._impose(nodes.velocity_update, nodes)
 
     def post_velocities_to_grid(self, nodes: NodesView) -> None:
         """The re-mapped velocity is the given one."""
-        self._impose("velocity")(nodes)
+        self._impose(nodes.velocity, nodes)

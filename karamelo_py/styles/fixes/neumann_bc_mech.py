@@ -5,7 +5,7 @@ import numpy as np
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import evaluated, per_direction
+from karamelo_py.styles.fixes.formulas import per_direction, vector
 from karamelo_py.styles.fixes.tools import Bodies, PointForceFix
 
 
@@ -44,8 +44,4 @@ class NeumannBcMech(PointForceFix):
 
     def push(self, bodies: Bodies) -> np.ndarray:
         """See `PointForceFix.push`."""
-        force = np.zeros_like(bodies.x)
-        for k, formula in enumerate(self.traction):
-            if formula is not None:
-                force[:, k] = bodies.face * evaluated(formula, self.hub, bodies.x, bodies.x0)
-        return force
+        return bodies.face[:, None] * vector(self.traction, self.hub, bodies.x, bodies.x0)
