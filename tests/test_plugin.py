@@ -102,7 +102,7 @@ def test_pip_installs_it_and_styles_and_help_tell_of_it(tmp_path):
     lines = [line for line in done.stdout.splitlines() if "mpm-examples 0.1.0" in line]
     listed = {line.split()[0]: line for line in lines}
     page = (PLUGIN / "README.md").read_text("utf-8")
-    assert len(listed) == 14
+    assert len(listed) == 17
     assert all(name in page for name in listed)
     assert "Slow points down" in listed["drag"]
     done = karamelo_py(tmp_path / "site", tmp_path, "help", "drag")
@@ -371,3 +371,45 @@ def test_an_eos_under_compression(run_interpreted):
     # The trace of the stress in uniaxial strain: s11 + 2 s22 = -3 p = 3 K ln J, with nine digits
     # of J, and so seven of ln J = -0.02.
     np.testing.assert_allclose(s11 + 2 * s22, 3 * 5e7 * np.log(J), rtol=1e-7)
+
+
+@pytest.mark.parametrize("part", ["damage(d, worn, 0.1)", "temperature(d, heating, 2, 300)"])
+def test_a_damage_and_a_temperature(run_interpreted, part):
+    """Pulled beyond yield: D = ep / limit takes its share of Y; dT is Y dep / (rho cp).
+
+    With rho = rho0 / J and dep = 2/3 dJ/J that is 2/3 Y (J - J at yield) / (rho0 cp).
+    """
+    law = f"plastic, 25e6, 20e3)\n{part[:-1]}"
+    script = PULL.replace("recovering, 25e6, 20e3, 1e6, {recovery}", law)
+    script = script.replace("bulk, hot)", "bulk, hot, d)")
+    column = "damage" if "worn" in part else "T"
+    script = script.replace("ep, R, seq", f"ep, {column}, seq").replace("200, 200, R", "200, 200")
+    script = script.replace("compute(hard, probe, all, R)", f"compute(hard, probe, all, {column})")
+    done = run_interpreted(script)
+    ep, number, q = np.loadtxt(done.folder / "points.100.LAMMPS", skiprows=11)[:, -3:].T
+    assert (ep > 0.01).all()
+    if "worn" in part:
+        np.testing.assert_allclose(number, ep / 0.1, rtol=1e-7)
+        np.testing.assert_allclose(q, (1 - ep / 0.1) * 20e3, rtol=1e-7)
+    else:
+        J = (1 + 10 * 2e-5) ** 100
+        exact = 2 / 3 * 20e3 * J * (1 - np.exp(-1.5 * ep)) / (1000 * 2)
+        np.testing.assert_allclose(number - 300, exact, rtol=2e-4)  # a step stretches by 2e-4
+
+
+def test_a_solid(run_interpreted):
+    """A ring of 40 squares has their mass, and its centre; what lies outside is told."""
+    script = """
+        method(ulmpm, FLIP, linear, 1)
+        dimension(2, 0, 1, 0, 1, 0.1)
+        material(m, linear, 3, 100, 0.3)
+        solid(hoop, ring, {}, 0.5, 0.3, 40, m, 0.1)
+        compute(c, center_of_mass, all)
+        m = mass_of(hoop)
+        log_modify(custom, step, m, c_x, c_y)
+        run(0)
+    """
+    _, mass, x, y = np.loadtxt(run_interpreted(script.format(0.5)).folder / "log.mpm", skiprows=1)
+    np.testing.assert_allclose(mass, 3 * 40 * (2 * np.pi * 0.3 / 40) ** 2, rtol=1e-9)
+    np.testing.assert_allclose([x, y], 0.5, rtol=1e-9)
+    assert "points of ring outside the domain left out" in run_interpreted(script.format(0.8)).err

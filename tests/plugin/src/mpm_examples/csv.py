@@ -24,7 +24,7 @@ class Csv(OfPoints, TableDump):
 
     def write(self) -> None:
         """Write the present state."""
-        ids, _ = self.ids()
-        rows = np.column_stack([ids, *(self.field(name) for name in self.columns)])
+        points = self.table()
+        rows = np.column_stack([points.ids, *points.columns])
         header = ",".join(["id", *self.columns])
         np.savetxt(self.path(), rows, "%.10g", ",", header=header, comments="")

@@ -1,0 +1,47 @@
+"""A damage, a part of eos-strength."""
+
+from typing import Annotated, NamedTuple
+
+from karamelo_py.compiler.compile import real
+from karamelo_py.language.signature import Positive
+from karamelo_py.points.laws import column, damage
+from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
+
+
+class Worn(NamedTuple):
+    """Strength that is lost in proportion to plastic strain.
+
+    Parameters
+    ----------
+    limit
+        Plastic strain at which nothing is left.
+
+    Example
+    -------
+    damage(worn, worn, 0.2)
+    """
+
+    limit: Annotated[float, Positive]
+
+
+column(Worn, "damage", damage)
+
+
+@initial_damage.on(Worn)
+def _(damage, like):
+    return (real(0, like),)
+
+
+@damage_after.on(Worn)
+def _(damage, memory, strain, triaxiality, heat, dt):
+    return (min(memory[0] + strain / damage.limit, real(1, strain)),)
+
+
+@integrity.on(Worn)
+def _(damage, memory):
+    return real(1, memory[0]) - memory[0]
+
+
+@initiation.on(Worn)
+def _(damage, memory):
+    return memory[0]
