@@ -237,7 +237,7 @@ class _Walk:
         """Let a target stand for a value."""
         if isinstance(target, ast.Name):
             self.names[target.id] = value
-        elif isinstance(target, ast.Tuple):
+        elif isinstance(target, ast.Tuple | ast.List):
             values = list(value)
             stars = [k for k, t in enumerate(target.elts) if isinstance(t, ast.Starred)]
             if stars:
@@ -248,7 +248,10 @@ class _Walk:
         elif isinstance(target, ast.Attribute):
             setattr(self.do(target.value), target.attr, value)
         elif isinstance(target, ast.Subscript):
-            self.do(target.value)[self.do(target.slice)] = value
+            array = self.do(target.value)
+            if isinstance(array, _CHANGING):
+                raise NotKnown("on one of several ways, a list would change on all")
+            array[self.do(target.slice)] = value
         else:
             self.unknown(target)
 
@@ -262,6 +265,8 @@ class _Walk:
         elif isinstance(target, ast.Subscript):
             array = self.do(target.value)
             place = self.do(target.slice)
+            if isinstance(array, _CHANGING):
+                raise NotKnown("on one of several ways, a list would change on all")
             array[place] = operation(array[place], self.do(node.value))
         else:
             before = self.name(target.id)
@@ -473,6 +478,8 @@ class _Walk:
 
     def Call(self, node: ast.Call) -> Any:
         function = self.do(node.func)
+        if isinstance(getattr(function, "__self__", None), _CHANGING):
+            raise NotKnown("on one of several ways, a list would change on all")
         arguments = self.items(node.args)
         keywords = {k.arg: self.do(k.value) for k in node.keywords}
         return self.flow.call(function, arguments, keywords)
@@ -511,5 +518,6 @@ class _Walk:
     GeneratorExp = ListComp
 
 
+_CHANGING = list | dict | set
 _NOTHING = object()
 _COUNT = "for"  # no name of a function
