@@ -215,7 +215,8 @@ class KernelCache(_Cache):
 
 
 # What chooses code by type, and what is in every kernel.
-_BESIDE = [Path(__file__).with_name(name) for name in ("compile.py", "trace.py", "fields.py")]
+_NAMES = ("compile", "trace", "walk", "flow", "lowering", "values", "fields")
+_BESIDE = [Path(__file__).with_name(f"{name}.py") for name in _NAMES]
 WHOLE_FILES = [inlining.__file__, held.__file__, *WHOLE, *_BESIDE]
 
 

@@ -29,7 +29,8 @@ from karamelo_py.compiler.fingerprint import (
 )
 from karamelo_py.compiler.held import at_address, hold
 from karamelo_py.compiler.packed import Packed
-from karamelo_py.compiler.trace import at_work, forget, run_for_kernel, traced
+from karamelo_py.compiler.trace import alone, forget, roll, run_for_kernel, traced
+from karamelo_py.compiler.values import at_work
 
 
 class _NoCollections(event.Listener):
@@ -104,6 +105,14 @@ def subkernel(function: Callable) -> Callable:
 
     Python must not call it: there is nothing of it that Python could call.
     """
+    if not config.DISABLE_JIT:
+        alone(function)
+        shared(function)
+    return function
+
+
+def left(function: Callable) -> Callable:
+    """A function whose machine code is made with that of the kernel that knows its address."""
     inlining.claim(function.__qualname__, "left")
     return _compiled(function, _HOW | {"no_cpython_wrapper": True})
 
@@ -116,8 +125,10 @@ def entered(function: Callable) -> Callable:
     if config.DISABLE_JIT:
         return function
     inlining.claim(function.__qualname__, "kept")
-    inner = kernel(function, no_cpython_wrapper=True)
     names = inspect.signature(function).parameters
+    body = define(", ".join(names), f"return inner({', '.join(names)})", inner=shared(function))
+    body.__module__, body.__qualname__ = function.__module__, function.__qualname__
+    inner = kernel(body, no_cpython_wrapper=True)
     call = define(
         ", ".join(names),
         f"return inner({', '.join(f'hold({name})' for name in names)})",
@@ -131,7 +142,7 @@ def entered(function: Callable) -> Callable:
 
 def loop(function: Callable) -> Callable:
     """A kernel for Python alone, which takes its tuples held."""
-    return function if config.DISABLE_JIT else _packed(function, subkernel(function))
+    return function if config.DISABLE_JIT else _packed(function, shared(function))
 
 
 def _packed(function: Callable, inner: Callable) -> Callable:
@@ -199,8 +210,8 @@ def shared(function: Callable | None = None, *, unless: Callable | None = None) 
 
 def looping(function: Callable) -> Callable:
     """Mark a helper with a loop that is left to the compiler to unroll."""
-    overload(function, _INLINED, strict=False)(lambda *arguments: function)
-    return function
+    roll(function)
+    return shared(function)
 
 
 class Undefined(TypeError):
@@ -381,7 +392,11 @@ def choose(condition: bool, a: float, b: float) -> float:
 
 @by_type(choose)
 def _choose(condition, a, b):
-    return None if lanes_of(condition) else lambda condition, a, b: a if condition else b
+    return None if lanes_of(condition) else _one_of
+
+
+def _one_of(condition: bool, a: float, b: float) -> float:
+    return a if condition else b
 
 
 def in_all(condition: bool) -> bool:
@@ -552,5 +567,8 @@ def caller_of(signature: numba.types.Type) -> Callable:
 def define(parameters: str, *lines: str, **names: Any) -> Callable:
     """The function with these `parameters` and body `lines`, which may use `names`."""
     body = "\n    ".join(lines or ("pass",))
-    exec(compile(f"def spelled({parameters}):\n    {body}", SPELLED, "exec"), names)
-    return names["spelled"]
+    text = f"def spelled({parameters}):\n    {body}"
+    exec(compile(text, SPELLED, "exec"), names)
+    made = names["spelled"]
+    made.text = text  # for who walks through it
+    return made

@@ -14,7 +14,7 @@ from numba import prange, types
 from numba.extending import intrinsic
 
 from karamelo_py.compiler import inlining
-from karamelo_py.compiler.compile import by_type, define, kernel, subkernel
+from karamelo_py.compiler.compile import by_type, define, kernel, left
 from karamelo_py.compiler.held import HeldTuple, address, at_address, held_type, hold
 
 
@@ -93,7 +93,7 @@ def shared_out(function: Callable, parameters: str) -> Callable:
         return define(
             names,
             f"in_parallel(count, address_of(body), address(hold(({parameters}))))",
-            in_parallel=_in_parallel, address_of=_address_of, body=subkernel(task),
+            in_parallel=_in_parallel, address_of=_address_of, body=left(task),
             address=address, hold=hold,
         )  # fmt: skip
 

@@ -93,7 +93,7 @@ def cause_of(error: Exception) -> str:
         asking = line_that_asks(file, line)
         if asking is not None:
             what = linecache.getline(file, asking).strip()
-            return f"{text} (Numba compiles what branches: line {asking}, '{what}')"
+            return f"{text} (Numba compiles it for line {asking}, '{what}')"
     return text
 
 

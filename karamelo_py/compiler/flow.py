@@ -1,0 +1,258 @@
+"""Ways through a function that is written down: where they part, where they meet, and loops."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from karamelo_py.compiler.values import HeldValue, Untraceable, Value, counting, emit
+
+_PLAIN = (bool, int, float, str, np.generic, type(None))
+_DROPPED = object()
+
+
+class Way(NamedTuple):
+    """The end of a way: its last block, what names stand for, what was read."""
+
+    block: Any
+    names: dict[str, Any]
+    read: dict
+
+
+class Range(NamedTuple):
+    """A range whose bounds only a run knows."""
+
+    bounds: tuple
+
+
+class Counter(NamedTuple):
+    """How a loop over a range counts."""
+
+    start: Value
+    goes_on: Callable[[Value], Value]
+    after: Callable[[Value], Value]
+
+
+class _Leaf(NamedTuple):
+    """A number or pointer that depends on the way: what it is on each."""
+
+    made: Value | HeldValue
+    on: list
+
+
+class Head(NamedTuple):
+    """Where a loop begins."""
+
+    block: Any
+    leaves: list[_Leaf]
+    names: dict[str, Any]
+
+
+def is_value(thing: Any) -> bool:
+    """Whether only a run knows it."""
+    return isinstance(thing, Value)
+
+
+def _is_same(a: Any, b: Any) -> bool:
+    if a is b:
+        return True
+    plain = isinstance(a, _PLAIN) and type(a) is type(b)
+    return plain and repr(a) == repr(b)
+
+
+class Flow:
+    """Writes the ways of one call of a function.
+
+    Without a builder nothing is written, and only types are found.
+    """
+
+    def __init__(self, lowering: Any):
+        self.lowering, self.builder = lowering, lowering.builder
+
+    # --- ways
+
+    def _block(self) -> Any:
+        return self.builder and self.builder.append_basic_block("way")
+
+    def way(self, names: dict[str, Any]) -> Way:
+        """The way that ends here."""
+        return Way(self.builder and self.builder.block, names, self.lowering.read)
+
+    def part(self, condition: Value) -> tuple[Way, Way]:
+        """Two ways begin: of a condition that holds, and of one that does not."""
+        truth = emit(bool, condition)
+        blocks = self._block(), self._block()
+        if self.builder:
+            self.builder.cbranch(truth._value, *blocks)
+        return tuple(Way(block, {}, dict(self.lowering.read)) for block in blocks)
+
+    def start(self, way: Way) -> None:
+        """Go on at the beginning of a way."""
+        if self.builder:
+            self.builder.position_at_end(way.block)
+        self.lowering.read = way.read
+
+    def meet(self, ways: list[Way]) -> dict[str, Any]:
+        """Go on where ways meet; what names stand for there. Some stand for nothing any more."""
+        first = ways[0]
+        if len(ways) == 1:
+            self.start(first)
+            return first.names
+        leaves: list[_Leaf] = []
+        names: dict[str, Any] = {}
+        for name, thing in first.names.items():
+            if all(name in way.names for way in ways):
+                found = self._merged([thing, *(way.names[name] for way in ways[1:])], leaves)
+                if found is not _DROPPED:
+                    names[name] = found
+        block = self._block()
+        for k, way in enumerate(ways):
+            self.start(way)
+            self._enter(block, leaves, [leaf.on[k] for leaf in leaves])
+        everywhere = {
+            key: value
+            for key, value in first.read.items()
+            if all(way.read.get(key) is value for way in ways)
+        }
+        self.start(Way(block, names, everywhere))
+        return names
+
+    def _enter(self, block: Any, leaves: list[_Leaf], values: list) -> None:
+        """Go from here into a block where `leaves` get `values`."""
+        if not self.builder:
+            return
+        lowered = [
+            self.lowering.lowered(v, leaf.made._kind)
+            for v, leaf in zip(values, leaves, strict=True)
+        ]
+        here = self.builder.block
+        self.builder.branch(block)
+        for leaf, value in zip(leaves, lowered, strict=True):
+            if leaf.made._value is None:
+                with self.builder.goto_block(block):
+                    leaf.made._value = self.builder.phi(value.type)
+            leaf.made._value.add_incoming(value, here)
+
+    def _merged(self, things: list, leaves: list[_Leaf]) -> Any:
+        first = things[0]
+        if all(_is_same(first, thing) for thing in things[1:]):
+            return first
+        if all(isinstance(t, tuple) and type(t) is type(first) for t in things):
+            if len({len(t) for t in things}) > 1:
+                return _DROPPED
+            items = [self._merged(list(item), leaves) for item in zip(*things, strict=True)]
+            if any(item is _DROPPED for item in items):
+                return _DROPPED
+            return type(first)(*items) if hasattr(first, "_fields") else tuple(items)
+        if any(t is None or not isinstance(t, (Value, HeldValue, *_PLAIN)) for t in things):
+            return _DROPPED
+        kinds = [types.unliteral(self.lowering.kind_of(t)) for t in things]
+        kind = kinds[0]
+        if any(k != kind for k in kinds):
+            kind = self.lowering.typing.unify_types(*kinds)
+        if kind is None or isinstance(kind, types.Optional | types.UnicodeType):
+            return _DROPPED
+        made = (HeldValue if isinstance(first, HeldValue) else Value)(kind, None)
+        leaves.append(_Leaf(made, things))
+        return made
+
+    # --- loops
+
+    def loop(self, names: dict[str, Any], changed: frozenset[str]) -> tuple[Head, dict[str, Any]]:
+        """A loop begins, in which names stand for something else each time: what they stand for."""
+        leaves: list[_Leaf] = []
+        inside = dict(names)
+        for name in changed & names.keys():
+            inside[name] = self._carried(names[name], leaves)
+        block = self._block()
+        self._enter(block, leaves, [leaf.on[0] for leaf in leaves])
+        carried = {name: inside[name] for name in changed & names.keys()}
+        self.start(Way(block, {}, dict(self.lowering.read)))
+        return Head(block, leaves, carried), inside
+
+    def _carried(self, thing: Any, leaves: list[_Leaf]) -> Any:
+        if isinstance(thing, tuple):
+            items = [self._carried(item, leaves) for item in thing]
+            return type(thing)(*items) if hasattr(thing, "_fields") else tuple(items)
+        if thing is None or not isinstance(thing, (Value, HeldValue, *_PLAIN)):
+            return thing
+        kind = types.unliteral(self.lowering.kind_of(thing))
+        made = (HeldValue if isinstance(thing, HeldValue) else Value)(kind, None)
+        leaves.append(_Leaf(made, [thing]))
+        return made
+
+    def close(self, head: Head, names: dict[str, Any]) -> None:
+        """Back to where a loop begins."""
+        values: list = []
+        for name, before in head.names.items():
+            if name not in names:
+                raise Untraceable
+            self._again(before, names[name], values)
+        self._enter(head.block, head.leaves, values)
+
+    def _again(self, before: Any, after: Any, values: list) -> None:
+        """What the leaves of `before` become, in their order."""
+        if isinstance(before, Value | HeldValue):
+            kind = types.unliteral(self.lowering.kind_of(after))
+            if kind != before._kind and (
+                self.lowering.typing.unify_types(kind, before._kind) != before._kind
+            ):
+                raise Untraceable  # of another type from then on
+            values.append(after)
+        elif isinstance(before, tuple):
+            if type(before) is not type(after) or len(before) != len(after):
+                raise Untraceable
+            for one, other in zip(before, after, strict=True):
+                self._again(one, other, values)
+        elif not _is_same(before, after):
+            raise Untraceable
+
+    def counted(self, bounds: tuple) -> Counter:
+        """How a loop over a range counts."""
+        lowering, builder = self.lowering, self.builder
+        kinds = tuple(types.unliteral(lowering.kind_of(bound)) for bound in bounds)
+        typed = lowering.typing.resolve_value_type(range)
+        kind = lowering.typing.resolve_function_type(typed, kinds, {}).return_type.dtype
+        start, stop, step = {1: (0, *bounds, 1), 2: (*bounds, 1)}.get(len(bounds), bounds)
+        if not isinstance(step, int) or step == 0:
+            raise Untraceable
+        lowered = [builder and lowering.lowered(bound, kind) for bound in (start, stop)]
+
+        def goes_on(counter: Value) -> Value:
+            compare = builder and (builder.icmp_signed if kind.signed else builder.icmp_unsigned)
+            holds = builder and compare("<" if step > 0 else ">", counter._value, lowered[1])
+            return Value(types.boolean, holds)
+
+        def after(counter: Value) -> Value:
+            one = builder and counter._value.type(step)
+            return Value(kind, builder and builder.add(counter._value, one, flags=("nsw",)))
+
+        return Counter(Value(kind, lowered[0]), goes_on, after)
+
+    # --- what Python does otherwise where a value is met
+
+    def negate(self, thing: Any) -> Any:
+        """Whether it does not hold."""
+        return emit(operator.not_, thing) if is_value(thing) else not thing
+
+    def both(self, a: Any, b: Any) -> Any:
+        """Whether two comparisons hold."""
+        return emit(operator.and_, a, b) if is_value(a) and is_value(b) else a and b
+
+    def item(self, things: Any, place: Any) -> Any:
+        """An item of an array or of a tuple."""
+        if isinstance(things, tuple) and is_value(place):
+            return emit(operator.getitem, things, place)
+        return things[place]
+
+    def call(self, function: Callable, arguments: list, keywords: dict) -> Any:
+        """What a function gives."""
+        if function is len and is_value(arguments[0]):
+            return emit(len, arguments[0])
+        if function is counting and any(map(is_value, arguments)):
+            return Range(tuple(arguments))
+        return function(*arguments, **keywords)

@@ -1,0 +1,228 @@
+"""What stands for a number, lanes, an array or a held tuple where a kernel is written down.
+
+See :mod:`karamelo_py.compiler.trace`: Python runs a function on these, and every operation that
+meets one becomes code of the function that is compiled.
+"""
+
+from __future__ import annotations
+
+import builtins
+import operator
+import sys
+import types as python
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from numba import types
+
+from karamelo_py.compiler.held import _Held
+
+
+class Untraceable(BaseException):
+    """A function asks for what only a run can know; no function may catch that."""
+
+
+class Asks(Untraceable):
+    """The same, of a function that may be walked through (:mod:`karamelo_py.compiler.walk`)."""
+
+
+class Globals(dict):
+    """The globals of a module, as functions that are run for kernels see them."""
+
+    def __init__(self, true: dict, seen: Callable[[Any], Any]):
+        super().__init__()
+        self.true, self.seen = true, seen
+
+    def __getitem__(self, name: str) -> Any:
+        return self.seen(self.true[name] if name in self.true else getattr(builtins, name))
+
+
+asking: set = set()  # code of functions that ask
+
+
+def _ask(frame: python.FrameType) -> None:
+    code = frame.f_code
+    if type(frame.f_globals) is not Globals or code.co_name.startswith("<"):
+        raise Untraceable
+    asking.add(code)
+    raise Asks
+
+
+def ask(*arguments: Any) -> Any:
+    """The function at work asks for what only a run knows."""
+    _ask(sys._getframe(1))
+
+
+# --- where code goes to -------------------------------------------------------------------------
+
+_lowerings: list = []  # at work, innermost last
+
+
+def now() -> Any:
+    """What writes down now (:mod:`karamelo_py.compiler.lowering`)."""
+    return _lowerings[-1]
+
+
+@contextmanager
+def writing(lowering: Any) -> Iterator[None]:
+    """Within this, operations become code of `lowering`."""
+    _lowerings.append(lowering)
+    try:
+        yield
+    finally:
+        _lowerings.pop()
+
+
+def at_work() -> bool:
+    """Whether functions are run for a kernel now."""
+    return bool(_lowerings)
+
+
+def emit(function: Callable, *arguments: Any) -> Any:
+    """What `function` gives for these arguments: code of Numba's, or of what was chosen by type."""
+    return now().call(function, arguments)
+
+
+# --- values -------------------------------------------------------------------------------------
+
+
+class Value:
+    """A number, lanes or an array of the function that is compiled."""
+
+    __slots__ = ("_kind", "_value")
+    __array_ufunc__ = None  # NumPy's numbers leave operations to this
+
+    def __init__(self, kind: types.Type, value: Any):
+        self._kind, self._value = kind, value
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return now().attribute(self, name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in Value.__slots__:
+            object.__setattr__(self, name, value)
+        else:
+            now().set_attribute(self, name, value)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return now().call_bound(self, arguments)
+
+    def __getitem__(self, place: Any) -> Any:
+        return emit(operator.getitem, self, _place(place))
+
+    def __setitem__(self, place: Any, value: Any) -> None:
+        emit(operator.setitem, self, _place(place), value)
+
+    __bool__ = __int__ = __index__ = __float__ = __iter__ = __len__ = __contains__ = ask
+    __hash__ = __str__ = __repr__ = __format__ = ask
+
+
+def _place(place: Any) -> Any:
+    """What stands in the brackets of an array."""
+    if isinstance(place, tuple):
+        return tuple(map(_place, place))
+    if isinstance(place, slice):
+        bounds = place.start, place.stop, place.step
+        return emit(slice, *(bounds if bounds[2] is not None else bounds[:2]))
+    return place
+
+
+_BINARY = ("add", "sub", "mul", "truediv", "floordiv", "mod", "pow")
+_BITS = ("and_", "or_", "xor", "lshift", "rshift")
+
+
+def _in_place(operation: Callable) -> Callable:
+    def apply(a: Value, b: Any) -> Any:
+        if isinstance(a._kind, types.Array):  # it would change
+            raise Untraceable
+        return emit(operation, a, b)
+
+    return apply
+
+
+def _operators() -> None:
+    for name in (*_BINARY, *_BITS):
+        operation = getattr(operator, name)
+        plain = name.rstrip("_")
+        setattr(Value, f"__{plain}__", lambda a, b, do=operation: emit(do, a, b))
+        setattr(Value, f"__r{plain}__", lambda a, b, do=operation: emit(do, b, a))
+        setattr(Value, f"__i{plain}__", _in_place(operation))
+    for name in ("lt", "le", "gt", "ge", "eq", "ne"):
+        operation = getattr(operator, name)
+        setattr(Value, f"__{name}__", lambda a, b, do=operation: emit(do, a, b))
+    for name in ("neg", "pos", "invert"):
+        operation = getattr(operator, name)
+        setattr(Value, f"__{name}__", lambda a, do=operation: emit(do, a))
+    Value.__abs__ = lambda a: emit(abs, a)
+
+
+_operators()
+
+
+class HeldValue:
+    """A held tuple: its items are read when they are asked for, once on each way."""
+
+    __slots__ = ("_kind", "_value")
+
+    def __init__(self, kind: _Held, value: Any):
+        self._kind, self._value = kind, value
+
+    def __len__(self) -> int:
+        return len(self._kind)
+
+    def __getitem__(self, k: int) -> Any:
+        if isinstance(k, Value):
+            raise Untraceable
+        if isinstance(k, slice):
+            return tuple(self[i] for i in range(*k.indices(len(self))))
+        return now().item(self, range(len(self))[k])
+
+    def __iter__(self) -> Iterator:
+        return (self[k] for k in range(len(self)))
+
+    def __getattr__(self, name: str) -> Any:
+        fields = getattr(self._kind, "fields", ())
+        if name in fields:
+            return self[fields.index(name)]
+        found = getattr(self._kind.instance_class, name)
+        if callable(found) or isinstance(found, property):
+            raise Untraceable
+        return found
+
+    __eq__ = __ne__ = __hash__ = __contains__ = __add__ = __radd__ = ask
+
+
+class Emitted:
+    """A function that compiled code has a version of its own of."""
+
+    def __init__(self, function: Callable):
+        self.seen = function
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.seen(*arguments) if self.counts(arguments) else emit(self.seen, *arguments)
+
+    def counts(self, arguments: tuple) -> bool:
+        """Whether it is about whole numbers that are known, as lengths of loops are."""
+        return self.seen in OF_WHOLE and all(isinstance(a, int) for a in arguments)
+
+
+OF_WHOLE = {min, max, abs, int, bool}
+
+LONGEST = 1000  # range that is gone through
+LONG = 8  # range that is gone through where it need not be
+
+
+def counting(*bounds: int) -> range:
+    """`range`, in functions that are run."""
+    frame = sys._getframe(1)
+    if any(isinstance(bound, Value) for bound in bounds):
+        _ask(frame)
+    made = range(*bounds)
+    if len(made) > LONGEST:
+        raise Untraceable
+    if len(made) > LONG and type(frame.f_globals) is Globals and frame.f_code.co_name[0] != "<":
+        _ask(frame)
+    return made

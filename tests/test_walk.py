@@ -1,0 +1,258 @@
+"""Functions with branches and loops are written down, and do what Python does with them."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numba import config
+from numba.core import event
+from numba.core.caching import NullCache
+
+from karamelo_py.compiler.compile import kernel, looping, shared, subkernel
+from karamelo_py.compiler.held import hold
+
+pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+
+
+class Pair(NamedTuple):
+    first: float
+    second: float
+
+
+class Arrays(NamedTuple):
+    x: np.ndarray
+    out: np.ndarray
+
+
+def returns_early(n, x):
+    if n < 0:
+        return -1.0
+    if n == 0:
+        x = x + 1
+    elif n == 1 and x > 0:
+        return 2 * x
+    else:
+        x = x if n % 2 else -x
+    return x
+
+
+def counts(n, x):
+    total = 0
+    for k in range(n):
+        if k == 3:
+            continue
+        if k > 7:
+            break
+        total += k
+    for k in range(n, 0, -2):
+        total += 100 * k
+    return total
+
+
+def waits(n, x):
+    steps = 0
+    while n != 1 and steps < 100:
+        n = n // 2 if n % 2 == 0 else 3 * n + 1
+        steps += 1
+    while True:
+        steps += 1
+        if steps % 5 == 0:
+            return steps
+
+
+def nested(n, x):
+    found = 0.0
+    for i in range(n):
+        for j in range(i):
+            if (i * j) % 7 == 5:
+                found += x
+                break
+        else_x = x * i
+        found -= else_x
+    return found
+
+
+def carries(n, x):
+    pair, last = Pair(0.0, x), (0, 1)
+    for _ in range(n):
+        if pair.first < 10:
+            pair = Pair(pair.first + pair.second, pair.second * 0.5)
+        last = last[1], last[0] + last[1]
+    return pair.first + 1000 * last[1]
+
+
+def chains(n, x):
+    a = 0 < n <= 3
+    b = n > 5 or (x > 0 and n != 2)
+    c = not (a and b)
+    return 4 * a + 2 * b + c
+
+
+def guarded(n, x):
+    values = (x, 2 * x, 3 * x)
+    return values[n] if n >= 0 and n < 3 else -1.0
+
+
+def unrolled(n, x):
+    total = 0.0
+    for k, weight in enumerate((1.0, 2.0, 3.0)):
+        if k == n:
+            continue
+        if weight * x > 5:
+            break
+        total += weight
+    return total
+
+
+def long(n, x):
+    """Two loops over known ranges: of the second one, an item of a tuple is asked for."""
+    total = 0
+    for k in range(30):
+        total += k * n
+    different = (1, 2.0, 3, 4.0, 5, 6.0, 7, 8.0, 9, 10.0)
+    for k in range(10):
+        total += different[k]
+    return total
+
+
+def halves(n, x):
+    """Comprehensions and functions within, of what is known on one of two ways only."""
+    z = [k * x for k in (1, 2) if k > 1]
+    f = lambda a, b: a - b  # noqa: E731
+    if n > 2:
+        y = n * x
+        return f(*z, y)
+    return z[0]
+
+
+FUNCTIONS = [
+    returns_early, counts, waits, nested, carries, chains, guarded, unrolled, long, halves,
+]  # fmt: skip
+
+
+class Compiled(event.Listener):
+    """The names of the functions that Numba compiles."""
+
+    def __init__(self):
+        self.names = []
+
+    def on_start(self, event):
+        self.names.append(event.data["dispatcher"].py_func.__name__)
+
+    def on_end(self, event):
+        """Nothing more."""
+
+
+def in_a_kernel(function):
+    """A kernel that calls a function, which nothing else compiles."""
+
+    def caller(n, x):
+        return function(n, x)
+
+    made = kernel(caller)
+    made._cache = NullCache()
+
+    def call(n, x):
+        listener = Compiled()
+        with event.install_listener("numba:compile", listener):
+            result = made(n, x)
+        assert function.__name__ not in listener.names
+        return result
+
+    return call
+
+
+@pytest.mark.parametrize("mark", [shared, subkernel, looping])
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
+def test_as_python_does(function, mark):
+    if mark is looping and function is long:
+        pytest.skip("an item of a tuple of several kinds cannot be asked for in a loop")
+    expected = [function(n, x) for n in range(1, 12) for x in (1.75, -3.0)]
+    made = in_a_kernel(mark(lambda_of(function)))
+    assert [made(n, x) for n in range(1, 12) for x in (1.75, -3.0)] == expected
+
+
+def lambda_of(function):
+    """The same function once more: each is marked in one way."""
+    made = type(function)(function.__code__, function.__globals__, function.__name__)
+    return made
+
+
+@subkernel
+def put(arrays, n):
+    """Twice the numbers that are larger than n; how many."""
+    found = 0
+    for value in arrays.x:
+        if value > n:
+            arrays.out[found] += 2 * value
+            found += 1
+    arrays.out[found:] = -1.0
+    return found
+
+
+def test_arrays_also_held():
+    def caller(arrays, n):
+        return put(arrays, n) + 10 * put(hold(arrays), n)
+
+    arrays = Arrays(np.array([1.0, 5.0, 2.0, 7.0]), np.zeros(4))
+    assert kernel(caller)(arrays, 1.5) == 33
+    assert arrays.out.tolist() == [20, 8, 28, -1]
+
+
+RECORD = np.dtype([("count", np.int64), ("sum", np.float64)])
+
+
+@shared
+def add(records, k, x):
+    """Count x in a record."""
+    one = records[k]
+    if x > 0:
+        one.count += 1
+    one.sum = one.sum + x
+
+
+def test_attributes_of_records():
+    def caller(records, x):
+        for k in range(records.size):
+            add(records, k, x - k)
+
+    records = np.zeros(3, RECORD)
+    kernel(caller)(records, 1.5)
+    assert records["count"].tolist() == [1, 1, 0]
+    assert records["sum"].tolist() == [1.5, 0.5, -0.5]
+
+
+@shared
+def listed(x):
+    """A list that changes on one of two ways."""
+    out = [x]
+    if x > 0:
+        out.append(2 * x)
+    return sum(out)
+
+
+def test_a_list_does_not_change_on_both_ways():
+    def caller(x):
+        return listed(x)
+
+    try:
+        results = [kernel(caller)(x) for x in (1.0, -1.0)]
+    except Exception:  # Numba knows no lists where nothing is allocated
+        return
+    assert results == [3.0, -1.0]
+
+
+def test_a_file_that_has_changed_is_not_read(tmp_path, monkeypatch):
+    """What runs is what Python has read; another text beside it is not walked through."""
+    source = "def change(x):\n    if x > 0:\n        return {}\n    return x\n"
+    path = tmp_path / "module.py"
+    names: dict = {}
+    path.write_text(source.format("2 * x"))
+    exec(compile(path.read_text(), str(path), "exec"), names)
+    path.write_text(source.format("3 * x"))
+    change = shared(names["change"])
+
+    def caller(x):
+        return change(x)
+
+    assert kernel(caller)(1.0) == 2
