@@ -318,20 +318,6 @@ def test_help():
     assert by_name["velocity"].variadic
 
 
-def test_every_command_and_style_has_help():
-    for family in registry.families():
-        for name in registry.names(family):
-            target = registry.find(family, name)
-            if family in ("command", "fix", "compute", "region", "material", "dump"):
-                shown = name if family == "command" else f"{family} {name}"
-                described = describe(target, shown)
-                assert described.summary.endswith("."), shown
-                assert described.example, shown
-                assert described.syntax.startswith(shown.split()[0] + "("), shown
-                for parameter in described.parameters:
-                    assert parameter.description, (shown, parameter.name)
-
-
 def test_registry_names_what_is_near():
     with pytest.raises(ScriptError) as caught:
         registry.find("fix", "velocity_node")

@@ -93,6 +93,7 @@ def test_what_is_known_is_not_run_again(folder, capsys):
     assert "; 2 were known" in capsys.readouterr().out
     assert [row["v_x"] for row in records.read(folder / "s.csv")] == ["3", "4", "5"]
     # Another script is another run.
+    command[3] = "speed=4"
     (folder / "in.flight").write_text(SCRIPT.replace("steps = 4", "steps = 5"), encoding="utf-8")
     assert main(command) == 0
     assert marked.read_text() != "not run again"

@@ -289,9 +289,7 @@ def _class_kind(cls: type) -> str:
     if hasattr(cls, "script_kind"):
         return cls.script_kind
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", cls.__name__).lower()
-    if words in ("any group", "group"):
-        words = "group"
-    return f"the ID of a {words}" if words != "quantity" else "a quantity"
+    return f"the ID of a {words}"
 
 
 def _constrained(kind: Kind, constraints: list[Constraint]) -> Kind:

@@ -38,6 +38,8 @@ class Quantity:
         If nothing of that name exists, or it is not a single number.
     """
 
+    script_kind = "a quantity"
+
     def __init__(self, hub: Scene, name: str, formula: Any = None, words: bool = False):
         self.hub = hub
         self.name = name

@@ -85,6 +85,7 @@ class ParticleGroup(Group):
     """A set of points, by their reference positions. Members are decided when they are added."""
 
     kind = "particles"
+    script_kind = "a group of points, or all"
     _members = np.empty(0, dtype=np.int64)
 
     @property
@@ -140,6 +141,7 @@ class NodeGroup(Group):
     """
 
     kind = "nodes"
+    script_kind = "a group of nodes, or all"
     awaits_solids = False
 
     def __init__(self, hub: Scene, *, everything: bool = False):
@@ -191,6 +193,8 @@ class NodeGroup(Group):
 
 class AnyGroup:
     """For signatures: a group of points or of nodes. The word ``all`` means all points here."""
+
+    script_kind = "a group of points or of nodes, or all"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> ParticleGroup | NodeGroup:

@@ -151,13 +151,7 @@ class Fix:
 
 
 class Compute:
-    """Base of all computes: measures its `group` of points when the log is written.
-
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-    """
+    """Base of all computes: measures its `group` of points when the log is written."""
 
     id: str = ""
     style: str = ""

@@ -12,8 +12,6 @@ class EnergyBalance(Compute):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     work
         Work that loads have done on the group since the start, as far as it is known: a formula of
         time and published values; 0 without it.

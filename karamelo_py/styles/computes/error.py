@@ -17,8 +17,6 @@ class Error(Compute):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     field
         A column of a dump (x, vy, s11, T, ...), ux, uy, uz (displacement by component), or a whole
         field: ``displacement``, ``velocity``, ``stress``, ``strain``.

@@ -11,11 +11,6 @@ from karamelo_py.styles.computes.drift import Drift
 class LinearMomentum(Compute):
     """Measure the momentum sum m v of points, and how far it has drifted.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Example
     -------
     compute(p, linear_momentum, all)

@@ -18,8 +18,6 @@ class PositionQuantile(Compute):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     share
         Share of the mass, from 0 (the lowest point) to 1 (the highest).
 

@@ -17,8 +17,6 @@ class BodyForce(Fix):
 
     Parameters
     ----------
-    group
-        Group of nodes, or ``all``.
     acceleration
         bx, by, bz, as many as the domain has dimensions: force per mass, numbers or formulas of
         x0, y0, z0, time and published values. NULL leaves a component alone.

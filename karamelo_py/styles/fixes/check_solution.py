@@ -14,8 +14,6 @@ class CheckSolution(Fix):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     displacement
         ux, uy, uz, as many as the domain has dimensions: formulas of x0, y0, z0 and time.
 

@@ -57,8 +57,6 @@ class EdgeFix(Fix):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     region
         ID of a region: that of a solid, or one that ends where the solid does.
     """

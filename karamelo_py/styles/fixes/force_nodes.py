@@ -17,8 +17,6 @@ class ForceNodes(Fix):
 
     Parameters
     ----------
-    group
-        Group of nodes.
     force
         fx, fy, fz: numbers or formulas of time and published values. NULL leaves a component
         alone; in fewer dimensions the last ones may be left out, NULL or 0.

@@ -15,8 +15,6 @@ class ForceParticles(Fix):
 
     Parameters
     ----------
-    group
-        Group of points, or ``all``.
     force
         fx, fy, fz, as many as the domain has dimensions: numbers or formulas of x, y, z, x0, y0,
         z0, time and published values. NULL leaves a component alone.

@@ -19,8 +19,6 @@ class InitialStress(Fix):
 
     Parameters
     ----------
-    group
-        Group of points.
     sxx, syy, szz, syz, sxz, sxy
         Components: numbers or formulas of x, y, z, x0, y0, z0; tension is positive. NULL leaves a
         component alone. Shear components that the dimension does not have must be NULL or 0.

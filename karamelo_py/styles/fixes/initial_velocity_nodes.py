@@ -14,8 +14,6 @@ class InitialVelocityNodes(Fix):
 
     Parameters
     ----------
-    group
-        Group of nodes.
     velocity
         vx, vy, vz, as many as the domain has dimensions: numbers or formulas of x0, y0, z0.
         NULL leaves a component alone.

@@ -14,8 +14,6 @@ class InitialVelocityParticles(Fix):
 
     Parameters
     ----------
-    group
-        Group of points.
     velocity
         vx, vy, vz: numbers or formulas of x, y, z, x0, y0, z0. NULL leaves a component alone; in
         fewer dimensions the last ones may be left out, NULL or 0.

@@ -29,8 +29,6 @@ class LocalDamping(Fix):
 
     Parameters
     ----------
-    group
-        Group of nodes, or ``all``.
     alpha
         The share, from 0 to 1; 0.8 is usual. A number or a formula of time: damping may end.
 

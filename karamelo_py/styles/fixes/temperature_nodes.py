@@ -22,8 +22,6 @@ class TemperatureNodes(HeatFix):
 
     Parameters
     ----------
-    group
-        Group of nodes.
     T
         Temperature: a number or a formula of x0, y0, z0, time and published values.
 

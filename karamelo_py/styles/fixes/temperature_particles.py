@@ -17,8 +17,6 @@ class TemperatureParticles(HeatFix):
 
     Parameters
     ----------
-    group
-        Group of points.
     T
         Temperature: a number or a formula of x, y, z, x0, y0, z0, time and published values.
 

@@ -83,11 +83,6 @@ class Bodies:
 class PointForceFix(Fix):
     """Base of fixes that put a force on each point of their group.
 
-    Parameters
-    ----------
-    group
-        Group of points, or ``all``.
-
     Attributes
     ----------
     needs_stiffness

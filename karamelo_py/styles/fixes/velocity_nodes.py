@@ -81,8 +81,6 @@ class VelocityNodes(Fix):
 
     Parameters
     ----------
-    group
-        Group of nodes.
     velocity
         vx, vy, vz, as many as the domain has dimensions: numbers or formulas of x0, y0, z0, time
         and published values. NULL leaves a component free. With ``leq`` or ``geq`` in front of it

@@ -22,8 +22,6 @@ class VelocityParticles(Fix):
 
     Parameters
     ----------
-    group
-        Group of points.
     velocity
         vx, vy, vz, as many as the domain has dimensions: numbers or formulas of x, y, z, x0, y0,
         z0, time and published values. NULL leaves a component free.
