@@ -195,13 +195,13 @@ except SimulationError as error:
 
 
 def test_the_last_good_state_is_from_before_energy_grew(tmp_path):
-    """The block leaves at step 313; growth is seen at 300, behind the first step of a run, 251."""
+    """The block leaves at step 313; it has grown from 250 on, the start of the second run."""
     scene = block(1, "fix(v, initial_velocity_particles, all, 2)", "set_dt(0.001)", *OUTPUT)
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", f"SCENE = {scene!r}\n{GROWN}"], cwd=tmp_path,
         capture_output=True, text=True, env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
     )  # fmt: skip
     assert "step 313, " in done.stdout and "leaves the domain" in done.stdout, done.stderr
-    assert "The state from before energy grew is in files/last_good.251.h5" in done.stdout
-    assert [path.name for path in (tmp_path / "files").glob("*.h5")] == ["last_good.251.h5"]
+    assert "The state from before energy grew is in files/last_good.250.h5" in done.stdout
+    assert [path.name for path in (tmp_path / "files").glob("*.h5")] == ["last_good.250.h5"]
     assert read_log(tmp_path / "files" / "log.mpm").Step[-1] == 312

@@ -70,11 +70,12 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     steps
         How many; exactly so many are taken.
     on_trouble
-        ``stop``, or ``halve``: where a point goes wrong, energy comes from nowhere or the step gets
-        unstable, the run goes back to its last good state and tries half the step, at most five
-        times, and says so. Log, dumps, curves, and computes that remember (errors, drifts) go back
-        to that state, too: what had been written since is written again. Files and pictures of one
-        step are overwritten when it comes again, or stay where it does not.
+        ``stop``, or ``halve``: where a point goes wrong, energy comes from nowhere (from what is
+        otherwise a warning on) or the step gets unstable, the run goes back to its last good state
+        and tries half the step, at most five times, and says so. Log, dumps, curves, and computes
+        that remember (errors, drifts) go back to that state, too: what had been written since is
+        written again. Files and pictures of one step are overwritten when it comes again, or stay
+        where it does not.
 
     Example
     -------

@@ -23,7 +23,7 @@ from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import ruling_limit, words_of_share
-from karamelo_py.run.watch import grown_little, tell_of_growth
+from karamelo_py.run.watch import forget_growth, grown_little, growth
 from karamelo_py.scene import boundary
 from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
@@ -31,6 +31,7 @@ from karamelo_py.script.errors import Pause, Quit, ScriptError, render_message
 
 CHUNK = 100  # steps between two looks at the run, and between two snapshots, at most
 HALVINGS = 5  # at most, in a run
+RETURNS = 2  # at most, to one state from where energy grows: what two halves do not mend stays
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
 
 ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
@@ -51,7 +52,7 @@ def _kind_of_scene(hub: Hub) -> str:
 class Runner:
     """Runs a scene for a number of steps, to a time, or by a condition."""
 
-    remembers = ("halvings", "good")
+    remembers = ("halvings", "good", "returns")
 
     def __init__(
         self,
@@ -70,6 +71,7 @@ class Runner:
         self.until = until
         self.halve = halve
         self.halvings = 0
+        self.returns = 0  # to the last good state, since energy grew from there on
         self.memories: restart.Memories = ([], [])
         self.snapshot: dict[str, np.ndarray] = {}  # of the last good state
         self.kept = -1  # its step
@@ -130,6 +132,7 @@ class Runner:
 
     def _keep(self, simulation: Simulation) -> None:
         self.snapshot, self.kept = simulation.snapshot(self.snapshot), simulation.step
+        self.returns = 0
         if self.halve:
             self.memories = restart.memories(self.hub)
 
@@ -235,12 +238,19 @@ class Runner:
             if status != DONE:
                 if status == STOPPED and boundary.delete_leaving(hub, simulation, self.snapshot):
                     self._keep(simulation)
-                elif not self._try_half(simulation, status):
+                elif not self._try_half(simulation, status=status):
                     diagnosis.stop(hub, simulation, status, self.snapshot, self.place)
                 chunk = 1
                 continue
-            if not simulation.told_of_growth:
-                simulation.told_of_growth = tell_of_growth(hub, simulation)
+            found = None if simulation.told_of_growth else growth(hub, simulation)
+            if found is not None:
+                if self.returns < RETURNS and self._try_half(simulation, found[0]):
+                    self.returns += 1
+                    forget_growth(simulation)
+                    chunk = 1
+                    continue
+                hub.warn(found[0], hint=found[1])
+                simulation.told_of_growth = True
             boundary.tell_of_bounces(hub, simulation)
             if compiled < self.spent["compilation"]:
                 # A rate that counts compilation would promise hours.
@@ -259,11 +269,11 @@ class Runner:
                     self._fraction(simulation, first_step, first_time),
                 )
 
-    def _try_half(self, simulation: Simulation, status: int) -> bool:
+    def _try_half(self, simulation: Simulation, message: str = "", status: int = DONE) -> bool:
         """Go back to the last good state with half the step, where the script asks for that."""
         if not self.halve or self.halvings == HALVINGS:
             return False
-        message, _ = diagnosis.trouble(self.hub, simulation, status)
+        message = message or diagnosis.trouble(self.hub, simulation, status)[0]
         self.halvings += 1
         simulation.restore(self.snapshot)
         # Rows of log and dumps that have been written since go with what they show.
