@@ -117,3 +117,26 @@ def test_what_two_pass_on(monkeypatch):
     first, second = plan(hub.simulation, 2)
     assert (first.points, first.tiles, first.others) == (16, 2, 1)
     assert first.given == second.given == 3 * bytes_of_node(hub.simulation)
+
+
+@pytest.mark.parametrize("scheme", ["usf", "usavg"])
+def test_touching_bodies_on_their_way(state_interpreted, tmp_path, scheme):
+    """What contact remembers of a node goes with it from process to process."""
+    script = f"""
+method(ulmpm/contacts, FLIP, linear, 1)
+scheme({scheme})
+dimension(2, 0, 2, 0, 2, 0.1)
+region(a, block, 0.3, 0.6, 0.2, 0.8)
+region(b, block, 0.6, 0.9, 0.2, 0.8)
+material(m, neo-hookean, 1, 100, 0)
+solid(a, region, a, 2, m, 0.1, 0)
+solid(b, region, b, 2, m, 0.1, 0)
+group(a, particles, region, a, solid, a)
+group(b, particles, region, b, solid, b)
+fix(va, initial_velocity_particles, a, 45, 60)
+fix(vb, initial_velocity_particles, b, 40, 60+20*y0)
+set_dt(0.001)
+set_output(1000)
+run(12)
+"""
+    assert shared(state_interpreted, tmp_path, with_files(script), ranks=3)

@@ -103,6 +103,7 @@ class Ranks(Simulation):
     def sort(self) -> None:
         """Sort the points by tile."""
         if self._stepping:
+            self._tell_what_touched()
             self._part = self._parted.tiles.migrate(self._part)
             self._parted.tiles.sort(self._part)
         elif self._at_work:
@@ -315,11 +316,27 @@ class Ranks(Simulation):
         nodes = len(self._parted.tiles.foreign)
         return remembered_at(self._parted, np.array([[0, nodes]]))
 
+    def _tell_what_touched(self) -> None:
+        """All learn where contact acted in the last step: other nodes come to be in use."""
+        memory = self._memory()
+        if memory:
+            own = self._counted()
+            own = own[
+                np.any([(np.abs(one[own]) == self.step).any(axis=1) for one in memory], axis=0)
+            ]
+            for nodes, *rows in self.crew.everyone((own, *(one[own] for one in memory))):
+                for one, found in zip(memory, rows, strict=True):
+                    one[nodes] = found
+
+    def _counted(self) -> np.ndarray:
+        """The numbers of the nodes in use here that no other process counts."""
+        nodes = numbers(self._part.spans)
+        return nodes[self._parted.tiles.foreign[nodes] == 0]
+
     def gather(self, *, everywhere: bool = False) -> None:
         """Put the parts of all together, at the first process, or everywhere."""
         s = self._part
-        own = numbers(s.spans)
-        own = own[self._parted.tiles.foreign[own] == 0]
+        own = self._counted()
         work = self.control.totals[WORK].copy()
         found = {
             "counts": [block.points.mass.size for block in s.blocks],
