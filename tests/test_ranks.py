@@ -133,8 +133,8 @@ def test_what_two_pass_on(monkeypatch):
 def test_tiles_are_cut_by_work(monkeypatch, costs, tiles_of_first):
     """Four tiles of one law, then four of another, eight points each.
 
-    Where those of the first take 3 each, all take 16: the cut is at 8, in the third, and a tile is of
-    the one that has its middle. With 7 for the others it is at 16 of 32, in the sixth.
+    Where those of the first take 3 each, all take 16: the cut is at 8, in the third, and a tile is
+    of the one that has its middle. With 7 for the others it is at 16 of 32, in the sixth.
     """
     hub = hub_in_tiles(
         monkeypatch, "region(a, block, 0, 1.6)", "region(b, block, 1.6, 3.2)",
