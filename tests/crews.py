@@ -37,6 +37,7 @@ class Threads(Crew):
         return found if self.leads else None
 
     def lined_up(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        assert own.flags.c_contiguous  # which kernels and MPI rely on
         found = self.everyone(own)
         if self.leads:
             assert [len(one) for one in found] == list(counts)

@@ -501,7 +501,9 @@ class Ranks(Simulation):
             points = [_stripped(share, f"points/{k}/") for share in shares]
             order = _by_tile(tilings)
             arrays = {
-                name: np.concatenate([one[name] for one in points], axis=-1)[..., order]
+                name: np.take(
+                    np.concatenate([one[name] for one in points], axis=-1), order, axis=-1
+                )
                 for name in points[0]
             }
             _join_tilings(block.tiling, tilings)
@@ -684,7 +686,10 @@ def _share(k: int, block: Block, own: np.ndarray) -> dict[str, np.ndarray]:
     which = np.flatnonzero(own[occupied(tiling)[0]])
     ranges = tiling.range[which]
     points = between(*ranges.T)
-    found = {f"points/{k}/{name}": array[..., points] for name, array in arrays_of(block.points)}
+    found = {
+        f"points/{k}/{name}": np.take(array, points, axis=-1)
+        for name, array in arrays_of(block.points)
+    }
     rows = {name: getattr(tiling, name)[which] for name in ROWS}
     rows["range"] = one_after_another(ranges)
     rows["count"] = np.array([len(which), *tiling.count[1:]])

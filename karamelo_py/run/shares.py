@@ -142,7 +142,7 @@ class SharedTiles(Tiles):
 
         def parts(rank: int) -> list[list[np.ndarray]]:
             return [
-                [array[..., to == rank] for _, array in arrays_of(block.points)]
+                [np.compress(to == rank, array, axis=-1) for _, array in arrays_of(block.points)]
                 for block, to in zip(s.blocks, own, strict=True)
             ]
 
