@@ -37,6 +37,7 @@ class Threads(Crew):
         return found if self.leads else None
 
     def lined_up(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        assert own.flags.c_contiguous  # which kernels and MPI rely on
         found = self.everyone(own)
         if self.leads:
             assert [len(one) for one in found] == list(counts)
@@ -58,7 +59,11 @@ class Threads(Crew):
     def largest(self, array: np.ndarray) -> np.ndarray:
         return np.max(self.everyone(array), axis=0)
 
-    def passed(self, given: dict, taken: dict) -> None:
+    def send(self, given: dict, taken: dict) -> Any:
+        return given, taken
+
+    def wait(self, sent: Any) -> None:
+        given, taken = sent
         of_all = self.everyone(given)
         for rank, array in taken.items():
             array[...] = of_all[rank][self.rank]

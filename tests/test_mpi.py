@@ -216,7 +216,7 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
 @needs_mpi
 @pytest.mark.parametrize(
     "function",
-    [pytest.param("ranks.Ranks.go", marks=pytest.mark.full), "shares.SharedTiles.exchange"],
+    [pytest.param("ranks.Ranks.go", marks=pytest.mark.full), "shares.SharedTiles.give"],
 )
 def test_only_one_fails(tmp_path, function):
     """In its steps, and in what kernels ask for: the others end, too."""
@@ -272,12 +272,12 @@ COUNTS = """
 from karamelo_py.run import tiles
 from karamelo_py.run.crew import Crew
 tiles.DIRECT_UP_TO, tiles.TILES = 0, {2: 2}
-passed = Crew.passed
+send = Crew.send
 def counting(self, given, taken):
     with open(f"passed.{self.rank}", "a") as file:
         print(sum(array.nbytes for array in given.values()), file=file)
-    passed(self, given, taken)
-Crew.passed = counting
+    return send(self, given, taken)
+Crew.send = counting
 """
 
 

@@ -4,6 +4,7 @@ Here they are threads that talk as processes do, interpreted; the last tests sta
 """
 
 from itertools import product
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -18,6 +19,7 @@ from karamelo_py.output.console import Console
 from karamelo_py.run import tiles
 from karamelo_py.run.curve import along_curve
 from karamelo_py.run.plan import bytes_of_node, plan
+from karamelo_py.run.shares import SharedTiles, work_of
 from karamelo_py.scene.hub import Hub
 
 MOVING = (
@@ -97,23 +99,75 @@ def test_a_curve_through_all_places(shape):
         assert (np.abs(np.diff(places, axis=0)).sum(axis=1) == 1).all()
 
 
+def hub_in_tiles(monkeypatch, *lines: str) -> Hub:
+    """A scene in 1D in tiles of 4 cells, sorted."""
+    monkeypatch.setattr(tiles, "TILES", {1: 4})
+    monkeypatch.setattr(tiles, "DIRECT_UP_TO", 0)
+    hub = Hub(Console(quiet=True))
+    hub.interpreter = Interpreter(hub)
+    head = ("method(ulmpm, FLIP, linear, 1)", "dimension(1, 0, 3.6, 0.1)")
+    hub.interpreter.run_text("\n".join([*head, *lines]), "bar")
+    hub.simulation.sort()
+    return hub
+
+
 def test_what_two_pass_on(monkeypatch):
     """A bar from cell 4 to 20 in tiles of 4 cells, two points a cell, linear functions.
 
     The last point before the border is at 11.75 cells, and may go one further: it sees node 13 at
     most. The first one behind it, at 12.25, sees node 11 at least. Three nodes are in use by both.
     """
-    monkeypatch.setattr(tiles, "TILES", {1: 4})
-    monkeypatch.setattr(tiles, "DIRECT_UP_TO", 0)
-    lines = (
-        "method(ulmpm, FLIP, linear, 1)", "dimension(1, 0, 2.4, 0.1)",
-        "region(bar, block, 0.4, 2)", "material(a, linear, 1, 1, 0.3)",
+    hub = hub_in_tiles(
+        monkeypatch, "region(bar, block, 0.4, 2)", "material(a, linear, 1, 1, 0.3)",
         "solid(bar, region, bar, 2, a, 0.1, 0)",
     )  # fmt: skip
-    hub = Hub(Console(quiet=True))
-    hub.interpreter = Interpreter(hub)
-    hub.interpreter.run_text("\n".join(lines), "bar")
-    hub.simulation.sort()
     first, second = plan(hub.simulation, 2)
     assert (first.points, first.tiles, first.others) == (16, 2, 1)
     assert first.given == second.given == 3 * bytes_of_node(hub.simulation)
+
+
+@pytest.mark.parametrize(
+    "costs, tiles_of_first",
+    [((1, 1, 0), 4), ((3, 1, 0), 3), ((1, 1, 1000), 4), ((1, 7, 0), 6)],
+)
+def test_tiles_are_cut_by_work(monkeypatch, costs, tiles_of_first):
+    """Four tiles of one law, then four of another, eight points each.
+
+    Where those of the first take 3 each, all take 16: the cut is at 8, in the third, and a tile is
+    of the one that has its middle. With 7 for the others it is at 16 of 32, in the sixth.
+    """
+    hub = hub_in_tiles(
+        monkeypatch, "region(a, block, 0, 1.6)", "region(b, block, 1.6, 3.2)",
+        "material(a, linear, 1, 1, 0.3)", "material(b, neo-hookean, 1, 1, 0.3)",
+        "solid(a, region, a, 2, a, 0.1, 0)", "solid(b, region, b, 2, b, 0.1, 0)",
+    )  # fmt: skip
+    method, blocks = hub.update.method, hub.simulation.setup.blocks
+    two = SharedTiles(
+        SimpleNamespace(rank=0, size=2), method.lattices(hub), method.basis, 128, False,
+        one_place=False,
+    )  # fmt: skip
+    two.share_out(work_of(two.points_in(blocks), np.array(costs)))
+    assert np.count_nonzero(two.owner[:8] == 0) == tiles_of_first
+
+
+@pytest.mark.parametrize("scheme", ["usf", "usavg"])
+def test_touching_bodies_on_their_way(state_interpreted, tmp_path, scheme):
+    """What contact remembers of a node goes with it from process to process."""
+    script = f"""
+method(ulmpm/contacts, FLIP, linear, 1)
+scheme({scheme})
+dimension(2, 0, 2, 0, 2, 0.1)
+region(a, block, 0.3, 0.6, 0.2, 0.8)
+region(b, block, 0.6, 0.9, 0.2, 0.8)
+material(m, neo-hookean, 1, 100, 0)
+solid(a, region, a, 2, m, 0.1, 0)
+solid(b, region, b, 2, m, 0.1, 0)
+group(a, particles, region, a, solid, a)
+group(b, particles, region, b, solid, b)
+fix(va, initial_velocity_particles, a, 45, 60)
+fix(vb, initial_velocity_particles, b, 40, 60+20*y0)
+set_dt(0.001)
+set_output(1000)
+run(12)
+"""
+    assert shared(state_interpreted, tmp_path, with_files(script), ranks=3)

@@ -20,18 +20,19 @@ def save_state(request: dict) -> int:
     import numpy as np
     from states import final_columns, final_state
 
-    from karamelo_py.run import tiles
+    from karamelo_py.run import ranks, tiles
 
     script, columns = request["arguments"][0], request["columns"]
     usual = tiles.DIRECT_UP_TO, tiles.TILES
+    ranks.LEARN_EVERY = 2
     if request["boxes"]:
         tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 2, 3: 2}
     try:
-        ranks, folder = request["ranks"], request["out"] and Path(request["out"])
+        folder = request["out"] and Path(request["out"])
         if columns:
             arrays = final_columns(script, columns)
         else:
-            arrays = final_state(script, ranks=ranks, folder=folder)
+            arrays = final_state(script, ranks=request["ranks"], folder=folder)
         np.savez(request["state"], **arrays)
     except Exception:
         traceback.print_exc()

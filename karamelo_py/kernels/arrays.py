@@ -93,8 +93,10 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 class Tiling(NamedTuple):
     """The points of a block by tile."""
 
-    count: np.ndarray  # (2,) int64: number of occupied tiles, and of shares of the points
-    share: np.ndarray  # (S + 1,) int64: tiles of the k-th share are share[k]:share[k + 1]
+    count: np.ndarray  # (3,) int64: number of occupied tiles, of shares of the points, and of those
+    #                    of them that other processes wait for
+    share: np.ndarray  # (S + 1,) int64: tiles of the k-th share are order[share[k]:share[k + 1]]
+    order: np.ndarray  # (T + 1,) int64: in which the occupied tiles are visited
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
     grid: np.ndarray  # (T + 1,) int64: the grid that the k-th occupied tile belongs to
     number: np.ndarray  # (T + 1,) int64: of the k-th occupied tile among all

@@ -12,17 +12,20 @@ import numpy as np
 from numba import types
 
 from karamelo_py.compiler.compile import caller_of, entered
+from karamelo_py.kernels.step import sweep_all, sweep_blocks
+from karamelo_py.kernels.sums import given
+from karamelo_py.kernels.sweep import sweep_points, sweep_shares
 from karamelo_py.kernels.totals import (
     agree_on_heat,
     agree_on_reports,
     collect,
     counts,
-    exchange,
     number_of_all,
+    take_over,
 )
 
 CALL = types.int64(types.int64, types.int64, types.int64)
-BOXES, TOTALS, REPORTS, HEAT, NUMBER = range(5)
+SWEEP, NEXT, GIVE, TAKE, TOTALS, REPORTS, HEAT, NUMBER = range(8)
 
 _call = caller_of(CALL)
 
@@ -32,6 +35,20 @@ class Linked(NamedTuple):
 
     address: int  # of the function ``(what, a, b) -> number``
     foreign: np.ndarray  # (N,) uint8: 1 where another process adds up what a node gives
+
+
+class Border(NamedTuple):
+    """A sweep over the tiles that other processes wait for."""
+
+    mode: NamedTuple
+    address: int
+
+
+class Inside(NamedTuple):
+    """A sweep over the other tiles."""
+
+    mode: NamedTuple
+    address: int
 
 
 @entered
@@ -70,6 +87,34 @@ def _ask_if(due, address, what, a, b):
         _call(address, what, a, b)
 
 
-@exchange.on(Linked)
-def _(ranks, buffers, due, what):
-    _ask_if(due, ranks.address, BOXES, buffers.number, what)
+@take_over.on(Linked)
+def _(ranks, due):
+    _ask_if(due, ranks.address, TAKE, 0, 0)
+
+
+@sweep_all.on(Linked)
+def _(ranks, s, mode, visit, then, gathers, scatters, dt):
+    address = ranks.address
+    _ask(address, SWEEP, 0, 0)
+    sweep_blocks(s, Border(mode, address), visit, then, gathers, scatters, dt)
+    if len(visit.quantities):
+        due = scatters & (s.buffers.count[1] == 0)
+        _ask_if(due, address, GIVE, s.buffers.number, given(visit.quantities, s.kin))
+    sweep_blocks(s, Inside(mode, address), visit, then, gathers, scatters, dt)
+
+
+@sweep_points.on(Border)
+def _(mode, visit, s, block, then, gathers, scatters, dt):
+    border = block.tiling.count[2]
+    sweep_shares(mode.mode, visit, s, block, then, gathers, scatters, dt, 0, border)
+    if len(s.blocks) > 1:
+        _ask(mode.address, NEXT, 0, 0)
+
+
+@sweep_points.on(Inside)
+def _(mode, visit, s, block, then, gathers, scatters, dt):
+    border = block.tiling.count[2]
+    inside = block.tiling.count[1] - border
+    sweep_shares(mode.mode, visit, s, block, then, gathers, scatters, dt, border, inside)
+    if len(s.blocks) > 1:
+        _ask(mode.address, NEXT, 0, 0)

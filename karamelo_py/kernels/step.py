@@ -65,7 +65,7 @@ from karamelo_py.kernels.p2g import (
     SeriesBack,
     Volumes,
 )
-from karamelo_py.kernels.sums import adds, given
+from karamelo_py.kernels.sums import adds
 from karamelo_py.kernels.sweep import (
     OldWeights,
     Visit,
@@ -73,7 +73,7 @@ from karamelo_py.kernels.sweep import (
     sweep_nodes,
     sweep_points,
 )
-from karamelo_py.kernels.totals import agree_on_reports, exchange
+from karamelo_py.kernels.totals import Alone, agree_on_reports, take_over
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.basis import placed
@@ -99,7 +99,17 @@ def _sweep(block, s, mode, visit, then, gathers, scatters, dt):
     sweep_points(mode, visit, s, block, then, gathers, scatters, dt)
 
 
-_sweep_blocks = over_blocks(_sweep)
+sweep_blocks = over_blocks(_sweep)
+
+
+@point_function()
+def sweep_all(ranks, s, mode, visit, then, gathers, scatters, dt):
+    """Sweep over the points of all blocks; begin to pass on what they give to other processes."""
+
+
+@sweep_all.on(Alone)
+def _(ranks, s, mode, visit, then, gathers, scatters, dt):
+    sweep_blocks(s, mode, visit, then, gathers, scatters, dt)
 
 
 @entered
@@ -139,7 +149,7 @@ def _visit(s, mode, visit, then, gathers, scatters, dt):
     direct = s.buffers.count[1]
     anew = tuple(quantity for quantity in visit.quantities if not adds(quantity))
     sum_all(mode, anew, s, scatters & (direct == 1))
-    _sweep_blocks(s, mode, visit, then, gathers, scatters, dt)
+    sweep_all(s.control.ranks, s, mode, visit, then, gathers, scatters, dt)
     sum_all(mode, visit.quantities, s, scatters & (direct == 0))
 
 
@@ -147,8 +157,7 @@ def _visit(s, mode, visit, then, gathers, scatters, dt):
 def sum_all(mode, quantities, s, due):
     """Sum at the nodes what the points gave, if they did."""
     if len(quantities):
-        boxes = due & (s.buffers.count[1] == 0)
-        exchange(s.control.ranks, s.buffers, boxes, given(quantities, s.kin))
+        take_over(s.control.ranks, due & (s.buffers.count[1] == 0))
         sum_buffers(mode, quantities, s, due)
 
 

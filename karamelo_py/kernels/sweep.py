@@ -305,11 +305,11 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
 
 
 @subkernel
-def visit_share(visit, s, block, then, gathers, scatters, dt, k):
-    """Visit the points of the tiles of the k-th share, one thread's work."""
-    share = block.tiling.share
-    for t in range(share[k], share[k + 1]):
-        visit_tile(visit, s, block, then, gathers, scatters, dt, t)
+def visit_share(visit, s, block, then, gathers, scatters, dt, first, k):
+    """Visit the points of the tiles of the k-th share behind the `first`, one thread's work."""
+    share, order = block.tiling.share, block.tiling.order
+    for t in range(share[first + k], share[first + k + 1]):
+        visit_tile(visit, s, block, then, gathers, scatters, dt, order[t])
 
 
 @subkernel
@@ -322,7 +322,7 @@ def visit_nodes(task, kin, nodes, spans, dt, t):
 
 # --- threads ----------------------------------------------------------------------------------
 
-_visit_shares = shared_out(visit_share, "visit, s, block, then, gathers, scatters, dt")
+_visit_shares = shared_out(visit_share, "visit, s, block, then, gathers, scatters, dt, first")
 _sum_tiles = shared_out(sum_tile, "quantities, kin, nodes, buffers")
 _visit_spans = shared_out(visit_nodes, "task, kin, nodes, spans, dt")
 
@@ -333,14 +333,20 @@ def sweep_points(mode, visit, s, block, then, gathers, scatters, dt):
 
 
 @entered
-def _visit_all(mode, visit, s, block, then, gathers, scatters, dt):
-    shares = block.tiling.count[1]
-    _visit_shares(mode, shares, visit, s, block, then, gathers, scatters, dt)
+def _visit_all(mode, visit, s, block, then, gathers, scatters, dt, first, count):
+    _visit_shares(mode, count, visit, s, block, then, gathers, scatters, dt, first)
 
 
 @sweep_points.on(Serial)
 @sweep_points.on(Threaded)
 def _(mode, visit, s, block, then, gathers, scatters, dt):
+    shares = block.tiling.count[1]
+    sweep_shares(mode, visit, s, block, then, gathers, scatters, dt, 0, shares)
+
+
+@shared
+def sweep_shares(mode, visit, s, block, then, gathers, scatters, dt, first, count):
+    """Sweep over `count` shares of the points of a block, from the `first` on."""
     clock = s.control.clock[0]
     # A little more, so that points are sorted next whenever one did not fit (see run.tiles).
     room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
@@ -348,7 +354,7 @@ def _(mode, visit, s, block, then, gathers, scatters, dt):
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.buffers.nodes,
         clock.now, real(room, dt),
     )  # fmt: skip
-    _visit_all(mode, visit, context, block, then, gathers, scatters, dt)
+    _visit_all(mode, visit, context, block, then, gathers, scatters, dt, first, count)
 
 
 @point_function()

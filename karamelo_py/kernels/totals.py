@@ -174,12 +174,12 @@ def _(ranks, control):
 
 
 @point_function()
-def exchange(ranks, buffers, due, what):
-    """Get what the tiles of other processes give to nodes in use here; `what` as of `given`."""
+def take_over(ranks, due):
+    """Wait for what the tiles of other processes give to nodes in use here."""
 
 
-@exchange.on(Alone)
-def _(ranks, buffers, due, what):
+@take_over.on(Alone)
+def _(ranks, due):
     return None
 
 

@@ -163,14 +163,17 @@ class Crew:
             self.world.Allreduce(array, out, op=MPI.MAX)
         return out
 
-    def passed(self, given: dict[int, np.ndarray], taken: dict[int, np.ndarray]) -> None:
-        """Send arrays to some others and fill those that they send, by rank."""
+    def send(self, given: dict[int, np.ndarray], taken: dict[int, np.ndarray]) -> Any:
+        """Begin to send arrays to some others and to fill those that they send, by rank."""
+        waiting = [self.world.Irecv(array, rank) for rank, array in taken.items()]
+        return waiting + [self.world.Isend(array, rank) for rank, array in given.items()]
+
+    def wait(self, sent: Any) -> None:
+        """Wait until all is there that `send` has begun."""
         from mpi4py import MPI
 
-        waiting = [self.world.Irecv(array, rank) for rank, array in taken.items()]
-        waiting += [self.world.Isend(array, rank) for rank, array in given.items()]
         with self._waiting():
-            MPI.Request.Waitall(waiting)
+            MPI.Request.Waitall(sent)
 
     def fail(self, error: BaseException) -> None:
         """End all processes because of an error that cannot be raised here."""

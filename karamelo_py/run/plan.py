@@ -14,7 +14,7 @@ from karamelo_py.run.crew import Crew
 from karamelo_py.run.shares import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import sparse
-from karamelo_py.run.tiles import Boxes, chosen_of, numbers
+from karamelo_py.run.tiles import SHARES, Boxes, chosen_of, numbers
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 
@@ -103,7 +103,7 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
         )
 
     of_all = [tiles_of(_Pretended(rank, ranks)) for rank in range(ranks)]
-    of_all[0].share_out(of_all[0].points_in(s.blocks))
+    of_all[0].share_out(of_all[0].points_in(s.blocks).sum(axis=0))
     parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
     boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
     for tiles in of_all:
@@ -131,7 +131,10 @@ def _part(s: Setup, own: np.ndarray) -> Setup:
         tiling = block.tiling
         which = np.flatnonzero(own[occupied(tiling)[0]])
         rows = {name: getattr(tiling, name)[which] for name in Tiling._fields[2:]}
-        rows |= {"count": np.array([len(which), tiling.count[1]]), "share": tiling.share}
+        rows |= {
+            "count": np.array([len(which), *tiling.count[1:]]),
+            "share": np.zeros(2 * SHARES + 1, np.int64),
+        }
         blocks.append(block._replace(tiling=tiling._replace(**rows)))
     return s._replace(blocks=tuple(blocks), spans=np.zeros((1, 2), np.int64), heat=None)
 

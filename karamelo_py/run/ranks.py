@@ -21,12 +21,23 @@ import numpy as np
 from karamelo_py.compiler.compile import address_of_python
 from karamelo_py.kernels.arrays import Block, Nodes, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.ranks import BOXES, CALL, HEAT, NUMBER, REPORTS, TOTALS, Linked
+from karamelo_py.kernels.ranks import (
+    CALL,
+    GIVE,
+    HEAT,
+    NEXT,
+    NUMBER,
+    REPORTS,
+    SWEEP,
+    TAKE,
+    TOTALS,
+    Linked,
+)
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.by_id import ById, Ordered, Piece
 from karamelo_py.run.crew import ENDING, FAILED, Crew
 from karamelo_py.run.lowering import State, lower
-from karamelo_py.run.shares import SharedTiles, joined, occupied, sized
+from karamelo_py.run.shares import SharedTiles, joined, occupied, sized, work_of
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.state import changing, of_nodes, remembered_at, take_points, take_tiling
@@ -37,13 +48,18 @@ from karamelo_py.run.tiles import (
     in_tiles,
     in_use,
     numbers,
+    one_after_another,
     shares_of,
     used,
 )
+from karamelo_py.run.work import Work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
 OVER = "over"
+LEARN_EVERY = (
+    100  # steps, from one output to another: then it is seen whether the work is shared well
+)
 ROWS = ("number", "range", "grid", "box")  # of a tiling
 
 
@@ -72,6 +88,8 @@ class Ranks(Simulation):
         self._bare = self.follows and previous is None
         self._call = address_of_python(self._answer, CALL)
         self._parted = self._empty_part()
+        self._work = Work(len(self._whole.blocks))
+        self._counted_at = self._learned_at = self.step
 
     # --- the whole --------------------------------------------------------------------------------
 
@@ -103,7 +121,9 @@ class Ranks(Simulation):
     def sort(self) -> None:
         """Sort the points by tile."""
         if self._stepping:
-            self._part = self._parted.tiles.migrate(self._part)
+            self._tell_what_touched()
+            self._account()
+            self._part = self._parted.tiles.migrate(self._part, self._learn())
             self._parted.tiles.sort(self._part)
         elif self._at_work:
             raise ScriptError(
@@ -269,19 +289,20 @@ class Ranks(Simulation):
         if clock.drift > clock.drift_limit or not covered:
             super().sort()
         tiles = self._parted.tiles
-        tiles.share_out(tiles.points_in(whole.blocks))
+        tiles.share_out(work_of(tiles.points_in(whole.blocks), self._work.costs))
         nodes = numbers(whole.spans)
         memory = [one[nodes] for one in self._memory()]
-        self._together("take", tiles.cuts, nodes, memory, shares=self._shares())
+        shares = [self._share_of(whole, rank) for rank in range(self.crew.size)]
+        self._together("take", tiles.cuts, nodes, memory, shares=shares)
         self._handed_out = self.version
 
-    def _shares(self) -> list[list[dict[str, np.ndarray]]]:
-        """What each process has of the whole, block by block."""
-        owner = self._parted.tiles.owner
-        return [
-            [_share(k, block, owner == rank) for k, block in enumerate(self._whole.blocks)]
-            for rank in range(self.crew.size)
-        ]
+    def _share_of(self, s: Setup, rank: int) -> dict[str, np.ndarray]:
+        """The points and tiles that a process is to have of those in `s`, by name."""
+        own = self._parted.tiles.owner == rank
+        found = {}
+        for k, block in enumerate(s.blocks):
+            found |= _share(k, block, own)
+        return found
 
     def take(
         self, cuts: np.ndarray, nodes: np.ndarray, memory: list, shares: list | None = None
@@ -294,7 +315,7 @@ class Ranks(Simulation):
             one[nodes] = rows
         if not self.crew.leads:
             self.control.totals[WORK] = 0
-        self._put({name: array for block in found for name, array in block.items()})
+        self._put(found)
 
     def _put(self, found: dict[str, np.ndarray]) -> None:
         """Let the part have these points and tiles."""
@@ -315,11 +336,27 @@ class Ranks(Simulation):
         nodes = len(self._parted.tiles.foreign)
         return remembered_at(self._parted, np.array([[0, nodes]]))
 
+    def _tell_what_touched(self) -> None:
+        """All learn where contact acted in the last step: other nodes come to be in use."""
+        memory = self._memory()
+        if memory:
+            own = self._counted()
+            own = own[
+                np.any([(np.abs(one[own]) == self.step).any(axis=1) for one in memory], axis=0)
+            ]
+            for nodes, *rows in self.crew.everyone((own, *(one[own] for one in memory))):
+                for one, found in zip(memory, rows, strict=True):
+                    one[nodes] = found
+
+    def _counted(self) -> np.ndarray:
+        """The numbers of the nodes in use here that no other process counts."""
+        nodes = numbers(self._part.spans)
+        return nodes[self._parted.tiles.foreign[nodes] == 0]
+
     def gather(self, *, everywhere: bool = False) -> None:
         """Put the parts of all together, at the first process, or everywhere."""
         s = self._part
-        own = numbers(s.spans)
-        own = own[self._parted.tiles.foreign[own] == 0]
+        own = self._counted()
         work = self.control.totals[WORK].copy()
         found = {
             "counts": [block.points.mass.size for block in s.blocks],
@@ -423,9 +460,56 @@ class Ranks(Simulation):
             self.control.values[:] = values
             self.control.clock.view(np.ndarray)[:] = clock
         with self._steps():
+            if abs(self.step - self._learned_at) >= LEARN_EVERY and not self._parted.tiles.direct:
+                self._rebalance()
+            self._counted_at = self.step
+            self._work.pause()
             status = super().advance(count)
+            self._account()
         self._shown = False
         return status
+
+    def _account(self) -> None:
+        """Take note of the steps so far; what comes before the next is not counted."""
+        blocks = self._part.blocks
+        counts = [block.points.mass.size for block in blocks]
+        counts.append(sum(int(block.tiling.count[0]) for block in blocks))
+        self._work.done(counts, self.step - self._counted_at)
+        self._counted_at = self.step
+        self._work.pause()
+
+    def _learn(self) -> np.ndarray:
+        """What points and tiles cost."""
+        self._learned_at = self.step
+        self._work.learn(self.crew)
+        return self._work.costs
+
+    def _rebalance(self) -> None:
+        """Hand over tiles as they are: points may never be sorted again."""
+        s, tiles = self._part, self._parted.tiles
+        if not tiles.balance(work_of(tiles.points_in(s.blocks), self._learn())):
+            return
+        self._tell_what_touched()
+        own = [tiles.owner[occupied(block.tiling)[0]] for block in s.blocks]
+        others = tiles.partners(np.bincount(np.concatenate(own), minlength=self.crew.size))
+        given = {rank: self._share_of(s, rank) for rank in others}
+        shares = [self._share_of(s, self.crew.rank), *self.crew.traded(given).values()]
+        tiles.empty_nodes(s)
+        blocks = []
+        for k, block in enumerate(s.blocks):
+            tilings = [_stripped(share, f"tiling/{k}/") for share in shares]
+            points = [_stripped(share, f"points/{k}/") for share in shares]
+            order = _by_tile(tilings)
+            arrays = {
+                name: np.take(
+                    np.concatenate([one[name] for one in points], axis=-1), order, axis=-1
+                )
+                for name in points[0]
+            }
+            _join_tilings(block.tiling, tilings)
+            blocks.append(block._replace(points=take_points(block.points, arrays, "")))
+        self._part = s._replace(blocks=tuple(blocks))
+        tiles.lay_out(self._part)
 
     def waits(self) -> np.ndarray:
         """Seconds that each process has waited for others in steps so far."""
@@ -470,7 +554,8 @@ class Ranks(Simulation):
             [array[nodes] for _, array in of_nodes(whole)],
         )  # fmt: skip
         crew.told(told)
-        self._take_back(*told, crew.handed_out(self._shares()))
+        shares = [self._share_of(whole, rank) for rank in range(crew.size)]
+        self._take_back(*told, crew.handed_out(shares))
 
     def _take_back(
         self, values: np.ndarray, clock: np.ndarray, nodes: np.ndarray, rows: list, share: list
@@ -484,7 +569,7 @@ class Ranks(Simulation):
             array[nodes[here]] = found[here]
         for k, block in enumerate(s.blocks):
             for name, array in arrays_of(block.points):
-                array[...] = share[k][f"points/{k}/{name}"]
+                array[...] = share[f"points/{k}/{name}"]
 
     @contextmanager
     def _steps(self) -> Iterator[None]:
@@ -497,14 +582,26 @@ class Ranks(Simulation):
     def _answer(self, what: int, a: int, b: int) -> int:
         """What kernels ask of the other processes (karamelo_py.kernels.ranks)."""
         try:
-            return self._answers[what](self, a, b) or 0
+            self._work.note()
+            found = self._answers[what](self, a, b) or 0
+            if what == NEXT:
+                self._work.next_block()
+            else:
+                self._work.resume(0 if what in {SWEEP, GIVE} else None)
+            return found
         except BaseException as error:
             # Nothing can be raised through a kernel, and the others wait.
             self.crew.fail(error)
             raise
 
-    def _boxes(self, number: int, arrays: int) -> None:
-        self._parted.tiles.exchange(self._part, number, arrays)
+    def _go_on(self, *_: int) -> None:
+        """Only the time is taken."""
+
+    def _give(self, number: int, arrays: int) -> None:
+        self._parted.tiles.give(self._part, number, arrays)
+
+    def _take(self, *_: int) -> None:
+        self._parted.tiles.take()
 
     def _totals(self, first: int, count: int) -> None:
         of_all = self.crew.added(self.control.totals[first : first + count])
@@ -529,7 +626,8 @@ class Ranks(Simulation):
         return int(self.crew.added(np.array([number]))[0])
 
     _answers: ClassVar[dict[int, Callable]] = {
-        BOXES: _boxes, TOTALS: _totals, REPORTS: _reports, HEAT: _heat, NUMBER: _number
+        SWEEP: _go_on, NEXT: _go_on, GIVE: _give, TAKE: _take, TOTALS: _totals,
+        REPORTS: _reports, HEAT: _heat, NUMBER: _number,
     }  # fmt: skip
 
     # --- state that can be returned to ------------------------------------------------------------
@@ -588,18 +686,20 @@ def _share(k: int, block: Block, own: np.ndarray) -> dict[str, np.ndarray]:
     which = np.flatnonzero(own[occupied(tiling)[0]])
     ranges = tiling.range[which]
     points = between(*ranges.T)
-    found = {f"points/{k}/{name}": array[..., points] for name, array in arrays_of(block.points)}
+    found = {
+        f"points/{k}/{name}": np.take(array, points, axis=-1)
+        for name, array in arrays_of(block.points)
+    }
     rows = {name: getattr(tiling, name)[which] for name in ROWS}
-    rows["range"] = _one_after_another(ranges)
-    rows["count"] = np.array([len(which), tiling.count[1]])
+    rows["range"] = one_after_another(ranges)
+    rows["count"] = np.array([len(which), *tiling.count[1:]])
     rows["share"] = shares_of(rows["range"], int(tiling.count[1]), len(tiling.share))
     return found | {f"tiling/{k}/{name}": array for name, array in rows.items()}
 
 
-def _one_after_another(ranges: np.ndarray) -> np.ndarray:
-    """Ranges (k, 2) as long as these, each from the end of the one before."""
-    ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
-    return np.stack([np.append(0, ends)[:-1], ends], axis=1)
+def _stripped(found: dict[str, np.ndarray], stem: str) -> dict[str, np.ndarray]:
+    """What has a name that begins so, without that."""
+    return {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
 
 
 def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
@@ -609,7 +709,7 @@ def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
 
 def _by_tile(tilings: list[dict[str, np.ndarray]]) -> np.ndarray:
     """The order of tiles for points that stand one process after another."""
-    ranges = _one_after_another(_joint(tilings, "range"))
+    ranges = one_after_another(_joint(tilings, "range"))
     return between(*ranges[np.argsort(_joint(tilings, "number"))].T)
 
 
@@ -617,11 +717,13 @@ def _join_tilings(tiling: Tiling, tilings: list[dict[str, np.ndarray]]) -> None:
     """The tiles of all processes, in the order of their numbers."""
     order = np.argsort(_joint(tilings, "number"))
     tiling.count[0] = len(order)
-    rows = {name: _joint(tilings, name)[order] for name in (*ROWS, "report")}
-    ranges = _one_after_another(rows["range"])
-    # Points that went wrong keep their place in their tile.
-    wrong = rows["report"][:, 2] > 0
-    rows["report"][wrong, 2] += (ranges - rows["range"])[wrong, 0]
+    names = [name for name in (*ROWS, "report") if name in tilings[0]]
+    rows = {name: _joint(tilings, name)[order] for name in names}
+    ranges = one_after_another(rows["range"])
+    if "report" in rows:
+        # Points that went wrong keep their place in their tile.
+        wrong = rows["report"][:, 2] > 0
+        rows["report"][wrong, 2] += (ranges - rows["range"])[wrong, 0]
     for name, array in (rows | {"range": ranges}).items():
         getattr(tiling, name)[: len(order)] = array
     tiling.share[:] = shares_of(ranges, int(tiling.count[1]), len(tiling.share))

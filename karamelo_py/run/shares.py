@@ -15,6 +15,7 @@ from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of
 from karamelo_py.run.crew import Crew
 from karamelo_py.run.curve import along_curve
 from karamelo_py.run.tiles import (
+    SHARES,
     Boxes,
     Reached,
     Tiles,
@@ -22,13 +23,16 @@ from karamelo_py.run.tiles import (
     buffers_of,
     chosen_of,
     extents,
+    one_after_another,
     ragged,
     rows_of,
+    shares_of,
     steps_of,
 )
 from karamelo_py.scene.lattice import Lattice
 
-IMBALANCE = 1.1  # largest share of the points over the mean: above it they are shared out anew
+IMBALANCE = 1.1  # largest share of the work over that after a new cut: above it tiles are cut anew
+FINE = 1000  # parts of the unit of costs, in which work is added up as whole numbers
 
 
 class Needs(NamedTuple):
@@ -90,41 +94,55 @@ class SharedTiles(Tiles):
         self.cuts = cuts
         self.owner = np.searchsorted(cuts, self._along, side="right") - 1
 
-    def share_out(self, per_tile: np.ndarray) -> None:
-        """Cut the tiles into ranges of nearly as many points each."""
+    def share_out(self, work: np.ndarray) -> None:
+        """Cut the tiles into ranges of nearly as much work each."""
         cuts = np.append(0, np.full(self.crew.size, self.count))
         if not self.direct:
-            along = np.empty_like(per_tile)
-            along[self._along] = per_tile
+            along = np.empty_like(work)
+            along[self._along] = work
             ends = np.cumsum(along)
             parts = np.arange(1, self.crew.size) * ends[-1] / self.crew.size
             # A tile is of the one that has its middle.
             cuts[1:-1] = np.searchsorted(ends - 0.5 * along, parts)
         self.cut(cuts)
 
-    def points_in(self, blocks: Iterable[Block]) -> np.ndarray:
-        """Number of the points in each tile, of blocks that are sorted."""
-        per_tile = np.zeros(self.count, np.int64)
-        for block in blocks:
-            np.add.at(per_tile, *occupied(block.tiling))
-        return per_tile
+    def balance(self, work: np.ndarray) -> bool:
+        """Cut the tiles anew where that is worth it; `work` (tiles,) is of the own points."""
+        before, work = self.cuts, self.crew.added(work)
 
-    def migrate(self, s: Setup) -> Setup:
+        def largest() -> float:
+            return np.bincount(self.owner, work, self.crew.size).max()
+
+        now = largest()
+        self.share_out(work)
+        if now <= IMBALANCE * largest():
+            self.cut(before)
+        return self.cuts is not before
+
+    def points_in(self, blocks: Iterable[Block]) -> np.ndarray:
+        """(blocks, tiles) number of the points, of blocks that are sorted."""
+        found = np.zeros((len(blocks), self.count), np.int64)
+        for row, block in zip(found, blocks, strict=True):
+            tiles, points = occupied(block.tiling)
+            row[tiles] = points
+        return found
+
+    def partners(self, going: np.ndarray) -> list[int]:
+        """Others that this process has something for, or that have for it; how much, by rank."""
+        going[self.crew.rank] = 0
+        return np.flatnonzero(going + self.crew.swapped(going)).tolist()
+
+    def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
         """Hand over the points that have gone to the tiles of others."""
         tiles = [self._by_tile(s, block)[1] for block in s.blocks]
-        here = sum(np.bincount(of, minlength=self.count) for of in tiles)
-        per_tile = self.crew.added(here)
-        shares = np.bincount(self.owner, per_tile, self.crew.size)
-        if shares.max() > IMBALANCE * shares.mean():
-            self.share_out(per_tile)
+        here = np.array([np.bincount(of, minlength=self.count) for of in tiles])
+        self.balance(work_of(here, costs))
         own, me = [self.owner[of] for of in tiles], self.crew.rank
-        going = sum(np.bincount(to, minlength=self.crew.size) for to in own)
-        going[me] = 0
-        others = np.flatnonzero(going + self.crew.swapped(going)).tolist()
+        others = self.partners(sum(np.bincount(to, minlength=self.crew.size) for to in own))
 
         def parts(rank: int) -> list[list[np.ndarray]]:
             return [
-                [array[..., to == rank] for _, array in arrays_of(block.points)]
+                [np.compress(to == rank, array, axis=-1) for _, array in arrays_of(block.points)]
                 for block, to in zip(s.blocks, own, strict=True)
             ]
 
@@ -149,6 +167,33 @@ class SharedTiles(Tiles):
         of_all = {self.crew.rank: own, **dict(sorted(found.items()))}
         self._of = np.repeat(list(of_all), [len(boxes.grid) for boxes in of_all.values()])
         return Boxes(*(np.concatenate(same) for same in zip(*of_all.values(), strict=True)))
+
+    def empty_tiling(self) -> Tiling:
+        return super().empty_tiling()._replace(share=np.zeros(2 * SHARES + 1, np.int64))
+
+    def lay_out(self, s: Setup) -> None:
+        super().lay_out(s)
+        if not self.direct:
+            self._border_first(s)
+
+    def _border_first(self, s: Setup) -> None:
+        """Let the tiles that others wait for be visited first."""
+        awaited = np.zeros(len(self._of), bool)
+        for box, _, _ in self._passed.values():
+            awaited[box] = True
+        begin = 0
+        for block in s.blocks:
+            tiling = block.tiling
+            own = awaited[begin : begin + tiling.count[0]]
+            begin += tiling.count[0]
+            border = np.count_nonzero(own)
+            order = np.argsort(~own, kind="stable")
+            tiling.order[: len(order)] = order
+            tiling.count[1:] = 2 * SHARES, SHARES
+            for k, tiles in enumerate((order[:border], order[border:])):
+                ranges = one_after_another(tiling.range[tiles])
+                share = k * border + shares_of(ranges, SHARES, SHARES + 1)
+                tiling.share[k * SHARES : (k + 1) * SHARES + 1] = share
 
     def own_boxes(self, s: Setup) -> Boxes:
         """The boxes of the own tiles, with their place in the order of one process."""
@@ -244,8 +289,8 @@ class SharedTiles(Tiles):
         self._marked = np.concatenate(found)
         self.foreign[self._marked] = 1
 
-    def exchange(self, s: Setup, number: int, what: int) -> None:
-        """Pass on what the own tiles give to nodes of others, and get what theirs give to own."""
+    def give(self, s: Setup, number: int, what: int) -> None:
+        """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
         arrays = chosen_of(buffers_of(s)[number].nodes, what)
         width = sum(array.shape[1] for array in arrays)
         given = {
@@ -256,12 +301,23 @@ class SharedTiles(Tiles):
             rank: np.empty((rows.stop - rows.start, width), arrays[0].dtype)
             for rank, rows in self._taken.items()
         }
-        self.crew.passed(given, taken)
+        self._under_way = arrays, taken, self.crew.send(given, taken)
+
+    def take(self) -> None:
+        """Wait for what others give."""
+        arrays, taken, requests = self._under_way
+        self.crew.wait(requests)
         for rank, rows in self._taken.items():
             first = 0
             for array in arrays:
                 array[rows] = taken[rank][:, first : first + array.shape[1]]
                 first += array.shape[1]
+
+
+def work_of(points: np.ndarray, costs: np.ndarray) -> np.ndarray:
+    """(tiles,) cost of points (blocks, tiles), and of their tiles, in whole numbers."""
+    cost = points * costs[:-1, None] + (points > 0) * costs[-1]
+    return np.rint(FINE * cost.sum(axis=0)).astype(np.int64)
 
 
 def occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:

@@ -101,8 +101,9 @@ class Tiles:
     def empty_tiling(self) -> Tiling:
         """Room for the tiles of a block."""
         return Tiling(
-            count=np.array([0, 1]),
+            count=np.array([0, 1, 0]),
             share=np.zeros(SHARES + 1, np.int64),
+            order=np.arange(self.count + 1),
             range=np.zeros((self.count + 1, 2), np.int64),
             grid=np.zeros(self.count + 1, np.int64),
             number=np.zeros(self.count + 1, np.int64),
@@ -188,7 +189,7 @@ class Tiles:
         occupied = np.flatnonzero(ends > begins)
         count = len(occupied)
         shares = 1 if self.direct else SHARES
-        tiling.count[:] = count, shares
+        tiling.count[:2] = count, shares
         tiling.number[:count] = occupied
         tiling.range[:count] = np.stack([begins[occupied], ends[occupied]], axis=1)
         tiling.share[:] = shares_of(tiling.range[:count], shares, len(tiling.share))
@@ -370,6 +371,12 @@ def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
     out[1:shares] = np.searchsorted(ranges.sum(axis=1) / 2, parts)
     out[shares] = len(ranges)
     return out
+
+
+def one_after_another(ranges: np.ndarray) -> np.ndarray:
+    """Ranges (k, 2) as long as these, each from the end of the one before."""
+    ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
+    return np.stack([np.append(0, ends)[:-1], ends], axis=1)
 
 
 def in_tiles(tiling: Tiling) -> int:

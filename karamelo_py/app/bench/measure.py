@@ -116,7 +116,7 @@ def _name(*tags: Any) -> str:
 
 @sweep_points.on(Timed)
 def _(mode, visit, s, block, then, gathers, scatters, dt):
-    nothing = block._replace(tiling=block.tiling._replace(count=np.zeros(2, np.int64)))
+    nothing = block._replace(tiling=block.tiling._replace(count=np.zeros(3, np.int64)))
     name = _name(*visit.tasks, *visit.quantities)
     with _noted(mode.of_points, name):
         sweep_points(mode.mode, visit, s, block, then, gathers, scatters, dt)
