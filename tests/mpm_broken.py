@@ -1,0 +1,322 @@
+"""A package of styles that are wrong, each in its way; scripts call them in small letters."""
+
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.fields import scalar
+from karamelo_py.kernels.step import ACCELERATE, SUMS
+from karamelo_py.points.basis.product import along, register
+from karamelo_py.points.laws import (
+    advance,
+    cauchy_stress,
+    column,
+    elastic_strain,
+    energy_density,
+    initial_state,
+    jacobian,
+    kirchhoff_stress,
+    wave_speed_squared,
+)
+from karamelo_py.points.laws.strengths.hardening import flow_stress, hardened, hardening
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.modify import Compute, Fix, heat_hook, node_hook, point_hook
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.dumps.base import Dump
+
+
+# --- hooks
+class Spring(Fix):
+    def __init__(self, hub, group: ParticleGroup, k: float = 1.0):
+        super().__init__(hub, group)
+        1 / k
+
+    def initial_integrate(self, points):
+        return missing  # noqa
+
+
+class Group(Fix):
+    def __init__(self, hub, group: ParticleGroup):
+        super().__init__(hub, group)
+        self.formulas = (Expression(1.0),)
+
+
+def uncompilable(mass, v, x_old, x, value, before, dt, kick):
+    return v * len(f"{value:.3e}"), x, 0.0
+
+
+class Light(Group):
+    post_grid_to_point = point_hook(uncompilable)
+
+
+def at_point(mass, v, x_old, x, value, before, dt, kick):
+    return v, x, 1.0
+
+
+def at_node(mass, v, v_star, force, value, before, dt, share):
+    return v, v_star, force, 1.0
+
+
+class Misplaced(Group):
+    post_particles_to_grid = point_hook(at_point)
+
+
+class Swapped(Group):
+    final_integrate = node_hook(at_node)
+
+
+class Cold(Group):
+    supply_heat = point_hook(at_point)
+
+
+class Hot(Group):
+    initial_integrate = heat_hook(at_point)
+
+
+def too_few(mass, v, v_star, force, value, before, dt):
+    return v, v_star, force, 0.0
+
+
+class Many(Group):
+    post_particles_to_grid = node_hook(too_few)
+
+
+class Few(Group):
+    initial_integrate = point_hook(lambda mass, v, x_old, x, value, before, dt, kick: (v, x))
+
+
+class Undirected(Fix):
+    post_particles_to_grid = node_hook(at_node)
+
+    def __init__(self, hub, group: ParticleGroup):
+        super().__init__(hub, group)
+
+
+class Viewless(Group):
+    def initial_integrate(self): ...
+
+
+class Idle(Fix):
+    published = ()
+
+    def initial_integrat(self, points): ...
+
+
+class Misspelt(Idle):
+    def initial_integrate(self, points): ...
+
+    def post_gird_to_point(self, points): ...
+
+    def _post_process(self): ...
+
+    def position_of(self): ...
+
+
+class Silent(Group):
+    published = ("x",)
+    initial_integrate = point_hook(at_point)
+
+
+class Stop(Group):
+    def initial_integrate(self, points):
+        points.velocity[:] = 0
+
+
+class Weigh(Group):
+    def initial_integrate(self, points):
+        points.mass[:] = 0
+
+
+class Gauge(Compute):
+    published = ("x",)
+
+    def refresh(self):
+        self.publish("s", 1)
+
+
+# --- fields
+class Shapeless(NamedTuple):
+    array: Any
+
+
+class Wordy(NamedTuple):
+    array: Any
+    shape = scalar
+    columns = "dose"
+
+
+class Sized(NamedTuple):
+    array: Any
+    shape = scalar
+
+    def start(kin):
+        return 1.0, 2.0
+
+
+class Unshaped(NamedTuple):
+    array: Any
+
+    def shape(kin):
+        return kin.dimensions
+
+
+class Taken(NamedTuple):
+    array: Any
+    shape = scalar
+    columns = ("vx",)
+
+
+class Other(NamedTuple):
+    array: Any
+    shape = scalar
+    columns = ("dose",)
+
+
+class Second(Other):
+    pass
+
+
+class Bare(Group):
+    point_fields = Other
+
+
+class Formless(Group):
+    point_fields = (Shapeless,)
+
+
+class OneWord(Group):
+    point_fields = (Wordy,)
+
+
+class Clashing(Group):
+    point_fields = (Taken,)
+
+
+class Doubled(Group):
+    point_fields = (Sized,)
+
+
+class Lost(Group):
+    node_fields = (Unshaped,)
+
+
+class First(Group):
+    published = ()
+    point_fields = (Other,)
+
+
+class Again(Group):
+    point_fields = (Second,)
+
+
+# --- laws
+class Law(NamedTuple):
+    """E and nothing else."""
+
+    E: float
+    specific_volume = 1.0
+
+
+class Motionless(Law): ...
+
+
+class Growing(Law): ...
+
+
+class Raising(Law): ...
+
+
+class Short(Law): ...
+
+
+class Uncompiled(Law): ...
+
+
+for kind in (Motionless, Growing, Raising, Short, Uncompiled):
+    initial_state.on(kind)(lambda law, kin, like: (like,))
+    cauchy_stress.on(kind)(lambda law, kin, state: (state[0],) * 3)
+    kirchhoff_stress.on(kind)(lambda law, kin, state: (state[0],) * 3)
+    elastic_strain.on(kind)(lambda law, kin, state: (state[0],) * 3)
+    jacobian.on(kind)(lambda law, kin, state: state[0])
+    energy_density.on(kind)(lambda law, kin, state: state[0])
+    wave_speed_squared.on(kind)(lambda law, kin, state: law.E)
+for kind in (Short, Uncompiled):
+    advance.on(kind)(lambda law, kin, state, dl, dt: state)
+advance.on(Growing)(lambda law, kin, state, dl, dt: (*state, dt))
+cauchy_stress.on(Short)(lambda law, kin, state: (state[0], state[0]))
+
+
+@advance.on(Raising)
+def _(law, kin, state, dl, dt):
+    return unknown  # noqa
+
+
+@wave_speed_squared.on(Uncompiled)
+def _(law, kin, state):
+    return law.E * len(f"{law.E:.3e}")
+
+
+class Hiding(Law): ...
+
+
+class Double(Law): ...
+
+
+column(Hiding, "seq", energy_density)
+column(Double, "dose", energy_density)
+
+
+class Forgetful(NamedTuple):
+    """A strength."""
+
+    G: float
+
+
+hardening(Forgetful, R=0.0)
+flow_stress.on(Forgetful)(lambda strength, memory, increment, heat, dt: (strength.G, strength.G))
+hardened.on(Forgetful)(lambda strength, memory, increment, dt: (memory[0],))
+
+
+# --- parts of a step
+class Basis(NamedTuple):
+    cells = nodes_per_cell = 1
+    least_nodes = 2
+    steady_moment = steep_edge = True
+
+
+class Pathless(Basis): ...
+
+
+class Tuple(Basis): ...
+
+
+class Vague(NamedTuple): ...
+
+
+class Lazy(NamedTuple):
+    inverts_spread = False
+
+
+class Rowless(NamedTuple): ...
+
+
+class Wrong(NamedTuple):
+    rows = (SUMS, "twice")
+
+
+class Grounded(NamedTuple):
+    rows = ACCELERATE
+
+
+register(Pathless, 2)
+register(Tuple, 2)
+along.on(Tuple)(lambda basis, kin, grid, place, direction: (0, 0.5, (0.5, 0.5), (-1.0, 1.0), ()))
+
+
+# --- others
+class Torn(Dump):
+    def write(self):
+        raise KeyError("lost")
+
+
+def forget(hub):
+    """Do nothing well."""
+    return {}["it"]
