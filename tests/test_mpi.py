@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 from conftest import INPUTS, ROOT
+from going_on import same_files
 from scenes import block
-from test_restart import same_files
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.launch import OPEN_MPI

@@ -10,9 +10,10 @@ import h5py
 import numpy as np
 import pytest
 from combinations import MESHED, scene, write_mesh
+from going_on import CURVE, SCENES, same_files, with_files
 from scenes import SCHEMES, block
 from states import same_bits
-from test_restart import CURVE, SCENES, same_files, ways, with_files
+from test_restart import ways
 
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console

@@ -5,13 +5,10 @@ Nothing here compares with a formula; the other tests do.
 
 import json
 import os
-import random
 import re
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from itertools import product
 from pathlib import Path
 from textwrap import dedent
@@ -20,64 +17,11 @@ import h5py
 import numpy as np
 import pytest
 from combinations import BASES, MESHED, SCHEMES, TRANSFERS, fits, refused, scene, write_mesh
-from scenes import H, block
-from test_boundary import thrown
-from test_columns_karamelo import sheared
-from test_contact_grid import bars
-from test_contact_points import bodies
-from test_heat import HOT, slab
-from test_laws_rigid import scene as pushed
-from test_laws_scripts import ALL, pulled
-from test_walls import scene as rubbed
+from going_on import CURVE, FLY, OUTPUTS, SCENES, arrays, goes_on, same_files, with_files
+from scenes import block
 
 from karamelo_py.language import registry
 from karamelo_py.run.memory import memory_of, remember
-
-EVERY = "restart(2, r.*.h5)\n"
-
-
-def arrays(path: Path) -> dict[str, np.ndarray]:
-    """All that a file in HDF5 holds, by name."""
-    found = {}
-
-    def keep(name, item):
-        if isinstance(item, h5py.Dataset):
-            found[name] = item[()]
-
-    with h5py.File(path, swmr=True) as root:
-        root.visititems(keep)
-    return found
-
-
-def same_files(one: Path, other: Path) -> None:
-    """Two folders hold the same files, byte by byte."""
-    names = {path.name for path in one.iterdir()} - {"out"}
-    assert names == {path.name for path in other.iterdir()} - {"out"}
-    for name in names:
-        assert (one / name).read_bytes() == (other / name).read_bytes(), name
-
-
-def with_files(script: str, line: str = EVERY) -> str:
-    """A script that writes files to go on from, from its first run on."""
-    text, count = re.subn("^run", f"{line}run", dedent(script), count=1, flags=re.M)
-    assert count
-    return text
-
-
-def goes_on(run, script: str, *, files: int = 1) -> Path:
-    """Run a script, and once more from some of the files that it wrote; all is the same."""
-    whole = run(script, folder="whole").folder
-    written = sorted(whole.glob("r.*.h5"), key=lambda path: int(path.name.split(".")[1]))
-    assert len(written) > 1
-    for file in written[: -1 : max(1, (len(written) - 1) // files)][:files]:
-        again = whole.with_name("again")
-        shutil.rmtree(again, ignore_errors=True)
-        shutil.copytree(whole, again)
-        said = run(script, "-restart", file.name, folder="again")
-        assert "continued from step" in said.out
-        same_files(whole, again)
-    return whole
-
 
 # --- every way to compute -----------------------------------------------------------------------
 
@@ -106,178 +50,6 @@ def test_every_way(run_interpreted, tmp_path, way):
     option = way[3]
     mesh = write_mesh(tmp_path / "m.vtk", MESHED[option]) if option in MESHED else None
     goes_on(run_interpreted, with_files(scene(*way, mesh=mesh, steps=4)))
-
-
-RUBBING = bars(
-    0.0, "fix(rub, contact/friction, a, b, 0.3)", "log_modify(custom, step, rub_x, va_x)",
-    "fix(slide, initial_velocity_particles, b, -0.1, 0.3)", "run(6)", d=2, scheme="usavg", v=2,
-)  # fmt: skip
-TOOLS = (
-    "fix(F, indent/minimize_penetration, all, sphere, 0.1, 0.45, 0.55, 0, 3, 0, 0, 0.2)",
-    "fix(W, contact/minimize_penetration/plane, body, 0.32, 0, 0, 1, 0, 0, 0.3)",
-    "fix(I, indent, all, sphere, 500, 0.13, 0.45, 0.55, 0)",
-    "fix(C, cuttingtool, all, 0.1, 0.35 + time, 0.36, 0, -1, 0, 0, 0.4, 0.5, 0.6, 0.36)",
-    "log_modify(custom, step, F_x, W_x, I_y, C_x)", "set_dt(0.001)", "run(6)",
-)  # fmt: skip
-GROUPS = """\
-region(low, block, 0.3, 0.3, 0.3, 0.5)
-group(low, nodes, region, low, all)
-group(half, particles, region, box, solid, body)
-fix(hold, velocity_nodes, low, 0.1*time, 0)
-fix(g, body_force, all, 0, -1)
-fix(push, force_nodes, low, 1, 0)
-fix(check, check_solution, all, 0.1*time*x0, 0)
-fix(v, initial_velocity_particles, all, sin(9*x0), 0)
-compute(R, reaction, low)
-compute(L, angular_momentum, all)
-compute(P, linear_momentum, all)
-compute(E, energy_balance, all)
-compute(err, error, all, ux, 0.1*time*x0, L2)
-compute(p, probe, all, x, point=3)
-pull = internal_force(half, x) + external_force(low, x)
-log_modify(custom, step, dt, R_x, L_drift, P_drift, E_drift, err_history, err_max, p, check_z, pull)
-set_output(time(0.004))
-plot(e, 2, time, E)
-save_plot(e.svg)
-"""
-LOADS = (
-    "fix(F, force_particles, all, 2*time, -1)", "fix(T, edge_traction, all, box, xhi, 0.2, y*time)",
-    "fix(P, edge_pressure, all, box, 5*time)", "fix(calm, local_damping, all, 0.8)",
-    "fix(Ek, kinetic_energy, all)", "fix(Es, strain_energy, all)",
-    "compute(E, energy_balance, all)", "set_output(1)",
-    "log_modify(custom, step, dt, limit, F_y, T_x, P_x, E_drift, Ek, Es)", "run(6)",
-)  # fmt: skip
-PYTHON = """\
-fix(v, initial_velocity_nodes, all, 0.2*sin(9*x0), 0)
-fix(push, python, all, pumps.push)
-region(everywhere, block, INF, INF, INF, INF)
-group(nodes, nodes, region, everywhere, all)
-fix(brake, python, nodes, pumps.brake)
-log_modify(custom, step, push_x, push_y, brake)
-"""
-# Tools of Karamelo, of which one needs space, and computes of points: all in a few points.
-BENCH = """\
-region(face, block, 0.46, INF, INF, INF, INF, INF)
-group(face, particles, region, face, all)
-fix(s, initial_stress, all, 3*x0, 1, 0, 0, 0, -2*y0)
-fix(v, initial_velocity_particles, all, sin(9*x0), 0, y0)
-fix(M, meldtool, all, 0.1, y, 0.03, 0.4, 0.35, 10*time, 0.31, 2, 0.12)
-fix(W, impenetrablesurface, all, 0.5, 0.42, 0.36, 0.35, 3, 4, time)
-fix(T, neumann_bc_mech, face, -7*time, 1, NULL)
-compute(s, average_stress, face)
-compute(c, center_of_mass, face)
-compute(q, position_quantile, all, 0.8)
-compute(m, max_position, all)
-compute(r, reference, all, ../curve.csv, vx)
-compute(now, reference, c_x, ../curve.csv, vx, max, relative)
-log_modify(custom, step, M_x, W_x, T_x, s_11, c_z, q_x, m_z, r, now)
-set_dt(0.001)
-run(4)
-"""
-CURVE = "x, vx\n0, 0\n0.4, 0.5\n2, 1\n"
-FACE = """
-    group(face, particles, region, end, all)
-    region(other, block, 0.9, 1)
-    group(other, particles, region, other, all)
-    fix(hold, temperature_particles, face, 301 + time)
-    fix(lamp, heat_flux_particles, other, 7*time)
-    fix(air, convection_particles, other, 0.01, 200)
-"""
-FLUIDS = """
-method(ulmpm, TFLIP, quadratic-spline, 0.98)
-scheme(usl/unlimited)
-dimension(1, 0, 1, 0.1)
-region(left, block, 0.2, 0.4)
-region(right, block, 0.6, 0.8)
-eos(water, fluid, 2, 100, 7)
-strength(thin, fluid, 0.1)
-material(water, eos-strength, water, thin)
-eos(air, ideal-gas, 1.2, 1.4, p=10)
-material(air, eos-strength, air, thin)
-solid(water, region, left, 2, water, 0.1)
-solid(air, region, right, 2, air, 0.1)
-fix(v, initial_velocity_particles, all, sin(9*x0))
-run(6)
-"""
-FLOWS = {
-    "a": "zerilli-armstrong, 80, 0.4, 0.2, 0, 0.0028, 0.000115, 0.3, 0.5",
-    "b": "tabulated, 80, 0, 0.4, 1, 0.9",
-    "c": "tabulated, 80, 0, 0.4, 0.5, 0.65, 1, 0.9",
-    "d": "formula, 80, 0.4 + 0.5*ep + 0.01*epdot",
-    "e": "mu-i, 80, 0.382, 0.643, 0.279, 1, 2",
-    "f": "drucker-prager, 80, 0.1, 30, 5, fit=plane-strain",
-    "g": "mohr-coulomb, 80, 0.1, 30, 5",
-    "h": "swift, 80, 0.4, 0.5, 0.01, 0.5",
-    "i": "linear, 80",
-}
-
-
-def flowing(method: str) -> str:
-    """One point a law, pulled and sheared until all flow."""
-    lines = [f"method({method})", f"dimension(2, 0, {len(FLOWS) / 10 + 0.1}, 0, 0.3, {H})",
-             "eos(bulk, linear, 8, 160)"]  # fmt: skip
-    for k, (name, law) in enumerate(FLOWS.items()):
-        lines += [
-            f"region({name}, block, {k / 10}, {(k + 1) / 10}, 0.1, 0.2)",
-            f"strength({name}, {law})",
-            f"material({name}, eos-strength, bulk, {name})",
-            f"solid({name}, region, {name}, 1, {name}, {H})",
-        ]
-    lines += [
-        "region(everywhere, block, INF, INF, INF, INF)",
-        "group(nodes, nodes, region, everywhere, all)",
-        "fix(pull, velocity_nodes, nodes, x0 + y0, -x0)",
-        "dump(d, all, particle, 1, d.*.txt, ep, epdot, s11, s12)",
-        "set_dt(0.003)",
-        "run(6)",
-    ]
-    return "\n".join(lines)
-
-
-SCENES = {
-    "loads": block(2, *LOADS),
-    "loads in the total frame": block(2, *LOADS).replace("ulmpm", "tlmpm"),
-    "wall that rubs": rubbed().replace("run_time(0.2)", "run(6)"),
-    "rigid": pushed().replace("run_time(3)", "set_dt(0.02)\nrun(40)"),
-    "rigid by a formula": pushed("ulmpm/contacts").replace("initial_velocity_particles, tool, 0.5",
-        "velocity_particles, tool, 0.2*time").replace("run_time(3)", "run(6)"),
-    "flow": flowing("ulmpm, FLIP, linear, 1"),
-    "flow in the total frame": flowing("tlmpm, APIC, linear"),
-    "rate of plastic strain": sheared(", epdot"),
-    "step that varies": block(
-        2, "fix(v, initial_velocity_particles, all, 5*sin(9*x0), 3)", "set_output(1)",
-        "fix(g, body_force, all, 100*time, 0)", "log_modify(custom, step, dt, time, limit)",
-        "run(3)", "run_time(0.02)",
-    ),
-    "friction": RUBBING,
-    "points that touch": bodies(
-        -0.01, "contact/minimize_penetration, a, b, 0.2", "log_modify(custom, step, c_x)", "run(6)",
-        d=2, n=2,
-    ),
-    "Hertz": bodies(
-        -0.01, "contact/hertz, a, b", "log_modify(custom, step, c_x)", "run(6)", d=2, n=2
-    ),
-    "heat": slab(HOT.format("301 + time"), ", hot_s", "run(6)"),
-    "heat in the total frame": slab(HOT.format(301), ", hot_s", "run(6)").replace(
-        'kind = "ulmpm"', 'kind = "tlmpm"'
-    ),
-    "metal": pulled(ALL).replace("run(50)", "run(6)"),
-    "anti locking": block(
-        2, "anti_volumetric_locking(true)", "fix(v, initial_velocity_particles, all, sin(9*x0), 0)",
-        "run(6)",
-    ),
-    "single": "precision(single)\n" + block(
-        2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "run(6)"
-    ),
-    "deleted": thrown(2, "delete", "run(8)", "run(22)"),
-    "reflected": thrown(2, "reflect", "run(8)", "run(22)"),
-    "tools": block(2, *TOOLS),
-    "groups": block(2, GROUPS, "run(7)"),
-    "functions in Python": block(2, PYTHON, "run(5)"),
-    "bench": block(3, BENCH, size=(0.2, 0.1, 0.1)),
-    "faces with heat": slab(FACE, ", lamp_s, air_s", "run(6)"),
-    "fluids": FLUIDS,
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -389,22 +161,6 @@ def test_growth_of_energy_is_told_once(tmp_path):
     assert said.stdout.split("\n")[:-1] == ["1 0", "0", "0 0.3", "1"], said.stderr
 
 
-OUTPUTS = """\
-dump(d1, all, particle, 2, all.txt, x, y, s11)
-dump(d2, all, particle/gz, 2, all.gz, x, y, s11)
-dump(d3, all, particle/bin, 3, all.bin, x, y)
-dump(d4, all, hdf5, time(0.01), points.h5, x, y, s11)
-dump(d5, all, grid/hdf5, 3, nodes.h5, vx, mass, occupied=true)
-dump(d6, all, vtk, 4, p.*.vtu, vx)
-dump(d7, all, movie, 3, m.gif, 300, 300, vx)
-dump(d8, all, grid, 3, g.*.txt, vx, fx, mass)
-dump(d9, all, grid/gz, 3, g.*.gz, vx, mass)
-dump(e1, all, grid/bin, 3, g.*.bin, vx, mass)
-dump(e2, all, grid/vtk, 4, g.*.vtu, vx)
-dump(e3, all, pyplot, 5, p.*.png, 1, 1, vx)
-"""
-
-
 def test_outputs_go_on_in_their_files(run_interpreted):
     """Also from a file of a run that was over, or between two runs; values are those read then."""
     fly = "fix(v, initial_velocity_particles, all, sin(9*x0), 0)"
@@ -447,9 +203,6 @@ test_another_number_of_threads = pytest.mark.xdist_group("identical")(
 
 
 # --- scripts ------------------------------------------------------------------------------------
-
-FLY = block(2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "set_dt(0.001)", "run(4)",
-            size=(0.2, 0.1))  # fmt: skip
 
 
 def test_what_a_function_forgets_is_told(run_interpreted, tmp_path):
@@ -620,14 +373,11 @@ def test_what_cannot_be_written_is_told(run_interpreted):
     assert not list(run_interpreted(FLY.replace("run", "restart(0)\nrun")).folder.glob("*.h5"))
 
 
-# --- parts of other packages --------------------------------------------------------------------
-
-
 # Prints what is forgotten: in an interpreter of its own, which compiles nothing.
 WATCH = """
 from pathlib import Path
 import numpy as np
-from test_restart import CURVE, OUTPUTS, SCENES, block
+from going_on import CURVE, OUTPUTS, SCENES, block
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.memory import remembered
@@ -673,90 +423,6 @@ def test_all_that_changes_is_remembered(tmp_path):
     forgotten = {tuple(line.split()[-2:]) for line in found}
     # What is made anew whenever it is needed.
     assert forgotten <= {("GridHdf5", "_rows"), ("ContactHertz", "_total")}, found
-
-
-# --- killed -------------------------------------------------------------------------------------
-
-LONG = block(
-    2, "fix(v, initial_velocity_particles, all, 0.1*sin(9*x0), 0)", "set_output(20)",
-    "compute(E, energy_balance, all)", "log_modify(custom, step, time, E, E_drift)",
-    "dump(d1, all, particle, 50, all.txt, x, y, s11)", "dump(d2, all, hdf5, 50, p.h5, x, s11)",
-    "dump(d3, all, particle/gz, 100, d.*.gz, x)", "set_dt(0.0001)", "restart(40, r.h5)", "run({})",
-    law="neo-hookean", size=(0.2, 0.1),
-)  # fmt: skip
-STEPS = 6000
-
-
-def started(folder: Path, *options: str) -> subprocess.Popen:
-    folder.mkdir(exist_ok=True)
-    (folder / "in.script").write_text(LONG.format(STEPS), encoding="utf-8")
-    return subprocess.Popen(
-        [sys.executable, "-m", "karamelo_py.app.cli", "in.script", *options],
-        cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows ends processes otherwise")
-@pytest.mark.xdist_group("neo-hookean")
-@pytest.mark.parametrize("kills", [3, pytest.param(100, marks=pytest.mark.full)])
-def test_killed_at_any_moment(tmp_path, kills):
-    """SIGKILL: every file is readable, and what goes on is as if nothing had happened."""
-    whole = tmp_path / "whole"
-    assert started(whole).wait(timeout=300) == 0
-    folder = tmp_path / "killed"
-    restart: list[str] = []
-    chance = random.Random(kills)
-    killed = 0
-    while True:
-        process = started(folder, *restart)
-        if killed < kills:
-            begun = (folder / "log.mpm").stat().st_mtime_ns if (folder / "log.mpm").exists() else 0
-            for _ in range(3000):
-                log = folder / "log.mpm"
-                if (log.exists() and log.stat().st_mtime_ns != begun) or process.poll() is not None:
-                    break
-                time.sleep(0.01)
-            time.sleep(chance.uniform(0, 0.6))
-            process.kill()
-            killed += 1
-        process.wait(timeout=300)
-        process.communicate()
-        if (folder / "r.h5").exists():
-            restart = ["-restart", "r.h5"]
-            json.loads(arrays(folder / "r.h5")["content"].tobytes())
-        if (folder / "log.mpm").exists():
-            lines = (folder / "log.mpm").read_text().splitlines()
-            assert all(len(line.split()) == 4 for line in lines)
-        if (folder / "p.h5").exists():
-            assert len(arrays(folder / "p.h5")["step"]) > 0
-        if process.returncode == 0:
-            break
-        assert process.returncode == -signal.SIGKILL
-    for rest in folder.glob("*.part"):
-        rest.unlink()
-    same_files(whole, folder)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
-@pytest.mark.xdist_group("neo-hookean")
-def test_signals_of_batch_systems(tmp_path, name):
-    """As Ctrl-C: the last state, whole files, 128 + the number; and the run can go on."""
-    number = getattr(signal, name)
-    process = started(tmp_path / "run")
-    for _ in range(3000):
-        if (tmp_path / "run" / "d.100.gz").exists() or process.poll() is not None:
-            break
-        time.sleep(0.02)
-    process.send_signal(number)
-    _, err = process.communicate(timeout=120)
-    assert process.returncode == 128 + number, err
-    assert "Traceback" not in err
-    assert "interrupted: the log and the dumps are complete" in err
-    folder = tmp_path / "run"
-    last = h5py.File(folder / "r.h5").attrs["step"]
-    assert (folder / "log.mpm").read_text().splitlines()[-1].split()[0] == str(last)
-    assert (folder / f"d.{last}.gz").exists()
 
 
 def test_what_a_halved_step_takes_back_is_written_once(run_interpreted):
