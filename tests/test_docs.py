@@ -64,21 +64,39 @@ def test_the_house_has_all_rooms():
         assert list((ROOT / "karamelo_py").rglob(named)) or (ROOT / named).exists(), named
 
 
-def test_the_house_counts_its_arrows():
-    """Folders right below the package, and which of them import from which others."""
-    page = (ROOT / "docs" / "house.md").read_text("utf-8")
-    order = re.findall(r"^\| `(\w+)/` \|", page, re.M)
+def arrows(depth):
+    """Folders of the package, `depth` levels deep, and which of them import from which others."""
+    package = ROOT / "karamelo_py"
     found = set()
-    for path in (ROOT / "karamelo_py").rglob("*/*.py"):
-        folder = path.relative_to(ROOT / "karamelo_py").parts[0]
-        text = path.read_text("utf-8")
-        found |= {(folder, to) for to in re.findall(r"^ *from karamelo_py\.(\w+)", text, re.M)}
-    arrows = [(a, b) for a, b in found if a != b]
+    for path in package.rglob("*/*.py"):
+        here = path.relative_to(package).parts[:-1][:depth]
+        for name in re.findall(r"^ *from karamelo_py\.([\w.]+)", path.read_text("utf-8"), re.M):
+            there = name.split(".")
+            while there and not package.joinpath(*there).is_dir():
+                there.pop()
+            if there and tuple(there[:depth]) != here:
+                found.add((here, tuple(there[:depth])))
+    return {end for arrow in found for end in arrow}, found
+
+
+def test_the_house_counts_its_arrows_and_lines():
+    page = (ROOT / "docs" / "house.md").read_text("utf-8")
     now = dict(re.findall(r"^\| ([^|]*) \| \d+ \| (\d+) \|$", page, re.M))
-    assert int(now["folders"]) == len(order) == len({end for arrow in arrows for end in arrow})
+    order = re.findall(r"^\| `(\w+)/` \|", page, re.M)
+    folders, found = arrows(1)
+    assert int(now["folders"]) == len(order) == len(folders)
     # One import more or less is no other picture.
-    assert int(now["arrows between them"]) == pytest.approx(len(arrows), abs=3)
-    assert [(a, b) for a, b in arrows if order.index(a) > order.index(b)] == []
+    assert int(now["arrows between them"]) == pytest.approx(len(found), abs=3)
+    assert [(a, b) for (a,), (b,) in found if order.index(a) > order.index(b)] == []
+    folders, found = arrows(2)
+    assert int(now["folders one level deeper"]) == len(folders)
+    assert int(now["arrows between those"]) == pytest.approx(len(found), abs=6)
+    count = sum(len(p.read_text("utf-8").splitlines()) for p in ROOT.glob("karamelo_py/**/*.py"))
+    assert int(now["lines of Python"]) == pytest.approx(count, rel=0.03)
+    # What a part costs.
+    for name, lines in re.findall(r"^\| [^|]* \| 1 \| `([\w/]+\.py)` \| (\d+) \|$", page, re.M):
+        path = ROOT / name if name.startswith("tests") else ROOT / "karamelo_py" / name
+        assert int(lines) == pytest.approx(len(path.read_text("utf-8").splitlines()), abs=3), name
 
 
 def test_readme_tells_the_whole_script():
