@@ -92,7 +92,11 @@ FAILURES = {
         (
             {"method": "ulmpm, ASFLIP, quadratic-spline, 1"},
             {"method": "ulmpm, AFLIP, quadratic-spline, 1"},
-        )
+        ),
+        (
+            {"method": "ulmpm, ASFLIP, quadratic-spline, 1, 0.2"},
+            {"method": "ulmpm, ASFLIP, quadratic-spline, 1, 0.1"},
+        ),
     ],
     "fast shocks": [
         (

@@ -72,3 +72,11 @@ def test_blocks_of_terms_make_the_same_sum(terms, size):
     totals = np.zeros((1, LIMBS), np.int64)
     add_blocks(totals, np.array(terms, float), size)
     assert rounded(totals[0]) == total_of(terms)
+
+
+@pytest.mark.parametrize("term", [np.nextafter(1, 0), -np.nextafter(1, 0), 1.0, 2.0**-30, 1e-199])
+def test_a_full_block_of_equal_terms(term):
+    """The largest sums of parts that a block can have, exact by a power of two."""
+    totals = np.zeros((1, LIMBS), np.int64)
+    add_blocks(totals, np.full(1024, term), 1024)
+    assert rounded(totals[0]) == 1024 * term

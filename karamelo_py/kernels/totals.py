@@ -20,6 +20,9 @@ LOST = LIMBS - 1  # counts terms that are no numbers
 DIGIT = (1 << 32) - 1
 MANTISSA = (1 << 52) - 1
 COARSE, FINE = 1e-200, 1e200  # largest terms that are added up as whole numbers
+MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # bits without the sign, which are in the order of the numbers
+WHOLE = 1.5 * 2.0**52
+WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
 # Rows of the totals: those of the published values have their slots, of which time, timestep and dt
 # are no sums.
 KINETIC, STORED, WORK = 0, 1, 2
@@ -58,32 +61,40 @@ def add_many(totals, row, terms, count):
     """Add the first `count` of `terms`, at most 2^10, without rounding.
 
     They are sums of whole numbers of two sizes, but for terms 2^30 times smaller than the largest.
+    A number added to 1.5 2^52 has its whole part in its last bits: both loops are sums of bits, in
+    any order, which vectors of the processor do.
     """
-    largest = odd = 0.0
+    top = 0
     for q in range(count):
-        largest = max(largest, abs(terms[q]))
-        odd += 0.0 * terms[q]  # NaN where a term is no number
-    if largest == 0.0 and odd == 0.0:
+        top = max(top, np.float64(terms[q]).view(np.int64) & MAGNITUDE)
+    largest = np.int64(top).view(np.float64)
+    if largest == 0.0:
         return
-    if not (COARSE < largest < FINE and odd == 0.0):
+    if not COARSE < largest < FINE:
         for q in range(count):
             add_to(totals, row, terms[q])
         return
     unit = ldexp(1.0, frexp(largest)[1] - 30)
-    per_unit, per_part = 1.0 / unit, 2.0**52 / unit
-    high = low = 0
+    per_unit, part = 1.0 / unit, unit / 2.0**52
+    least = np.float64(unit).view(np.int64)
+    high = low = small = 0
     for q in range(count):
         x = terms[q]
-        if not abs(x) * per_unit >= 1.0:
-            add_to(totals, row, x)
-            continue
-        whole = int(x * per_unit)
-        high += whole
-        low += int((x - whole * unit) * per_part)
+        fits = np.float64(x).view(np.int64) & MAGNITUDE >= least
+        x = x * per_unit if fits else 0.0
+        small += 0 if fits else 1
+        whole = x + WHOLE
+        high += np.float64(whole).view(np.int64) - WHOLE_BITS
+        rest = (x - (whole - WHOLE)) * 2.0**52 + WHOLE
+        low += np.float64(rest).view(np.int64) - WHOLE_BITS
+    if small > 0:
+        for q in range(count):
+            if abs(terms[q]) < unit:
+                add_to(totals, row, terms[q])
     add_to(totals, row, high * unit)
     above = low >> 32
-    add_to(totals, row, above * (2.0**32 / per_part))
-    add_to(totals, row, (low - (above << 32)) / per_part)
+    add_to(totals, row, above * (2.0**32 * part))
+    add_to(totals, row, (low - (above << 32)) * part)
 
 
 @entered
