@@ -59,14 +59,17 @@ class Threads(Crew):
     def largest(self, array: np.ndarray) -> np.ndarray:
         return np.max(self.everyone(array), axis=0)
 
-    def send(self, given: dict, taken: dict) -> Any:
+    def send(self, given: list, taken: list) -> Any:
         return given, taken
 
     def wait(self, sent: Any) -> None:
         given, taken = sent
         of_all = self.everyone(given)
-        for rank, array in taken.items():
-            array[...] = of_all[rank][self.rank]
+        for rank in {rank for rank, _ in taken}:
+            mine = [array for to, array in of_all[rank] if to == self.rank]
+            those = [array for of, array in taken if of == rank]
+            for array, found in zip(those, mine, strict=True):
+                array[...] = found
 
     def abandon(self, status: int = 1) -> None:
         self._barrier.abort()

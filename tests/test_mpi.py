@@ -275,7 +275,7 @@ tiles.DIRECT_UP_TO, tiles.TILES = 0, {2: 2}
 send = Crew.send
 def counting(self, given, taken):
     with open(f"passed.{self.rank}", "a") as file:
-        print(sum(array.nbytes for array in given.values()), file=file)
+        print(sum(array.nbytes for _, array in given), file=file)
     return send(self, given, taken)
 Crew.send = counting
 """

@@ -163,10 +163,10 @@ class Crew:
             self.world.Allreduce(array, out, op=MPI.MAX)
         return out
 
-    def send(self, given: dict[int, np.ndarray], taken: dict[int, np.ndarray]) -> Any:
-        """Begin to send arrays to some others and to fill those that they send, by rank."""
-        waiting = [self.world.Irecv(array, rank) for rank, array in taken.items()]
-        return waiting + [self.world.Isend(array, rank) for rank, array in given.items()]
+    def send(self, given: list[tuple[int, Any]], taken: list[tuple[int, Any]]) -> Any:
+        """Begin to send arrays to others (rank, array), and to fill those that they send."""
+        waiting = [self.world.Irecv(array, rank) for rank, array in taken]
+        return waiting + [self.world.Isend(array, rank) for rank, array in given]
 
     def wait(self, sent: Any) -> None:
         """Wait until all is there that `send` has begun."""

@@ -292,26 +292,17 @@ class SharedTiles(Tiles):
     def give(self, s: Setup, number: int, what: int) -> None:
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
         arrays = chosen_of(buffers_of(s)[number].nodes, what)
-        width = sum(array.shape[1] for array in arrays)
-        given = {
-            rank: np.concatenate([array[rows] for array in arrays], axis=1)
+        given = [
+            (rank, np.take(array, rows, axis=0))
             for rank, rows in self.given.items()
-        }
-        taken = {
-            rank: np.empty((rows.stop - rows.start, width), arrays[0].dtype)
-            for rank, rows in self._taken.items()
-        }
-        self._under_way = arrays, taken, self.crew.send(given, taken)
+            for array in arrays
+        ]
+        taken = [(rank, array[rows]) for rank, rows in self._taken.items() for array in arrays]
+        self._under_way = self.crew.send(given, taken)
 
     def take(self) -> None:
         """Wait for what others give."""
-        arrays, taken, requests = self._under_way
-        self.crew.wait(requests)
-        for rank, rows in self._taken.items():
-            first = 0
-            for array in arrays:
-                array[rows] = taken[rank][:, first : first + array.shape[1]]
-                first += array.shape[1]
+        self.crew.wait(self._under_way)
 
 
 def work_of(points: np.ndarray, costs: np.ndarray) -> np.ndarray:
