@@ -19,6 +19,7 @@ from scenes import block
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.launch import OPEN_MPI
+from karamelo_py.app.simulation import Simulation, SimulationError
 
 MPIEXEC = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or shutil.which("mpiexec")
 needs_mpi = pytest.mark.skipif(
@@ -260,6 +261,20 @@ def test_what_several_processes_cannot_do(monkeypatch, capsys):
     monkeypatch.setenv("SLURM_PROCID", "0")
     assert main(["styles"]) == 1
     assert "karamelo-py styles is of one process, and 4 were started" in capsys.readouterr().err
+
+
+def test_a_scene_in_python_is_of_one_process(monkeypatch):
+    """Never so many copies of the same run; one message."""
+    monkeypatch.setenv("PMI_SIZE", "3")
+    monkeypatch.setenv("PMI_RANK", "0")
+    with pytest.raises(SimulationError, match="3 processes were started") as refused:
+        Simulation("a = 2")
+    assert "mpiexec -n 3 karamelo-py SCRIPT" in str(refused.value)
+    monkeypatch.setenv("PMI_RANK", "1")
+    with pytest.raises(SystemExit) as left:
+        Simulation("a = 2")
+    assert not left.value.code
+    assert Simulation("a = 2", alone=True).variables["a"] == 2
 
 
 def test_one_rank_is_no_other_run(tmp_path, run_interpreted):

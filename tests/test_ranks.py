@@ -172,3 +172,12 @@ set_output(1000)
 run(12)
 """
     assert shared(state_interpreted, tmp_path, with_files(script), ranks=3)
+
+
+@pytest.mark.parametrize("method", ["ulmpm", "ulmpm/contacts"])
+def test_points_moved_by_python(state_interpreted, tmp_path, method):
+    """At the start of a step, in each of them: others have the points then."""
+    script = block(
+        2, "fix(c, python, all, shoves.carry)", *DUMPS, *MOVING, "run(14)", ppc=3, size=(0.3, 0.2)
+    ).replace("method(ulmpm,", f"method({method},")
+    assert shared(state_interpreted, tmp_path, with_files(script, "restart(5, r.*.h5)\n"), ranks=3)

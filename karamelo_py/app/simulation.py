@@ -7,6 +7,7 @@ import io
 import itertools
 import os
 import re
+import sys
 import warnings
 from collections.abc import Callable
 from os import PathLike
@@ -21,6 +22,7 @@ from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.language.meanings import shown
 from karamelo_py.output.console import Console
+from karamelo_py.run.crew import launched
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Pause, Quit, ScriptError, nearest
@@ -75,6 +77,9 @@ class Simulation:
         Show on the terminal what the command line shows.
     trust_geometries
         Let .geo files run programs and write files.
+    alone
+        Where mpiexec has started several processes: each has a scene of its own, such as one of a
+        study. Without it that is refused, since it would be the same run so many times.
     variables
         Take the place of what the script assigns to them, as ``-var`` does.
 
@@ -107,8 +112,11 @@ class Simulation:
         threads: int | None = None,
         verbose: bool = False,
         trust_geometries: bool = False,
+        alone: bool = False,
         **variables: Any,
     ):
+        if not alone:
+            _refuse_copies()
         self.hub = hub = Hub(Console() if verbose else _Quiet())
         hub.settings.threads = threads
         hub.settings.trusts = trust_geometries
@@ -339,6 +347,20 @@ class Simulation:
     def __repr__(self) -> str:
         count = sum(solid.count for solid in self.hub.solids.values())
         return f"<{self._name}: {count} points, step {self.step}, time {self.time:.6g}>"
+
+
+def _refuse_copies() -> None:
+    """Of several processes that were started, the first tells that none shares a scene here."""
+    size, rank = launched()
+    if size == 1:
+        return
+    if rank > 0:
+        sys.exit()
+    raise SimulationError(
+        f"{size} processes were started, and a scene in Python is of one: they would do the same",
+        expected=f"mpiexec -n {size} karamelo-py SCRIPT, by which they share a scene",
+        hint="Simulation(..., alone=True) where each is to have a scene of its own",
+    )
 
 
 def _said(value: Any) -> str:

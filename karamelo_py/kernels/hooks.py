@@ -530,7 +530,8 @@ def _choose_points(what, ids, hooks, h, p):
             if hooks.table[h].uses_place:
                 for c in range(directions(hooks)):
                     where[c, count] = what.x[c, p]
-                    where[3 + c, count] = hooks.x0[ids[p], c]
+                    if hooks.x0.shape[0] > 0:
+                        where[3 + c, count] = hooks.x0[ids[p], c]
             count += 1
         p += 1
     return count, p

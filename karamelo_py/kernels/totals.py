@@ -134,6 +134,13 @@ def _round(totals, digits, answer, first, count):
         answer[k] = rounded(digits)
 
 
+@entered
+def add_all(totals, row, terms):
+    """Add all `terms` to a total, without rounding."""
+    for q in range(terms.size):
+        add_to(totals, row, terms[q])
+
+
 @point_function()
 def collect(ranks, control, first, count):
     """Put the values of `count` totals, from row `first` on, into `control.answer`."""

@@ -19,10 +19,12 @@ from karamelo_py.kernels.export import (
 )
 from karamelo_py.kernels.g2p import FBar
 from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.node_columns import NODE_COLUMNS
-from karamelo_py.points.boundary import ReflectingGrid
+from karamelo_py.points.boundary import Bounces, ReflectingGrid
 from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density
+from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.plastic_rate import has_rate
 from karamelo_py.points.transfers import Moment
 
@@ -172,21 +174,15 @@ class Fields:
 
     def kinetic_energy(self, group: Any) -> float:
         """sum m v^2 / 2 of a particle group."""
-        v, mass = self.velocity.astype(float), self.mass.astype(float)
-        energy = 0.5 * mass * np.einsum("ij,ij->i", v, v)
-        return float(energy.sum() if group.all else energy[group.ids].sum())
+        return self._simulation.total("kinetic", group)
 
     def strain_energy(self, group: Any) -> float:
         """Stored energy of a particle group."""
-        return self._energy(group, energy_density)
+        return self._simulation.total("stored", group)
 
     def dissipated_energy(self, group: Any) -> float:
         """Dissipated energy of a particle group."""
-        return self._energy(group, dissipated_energy)
-
-    def _energy(self, group: Any, density: Callable) -> float:
-        energy = self._cached(density.__name__, lambda s: _energies(s, density))
-        return float(energy.sum() if group.all else energy[group.ids].sum())
+        return self._simulation.total("dissipated", group)
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
@@ -317,10 +313,51 @@ def _exported_state(simulation: Any) -> np.ndarray:
     return _of_points(simulation, lambda laws: export_state, EXPORTED)
 
 
-def _energies(simulation: Any, density: Callable) -> np.ndarray:
+def _kinetic(s: Any, block: Any) -> np.ndarray:
+    points = block.points
+    return 0.5 * points.mass.astype(float) * (points.v.astype(float) ** 2).sum(axis=0)
+
+
+def _of_law(density: Callable) -> Callable:
     """Energy of each point, from its density."""
-    fill = partial(export, density.tag, True)
-    return _of_points(simulation, lambda laws: fill if can(laws, density) else None)
+
+    def energies(s: Any, block: Any) -> np.ndarray | None:
+        if not can(block.laws, density):
+            return None
+        rows = np.zeros(len(block.points.id))
+        like = s.nodes.sums[0, MASS]
+        export(density.tag, True, s.kin, like, block.points, block.laws, rows)
+        return rows
+
+    return energies
+
+
+def _bounces(s: Any, block: Any) -> np.ndarray | None:
+    counts = fields.field(block.points.fields, Bounces)
+    return None if counts is None else counts.astype(float).ravel()
+
+
+def _born_with(s: Any, block: Any) -> np.ndarray | None:
+    """Internal energy of a gas as it was made.
+
+    The stored energy counts from there; beside it alone, all that a gas does would be much.
+    """
+    law = elastic_law(block.laws)
+    if not can(law, taken_heat):
+        return None
+    of_eos = np.array(initial_energy(law.eos, 1.0)[0]) * law.eos.specific_volume
+    return (block.points.mass * of_eos[block.points.material]).astype(float)
+
+
+# What the points of a block have that can be added up; None where their law does not have it.
+SUMMED = {
+    "mass": lambda s, block: block.points.mass.astype(float),
+    "kinetic": _kinetic,
+    "stored": _of_law(energy_density),
+    "dissipated": _of_law(dissipated_energy),
+    "born with": _born_with,
+    "bounces": _bounces,
+}
 
 
 def _shown(simulation: Any, name: str) -> np.ndarray:

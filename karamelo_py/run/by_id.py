@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels.arrays import Block, Setup
-from karamelo_py.output.fields import PIECE
+from karamelo_py.kernels.arrays import Block, Control, Setup
+from karamelo_py.kernels.totals import LIMBS, add_all, rounded
+from karamelo_py.output.fields import PIECE, SUMMED
 from karamelo_py.run.lowering import chosen
 from karamelo_py.scene.hub import Hub
 
@@ -29,14 +30,20 @@ class ById:
 
     hub: Hub
     setup: Setup
+    control: Control
     first = 0
     count: int
     present: np.ndarray
 
     @property
+    def kin(self) -> NamedTuple:
+        """The kinematics."""
+        return self.stepped.kin
+
+    @property
     def now(self) -> int:
         """Which of the two position arrays is the present one."""
-        return int(self.setup.control.clock[0].now)
+        return int(self.control.clock[0].now)
 
     def by_id(self, field: Callable) -> np.ndarray:
         """A field of all points in the order of their ids; `field` takes it from `Points`.
@@ -58,7 +65,7 @@ class ById:
         blocks = self.setup.blocks
         if all(field(block.points.fields, kind) is None for block in blocks):
             return None
-        out = fields.at_points(kind, self.setup.kin, self.count, float).array
+        out = fields.at_points(kind, self.kin, self.count, float).array
         for block in blocks:
             array = field(block.points.fields, kind)
             if array is not None:
@@ -73,7 +80,7 @@ class ById:
     @property
     def x(self) -> np.ndarray:
         """(N, d) present positions by id."""
-        d = self.setup.kin.dimension
+        d = self.kin.dimension
         return self.by_id(lambda points: points.x[self.now][:d]).T
 
     @property
@@ -86,6 +93,42 @@ class ById:
         """(N,) masses by id."""
         return self.by_id(lambda points: points.mass)
 
+    @property
+    def stepped(self) -> Setup:
+        """The arrays that are worked on."""
+        return self.setup
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The kinds of points, with those that are at hand."""
+        return self.stepped.blocks
+
+    def total(self, name: str, group: Any = None) -> float:
+        """What all points, or those of a group, have together of `SUMMED`; without rounding."""
+        limbs = np.zeros((1, LIMBS), np.int64)
+        chosen = None
+        if group is not None and not group.all:
+            chosen = np.zeros(self.count, np.bool_)
+            chosen[group.ids] = True
+        for block in self.stepped.blocks:
+            values = SUMMED[name](self.stepped, block)
+            if values is not None:
+                rows = slice(None) if chosen is None else chosen[block.points.id]
+                add_all(limbs, 0, values[rows])
+        return rounded(self.of_all(limbs)[0])
+
+    def counts(self) -> list[int]:
+        """How many points each block has."""
+        return [len(block.points.id) for block in self.stepped.blocks]
+
+    def of_all(self, numbers: np.ndarray) -> np.ndarray:
+        """Sums over all processes that have some of the points."""
+        return numbers
+
+    def most(self, numbers: np.ndarray) -> np.ndarray:
+        """The largest of each number of all processes."""
+        return numbers
+
     @cached_property
     def solid_of(self) -> np.ndarray:
         """(N,) the number of the solid of each point, from 0."""
@@ -96,7 +139,22 @@ class ById:
     @cached_property
     def x0(self) -> np.ndarray:
         """(N, d) positions before the first step."""
-        return self._of_solids(lambda solid, own: solid.x0[own])
+        return self._of_solids(lambda solid, own: solid.places[own])
+
+    def x0_of(self, ids: np.ndarray) -> np.ndarray:
+        """(n, d) positions of some points before the first step, without those of the others."""
+        order = np.argsort(ids)
+        sought, found = ids[order], np.empty((len(ids), self.kin.dimension))
+        for solid in self.hub.solids.values():
+            for begin in range(0, solid.count, PIECE):
+                first = solid.first_id + begin
+                end = first + min(PIECE, solid.count - begin)
+                own = slice(*np.searchsorted(sought, (first, end)))
+                if own.start < own.stop:
+                    low, high = sought[own.start] - first, sought[own.stop - 1] - first
+                    x0 = solid.places[begin + low : begin + high + 1]
+                    found[order[own]] = x0[sought[own] - first - low]
+        return found
 
     @property
     def volume0(self) -> np.ndarray:
@@ -133,6 +191,7 @@ class Piece(ById):
     def __init__(self, whole: ById, first: int, end: int, s: Setup, blocks: Iterable[Block]):
         self.hub = whole.hub
         self.setup = s._replace(blocks=tuple(blocks))
+        self.control = s.control
         self.first, self.count = first, end - first
         self.present = whole.present[first:end]
 

@@ -29,6 +29,7 @@ from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
+from karamelo_py.run.motion import Motion
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import one_a_cell, own_step_instead, sparse
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
@@ -88,86 +89,58 @@ class Foreseen:
         return self.moves and not self.basis.steady_moment
 
     @cached_property
-    def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """(N, d) positions and velocities of the points that there are."""
-        here, x, v = self.simulation.present, self.simulation.x, self.simulation.v
-        return (x, v) if here.all() else (x[here], v[here])
+    def motions(self) -> list[Motion]:
+        """How the solids move."""
+        return self.simulation.motions()
 
     @cached_property
     def turn(self) -> float:
         """The angle by which the solid that turns most would turn in this run, if none held it."""
         if self.d == 1 or self.hub.domain.axisymmetric:
             return 0.0
-        largest = 0.0
-        x, v = self.motion
-        mass, present = self.simulation.mass, self.simulation.present
-        of_solid = self.simulation.solid_of
-        if not present.all():
-            mass, of_solid = mass[present], of_solid[present]
-        for k in range(len(self.hub.solids)):
-            of = of_solid == k
-            m = mass[of]
-            if m.sum() > 0:
-                # Component by component: scenes of millions of points have little memory to spare.
-                here, fast = ([a[of, i] for i in range(self.d)] for a in (x, v))
-                for a in (*here, *fast):
-                    a -= np.average(a, weights=m)
-                inertia = sum(float((m * a**2).sum()) for a in here)
-                spin = [
-                    float((m * (here[i] * fast[j] - here[j] * fast[i])).sum())
-                    for i in range(self.d) for j in range(i)
-                ]  # fmt: skip
-                largest = max(largest, np.linalg.norm(spin) / inertia if inertia > 0 else 0.0)
-        return largest * self.duration
+        return max((one.spin for one in self.motions), default=0.0) * self.duration
 
     @cached_property
     def waves(self) -> float:
         """The speed of waves."""
-        return float(self.simulation.control.clock[0].rate - np.abs(self.motion[1]).max())
+        return float(self.simulation.control.clock[0].rate) - self.simulation.fastest()
 
     @cached_property
     def speed(self) -> float:
         """The largest component of a velocity over the speed of waves."""
-        return float(np.abs(self.motion[1]).max()) / self.waves if self.waves > 0 else 0.0
+        return self.simulation.fastest() / self.waves if self.waves > 0 else 0.0
 
     @cached_property
     def impact(self) -> float:
         """Half of the largest difference of velocities over the speed of waves."""
-        apart = np.ptp(self.motion[1], axis=0).max() / 2
-        return float(apart) / self.waves if self.waves > 0 else 0.0
+        if not (self.motions and self.waves > 0):
+            return 0.0
+        fast, slow = (
+            np.array([getattr(m, name) for m in self.motions]) for name in ("fast", "slow")
+        )
+        return float((fast.max(axis=0) - slow.min(axis=0)).max()) / 2 / self.waves
 
     @cached_property
     def vibration(self) -> tuple[float, float]:
         """The strain by which a solid swings that is stretched evenly, and in how many periods."""
         most = 0.0, 0.0
-        (x, v), present = self.motion, self.simulation.present
-        of_solid = self.simulation.solid_of[present]
-        mass = self.simulation.mass[present]
-        for k in range(len(self.hub.solids)):
-            of = of_solid == k
-            if not (of.any() and self.waves > 0):
-                continue
-            here, fast, m = x[of], v[of], mass[of, None]
-            size = float(np.ptp(here, axis=0).max()) / 2
-            here = here - np.average(here, axis=0, weights=m[:, 0])
-            # The gradient that is nearest to the velocities of all points; its turn is no strain.
-            gradient = np.linalg.lstsq(np.sqrt(m) * here, np.sqrt(m) * fast, rcond=None)[0]
-            rate = float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
-            strain = rate * size / (2 * self.waves)
-            most = max(most, (strain, self.duration * self.waves / (3 * size) if size else 0.0))
+        for one in self.motions if self.waves > 0 else ():
+            strain = one.rate * one.size / (2 * self.waves)
+            periods = self.duration * self.waves / (3 * one.size) if one.size else 0.0
+            most = max(most, (strain, periods))
         return most
 
     @cached_property
     def sag(self) -> float:
         """The strain of a solid under its own weight, g L / c^2."""
-        x, _ = self.motion
         most = 0.0
         for fix in self.hub.fixes.values():
-            if isinstance(fix, BodyForce) and self.waves > 0:
+            if isinstance(fix, BodyForce) and self.waves > 0 and self.motions:
+                x = np.array([one.centre for one in self.motions])
                 for k, formula in enumerate(fix.formulas[: self.d]):
                     if formula is not None:
                         g = abs(formula.evaluate_points(self.hub.values, x, x).mean())
-                        size = max(np.ptp(s.x0[:, k]) for s in self.hub.solids.values())
+                        size = max(one.high[k] - one.low[k] for one in self.motions)
                         most = max(most, float(g * size / self.waves**2))
         return most
 
@@ -282,7 +255,7 @@ def _repeated_contact(s: Foreseen) -> Iterator[Failure]:
     share = s.hub.update.dt_factor
     small = share is not None and share <= SMALL_SHARE
     kept = getattr(s.transfer, "alpha", 0.0)
-    way = float(np.abs(s.motion[1]).max()) * s.duration
+    way = s.simulation.fastest() * s.duration
     if kept > 0.9 and way > far and not small:
         yield Failure(
             "repeated contact",
@@ -390,8 +363,8 @@ def _warn_about_precision(hub: Hub, simulation: Simulation) -> None:
     """Say so when single precision cannot hold what a step adds to a position."""
     if hub.settings.precision != "single":
         return
-    x, v = np.abs(simulation.x).max(), np.abs(simulation.v).max()
-    step, spacing = float(v) * simulation.dt, float(np.spacing(np.float32(x)))
+    x = max((max(-one.low.min(), one.high.max()) for one in simulation.motions()), default=0.0)
+    step, spacing = simulation.fastest() * simulation.dt, float(np.spacing(np.float32(x)))
     if 0 < step < 16 * spacing:
         hub.warn(
             f"a step moves points by {step:.2g} at most, and in single precision positions have "

@@ -13,7 +13,7 @@ from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import told
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.expressions import POINT_SEEDS
+from karamelo_py.script.expressions import FIRST, POINT_SEEDS
 
 NO_PROGRAM = (-1, -1, -1, -1)
 
@@ -21,7 +21,7 @@ NO_PROGRAM = (-1, -1, -1, -1)
 def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
     """Tables of the compiled hooks of `fixes`, in their order."""
     dimension = hub.domain.dimension
-    count = sum(len(s.x0) for s in hub.solids.values())
+    count = sum(s.count for s in hub.solids.values())
     builder = _Builder(hub, count)
     for fix in fixes:
         for name, hook in fix.hooks().items():
@@ -29,7 +29,7 @@ def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
                 builder.add(fix, name, hook)
     if not builder.rows:
         return NoHooks()
-    x0 = np.concatenate([s.x0 for s in hub.solids.values()]) if builder.on_points else None
+    solids = hub.solids.values() if builder.uses_first else ()
     return Hooks(
         evaluate=address_of(evaluate_in_table, EVALUATE),
         table=np.array(builder.rows, HOOK).view(np.recarray),
@@ -37,7 +37,7 @@ def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
         members=np.concatenate([np.empty(0, np.int64), *builder.members]),
         code=np.concatenate([np.empty((0, 2), np.int64), *builder.code]),
         constants=np.concatenate([np.empty(0), *builder.constants]),
-        x0=np.empty((0, dimension)) if x0 is None else x0,
+        x0=np.concatenate([np.empty((0, dimension)), *(s.x0 for s in solids)]),
         chosen=np.zeros(BLOCK, np.int64),
         scratch=np.zeros((STACK + ROWS, BLOCK)),
         held=np.zeros((builder.shared_nodes(), dimension), HELD).view(np.recarray),
@@ -50,7 +50,7 @@ class _Builder:
     def __init__(self, hub: Hub, points: int):
         self.hub = hub
         self.points = points
-        self.on_points = False
+        self.uses_first = False  # places of points before the first step
         self.rows: list[tuple] = []
         self.programs: list[list[tuple]] = []
         self.members: list[np.ndarray] = []
@@ -80,7 +80,7 @@ class _Builder:
         programs = [self._program(formula) for formula in fix.formulas]
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
         self.programs.append([*programs, self._program(fix.wall_friction)])
-        self.on_points |= not hook.on_nodes
+        self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
         if hook.holds and hook.on_nodes:
             self.holding.append(fix)
 

@@ -155,7 +155,7 @@ def stable_conduction(hub: Hub) -> float:
         kappa = conductivity(law, 1.0)
         if kappa > 0:
             capacity = heat_capacity(law, 1.0) / specific_volume(law)
-            limits.append((solid.h / per_cell) ** 2 / (4 * solid.x0.shape[1]) * capacity / kappa)
+            limits.append((solid.h / per_cell) ** 2 / (4 * hub.domain.dimension) * capacity / kappa)
     return min(limits)
 
 
@@ -171,10 +171,12 @@ def check_heat(hub: Hub) -> None:
         )
 
 
-def lower(hub: Hub, previous: State | None = None, *, points: bool = True) -> tuple[Setup, Tiles]:
+def lower(
+    hub: Hub, previous: State | None = None, *, ids: tuple[int, int] | None = None
+) -> tuple[Setup, Tiles]:
     """Make the arrays of a run from the scene, taking over the state of points that exist.
 
-    Without `points` there are none: what is there besides.
+    With `ids`, from and to before, only with those points.
     """
     check_scene(hub)
     method = hub.update.method
@@ -183,7 +185,7 @@ def lower(hub: Hub, previous: State | None = None, *, points: bool = True) -> tu
     lattices = method.lattices(hub)
     transfer = hub.update.transfer_tag(real)
     basis = type(method.basis)(*(real(x) for x in method.basis))
-    count = sum(len(solid.x0) for solid in hub.solids.values())
+    count = sum(solid.count for solid in hub.solids.values())
     tiles = Tiles(lattices, basis, count, sparse(hub))
     contact = method.contact_between(hub, lattices)
     if previous is not None:
@@ -229,7 +231,7 @@ def lower(hub: Hub, previous: State | None = None, *, points: bool = True) -> tu
         buffers=tiles.empty_buffers(at_nodes),
         blocks=lower_blocks(
             hub,
-            hub.solids.values() if points else map(without_points, hub.solids.values()),
+            [solid if ids is None else part_of(solid, *ids) for solid in hub.solids.values()],
             kin,
             fields.declared(owners, "point_fields"),
             tiles,
@@ -277,12 +279,15 @@ def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) 
     )
 
 
-def without_points(solid: Solid) -> Solid:
-    """A solid like this one, without points."""
+def part_of(solid: Solid, first: int, end: int) -> Solid:
+    """A solid like this one, with its points whose ids are from `first` to before `end`."""
+    begin, end = (min(max(i - solid.first_id, 0), solid.count) for i in (first, end))
     other = copy.copy(solid)
     for name, value in vars(solid).items():
-        if isinstance(value, np.ndarray) and len(value) == len(solid.x0):
-            setattr(other, name, value[:0])
+        if isinstance(value, np.ndarray) and len(value) == solid.count:
+            setattr(other, name, value[begin:end])
+    other.places = solid.places[begin:end]
+    other.first_id += begin
     return other
 
 
@@ -324,11 +329,11 @@ def lower_block(
 
     def each(values: list, dtype: type) -> np.ndarray:
         """(n,): the value of its solid for each point."""
-        return np.repeat(np.array(values, dtype), [len(s.x0) for s in solids])
+        return np.repeat(np.array(values, dtype), [s.count for s in solids])
 
-    ids = np.concatenate([np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids])
+    ids = np.concatenate([np.arange(s.first_id, s.first_id + s.count) for s in solids])
     states = [start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True)]
-    counts = [len(s.x0) for s in solids]
+    counts = [s.count for s in solids]
     places = np.concatenate([method.places(kin, s, real) for s in solids])
     places = np.ascontiguousarray(places.T)
     here = places if method.frame.moves else places[: kin.dimension]

@@ -12,8 +12,9 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import wraps
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 from zlib import crc32
 
 import numpy as np
@@ -43,6 +44,7 @@ from karamelo_py.run.stable import sparse
 from karamelo_py.run.state import changing, of_nodes, remembered_at, take_points, take_tiling
 from karamelo_py.run.tiles import (
     DIRECT_UP_TO,
+    SHARES,
     Tiles,
     between,
     in_tiles,
@@ -60,11 +62,28 @@ OVER = "over"
 LEARN_EVERY = (
     100  # steps, from one output to another: then it is seen whether the work is shared well
 )
+CHANGING = ("advance", "set_initial")  # what changes the points
 ROWS = ("number", "range", "grid", "box")  # of a tiling
+
+
+def by_all(method: Callable) -> Callable:
+    """A method of each process for its part, where the whole is not there: of all together."""
+
+    @wraps(method)
+    def act(self: Ranks, *arguments: Any) -> Any:
+        if self._stepping or self._shown or not self._leading:
+            return method(self, *arguments)
+        return self._all_do(method.__name__, *arguments)
+
+    return act
 
 
 class Abandoned(Exception):
     """The first process has found a fault in the midst of a step, and tells of it."""
+
+
+class HandedOutAnew(Exception):
+    """A fix in Python has moved points at the start of a step: others have them now."""
 
 
 class Ranks(Simulation):
@@ -77,15 +96,15 @@ class Ranks(Simulation):
         self._handed_out = -1  # the version of the whole that the parts have
         self._leading = False
         self._stepping = False  # arrays are those of the part
-        self._at_work = False  # steps are taken
         self._joint = False  # all processes do the same, and wait for each other
         self._kept: dict[str, np.ndarray] = {}
         self._ordered: list[Ordered] = []  # own points, while pieces of all are looked at
         self._prepared = False
         self._bare = False
         super().__init__(hub, previous)
-        # Those that follow get their points from the first.
-        self._bare = self.follows and previous is None
+        # Nobody has points yet: each makes those of a share when a run begins.
+        self._bare = previous is None
+        self._shown = not self._bare
         self._call = address_of_python(self._answer, CALL)
         self._parted = self._empty_part()
         self._work = Work(len(self._whole.blocks))
@@ -96,11 +115,13 @@ class Ranks(Simulation):
     @property
     def setup(self) -> Setup:
         """The whole scene. It is gathered first where steps were taken since."""
-        if self._bare:
+        if self._bare and self._leading:
+            self._see_parts()
+        elif self._bare:
             # Before the first run a script asks for the points: of all processes alike.
-            self._bare = False
             whole, self.tiles = lower(self.hub)
-            self._whole = whole._replace(control=self.control, contact=self._whole.contact)
+            self._whole = whole._replace(control=self.control, contact=self.contact)
+            self._bare, self._shown = False, True
         if not self._shown:
             if self._leading:
                 self._together("gather")
@@ -118,6 +139,21 @@ class Ranks(Simulation):
         """The arrays that steps work on."""
         return self._part if self._stepping else self.setup
 
+    @property
+    def kin(self) -> NamedTuple:
+        """The kinematics."""
+        return self._whole.kin
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The kinds of points."""
+        return self._whole.blocks
+
+    @property
+    def contact(self) -> Any:
+        """How solids touch."""
+        return self._whole.contact
+
     def sort(self) -> None:
         """Sort the points by tile."""
         if self._stepping:
@@ -125,18 +161,12 @@ class Ranks(Simulation):
             self._account()
             self._part = self._parted.tiles.migrate(self._part, self._learn())
             self._parted.tiles.sort(self._part)
-        elif self._at_work:
-            raise ScriptError(
-                "a fix in Python moves points at the start of a step, which several processes "
-                "cannot share",
-                hint="one process, and as many threads as there are cores",
-            )
         else:
             super().sort()
             self._handed_out = -1
 
     def _lowered(self, state: State | None) -> tuple[Setup, Tiles]:
-        return lower(self.hub, state, points=self.crew.leads or state is not None)
+        return lower(self.hub, state, ids=None if state is not None else (0, 1))
 
     def _empty_part(self) -> SimpleNamespace:
         """The part of this process without points, with nodes and buffers of its own."""
@@ -197,11 +227,10 @@ class Ranks(Simulation):
                 # In the midst of what all do together: the others would wait for ever.
                 self.crew.amid = True
             else:
-                more = well and self.hub.interpreter.has_more
-                self.crew.told((OVER, well, self._prepared, more, self.hub.values.array))
-                if self._prepared and more:
-                    self._shown = False
-                    self.gather(everywhere=True)
+                if well and self.hub.interpreter.has_more and not self._bare:
+                    self._see_parts()
+                deleted = np.flatnonzero(~self.present)
+                self.crew.told((OVER, well, deleted, self.hub.values.array))
 
     def _meet(self) -> None:
         """See that all processes are about to do the same run."""
@@ -231,12 +260,11 @@ class Ranks(Simulation):
         while True:
             what, *arguments = self.crew.told()
             if what == OVER:
-                well, stepped, more, values = arguments
+                well, deleted, values = arguments
                 hub.values.array[:] = values
+                self.present[deleted] = False
                 if not well:
                     raise Quit
-                if stepped and more:
-                    self.gather(everywhere=True)
                 return
             try:
                 with suppress(Abandoned):
@@ -263,38 +291,50 @@ class Ranks(Simulation):
         if self.threads > 1:
             numba.set_num_threads(self.threads)
         self.begun = begun
-        self._let_go()
         self._prepare_hooks()
-        self.hub.update.method.begin(self.hub, self._whole.contact)
+        self.hub.update.method.begin(self.hub, self.contact)
+
+    def _see_prepared(self) -> None:
+        """Have all that follow made ready."""
+        if not self._prepared:
+            self._tell("prepare", self.begun)
+            self._prepared = True
 
     # --- handing out and gathering ----------------------------------------------------------------
 
     def _let_go(self) -> None:
-        """From here on the whole is with the first alone."""
-        self._bare = False
+        """From here on the parts alone have the present state."""
+        self._shown = False
         self._whole = self._whole._replace(
             blocks=tuple(b._replace(points=sized(b.points, 0)) for b in self._whole.blocks)
         )
 
     def _see_parts(self) -> None:
         """Hand out the whole where the parts do not have its present state."""
-        if not self._prepared:
-            self._tell("prepare", self.begun)
-            self._prepared = True
         if self._handed_out == self.version:
+            return
+        if self._bare:
+            self._together("fill")
+            self._handed_out = self.version
             return
         whole = self.setup
         clock = whole.control.clock[0]
         covered = all(in_tiles(b.tiling) == b.points.mass.size for b in whole.blocks)
         if clock.drift > clock.drift_limit or not covered:
             super().sort()
-        tiles = self._parted.tiles
-        tiles.share_out(work_of(tiles.points_in(whole.blocks), self._work.costs))
-        nodes = numbers(whole.spans)
-        memory = [one[nodes] for one in self._memory()]
-        shares = [self._share_of(whole, rank) for rank in range(self.crew.size)]
-        self._together("take", tiles.cuts, nodes, memory, shares=shares)
+        self._together("take", *self._cut(), shares=self._shares())
         self._handed_out = self.version
+
+    def _cut(self) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+        """Share the tiles of the whole out: where they are cut; nodes, and what these remember."""
+        tiles = self._parted.tiles
+        tiles.share_out(work_of(tiles.points_in(self._whole.blocks), self._work.costs))
+        nodes = numbers(self._whole.spans)
+        return tiles.cuts, nodes, [one[nodes] for one in self._memory()]
+
+    def _shares(self) -> list[dict[str, np.ndarray]]:
+        """What each process has of the whole."""
+        return [self._share_of(self._whole, rank) for rank in range(self.crew.size)]
 
     def _share_of(self, s: Setup, rank: int) -> dict[str, np.ndarray]:
         """The points and tiles that a process is to have of those in `s`, by name."""
@@ -303,6 +343,18 @@ class Ranks(Simulation):
         for k, block in enumerate(s.blocks):
             found |= _share(k, block, own)
         return found
+
+    def fill(self) -> None:
+        """Make the points of a share of the ids, and hand them over to whose tiles they are in."""
+        rank, size = self.crew.rank, self.crew.size
+        found, _ = lower(self.hub, ids=(self.count * rank // size, self.count * (rank + 1) // size))
+        blocks = zip(self._part.blocks, found.blocks, strict=True)
+        part = self._part._replace(
+            blocks=tuple(own._replace(points=block.points) for own, block in blocks)
+        )
+        self._part = self._parted.tiles.migrate(part, self._work.costs)
+        self._parted.tiles.sort(self._part)
+        self._bare = False
 
     def take(
         self, cuts: np.ndarray, nodes: np.ndarray, memory: list, shares: list | None = None
@@ -435,6 +487,7 @@ class Ranks(Simulation):
         """Tiles and nodes of the whole from those of all."""
         whole = self._whole
         for k, block in enumerate(whole.blocks):
+            block.tiling.count[1] = 1 if self.tiles.direct else SHARES
             _join_tilings(block.tiling, [part["tiling"][k] for part in parts])
         self.tiles.empty_nodes(whole)
         self.tiles.lay_out(whole)
@@ -449,25 +502,85 @@ class Ranks(Simulation):
 
     # --- steps ------------------------------------------------------------------------------------
 
+    def _all_do(self, name: str, *arguments: Any) -> Any:
+        """Have each process call one of its methods for its part; what the first finds."""
+        self._see_parts()
+        clock = self.control.clock.view(np.ndarray)
+        found = self._together("do", name, self.control.values, clock, arguments)
+        if name in CHANGING:
+            self._handed_out = self.version
+        return found
+
+    def do(self, name: str, values: np.ndarray, clock: np.ndarray, arguments: tuple) -> Any:
+        """Call a method for the part of this process, with these values and this clock."""
+        self.control.values[:] = values
+        self.control.clock.view(np.ndarray)[:] = clock
+        with self._steps():
+            found = getattr(self, name)(*arguments)
+        if name in CHANGING:
+            self._let_go()
+        return found
+
     def advance(self, count: int) -> int:
         """Take up to `count` steps, all processes together; DONE, or why it stopped."""
-        self._see_parts()
-        return self._together("go", count, self.control.values, self.control.clock.view(np.ndarray))
-
-    def go(self, count: int, values: Any = None, clock: Any = None) -> int:
-        """Take the steps of this process, from these values and this clock."""
-        if values is not None:
-            self.control.values[:] = values
-            self.control.clock.view(np.ndarray)[:] = clock
-        with self._steps():
+        if self._stepping:
             if abs(self.step - self._learned_at) >= LEARN_EVERY and not self._parted.tiles.direct:
                 self._rebalance()
             self._counted_at = self.step
             self._work.pause()
             status = super().advance(count)
             self._account()
-        self._shown = False
-        return status
+            return status
+        self._see_prepared()
+        return self._all_do("advance", count)
+
+    def set_initial(self, ID: str) -> None:
+        """Let the fix `ID` set the state that a run begins with."""
+        if self._stepping or not self.hub.fixes[ID].point_by_point:
+            super().set_initial(ID)
+        else:
+            self._all_do("set_initial", ID)
+
+    begin_to_look = by_all(Simulation.begin_to_look)
+
+    @by_all
+    def measure(self) -> None:
+        """Measure the rate of the fastest point."""
+        super().measure()
+        if self._stepping:
+            self._agree((), ("rate",))
+
+    @by_all
+    def measure_heat(self) -> None:
+        """Measure the lowest and highest temperatures of all points."""
+        super().measure_heat()
+        if self._stepping:
+            self._heat()
+
+    fastest = by_all(Simulation.fastest)
+    motions = by_all(Simulation.motions)
+
+    @by_all
+    def counts(self) -> list[int]:
+        """How many points each block has."""
+        return self.of_all(np.array(super().counts())).tolist()
+
+    def total(self, name: str, group: Any = None) -> float:
+        """What all points, or those of a group, have together; without rounding."""
+        return self.total_of(name, None if group is None or group.all else group.id)
+
+    @by_all
+    def total_of(self, name: str, ID: str | None) -> float:
+        """The same, by the ID of the group."""
+        return super().total(name, None if ID is None else self.hub.groups[ID])
+
+    def of_all(self, numbers: np.ndarray) -> np.ndarray:
+        """Sums over all processes, where each looks at its part."""
+        return self.crew.added(numbers) if self._stepping else numbers
+
+    def most(self, numbers: np.ndarray) -> np.ndarray:
+        """The largest of each number of all processes, where each looks at its part."""
+        return self.crew.largest(numbers) if self._stepping else numbers
 
     def _account(self) -> None:
         """Take note of the steps so far; what comes before the next is not counted."""
@@ -521,6 +634,7 @@ class Ranks(Simulation):
 
     def compile(self) -> None:
         """Have the loop over the steps compiled now, by all processes."""
+        self._see_prepared()
         self._see_parts()
         self.compile_part()
         self._tell("compile_part")  # and find on disk what has been compiled
@@ -530,54 +644,63 @@ class Ranks(Simulation):
         with self._steps():
             super().compile()
 
+    def _advance(self, count: int) -> int:
+        target = self.step + count
+        while True:
+            try:
+                return super()._advance(target - self.step)
+            except HandedOutAnew:
+                self.taken_up = True
+
     def act(self, function: Callable[[Setup], None], _: Setup) -> None:
         """In the midst of a step: the first acts on the whole, and all take over what it did."""
         self.gather()
         crew, control = self.crew, self.control
-        if not crew.leads:
-            if (told := crew.told()) is None:
-                raise Abandoned
-            self._take_back(*told, crew.handed_out(None))
-            return
-        self._stepping = False
+        if crew.leads:
+            told = self._act(function)
+            crew.told(told)
+        elif (told := crew.told()) is None:
+            raise Abandoned
+        what, values, clock, *arguments = told
+        control.values[:] = values
+        control.clock.view(np.ndarray)[:] = clock
+        getattr(self, what)(*arguments, shares=self._shares() if crew.leads else None)
+        if what == "take":
+            raise HandedOutAnew
+
+    def _act(self, function: Callable[[Setup], None]) -> tuple:
+        """Act on the whole; what the others are to do then, and with what."""
+        self._stepping, sorts = False, self.tiles.sorts
         try:
             function(self._whole)
         except BaseException:
-            crew.told(None)
+            self.crew.told(None)
             self._joint = False  # the others know
             raise
         self._stepping = True
-        whole = self._whole
-        nodes = numbers(whole.spans)
-        told = (
-            control.values, control.clock.view(np.ndarray), nodes,
-            [array[nodes] for _, array in of_nodes(whole)],
-        )  # fmt: skip
-        crew.told(told)
-        shares = [self._share_of(whole, rank) for rank in range(crew.size)]
-        self._take_back(*told, crew.handed_out(shares))
+        now = self.control.values, self.control.clock.view(np.ndarray)
+        if self.tiles.sorts > sorts:
+            return "take", *now, *self._cut()
+        nodes = numbers(self._whole.spans)
+        return "take_back", *now, nodes, [array[nodes] for _, array in of_nodes(self._whole)]
 
-    def _take_back(
-        self, values: np.ndarray, clock: np.ndarray, nodes: np.ndarray, rows: list, share: list
-    ) -> None:
+    def take_back(self, nodes: np.ndarray, rows: list, shares: list | None = None) -> None:
         """Put what the first has changed into the arrays that a step is at work on."""
-        s = self._part
-        self.control.values[:] = values
-        self.control.clock.view(np.ndarray)[:] = clock
+        s, found = self._part, self.crew.handed_out(shares)
         here = np.isin(nodes, numbers(s.spans))
-        for (_, array), found in zip(of_nodes(s), rows, strict=True):
-            array[nodes[here]] = found[here]
+        for (_, array), own in zip(of_nodes(s), rows, strict=True):
+            array[nodes[here]] = own[here]
         for k, block in enumerate(s.blocks):
             for name, array in arrays_of(block.points):
-                array[...] = share[f"points/{k}/{name}"]
+                array[...] = found[f"points/{k}/{name}"]
 
     @contextmanager
     def _steps(self) -> Iterator[None]:
-        self._stepping = self._at_work = True
+        self._stepping = True
         try:
             yield
         finally:
-            self._stepping = self._at_work = False
+            self._stepping = False
 
     def _answer(self, what: int, a: int, b: int) -> int:
         """What kernels ask of the other processes (karamelo_py.kernels.ranks)."""

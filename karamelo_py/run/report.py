@@ -97,9 +97,9 @@ def nodes_in_use(s: Setup) -> int:
 
 def bytes_per_point(simulation: Simulation) -> int:
     """Bytes of all fields of a point, the mean over the points of all kinds."""
-    blocks = simulation.setup.blocks
-    total = sum(sum(size for *_, size in point_fields(b)) * len(b.points.id) for b in blocks)
-    return round(total / max(1, sum(len(b.points.id) for b in blocks)))
+    counts = simulation.counts()
+    of_one = [sum(size for *_, size in point_fields(block)) for block in simulation.blocks]
+    return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
 
 def materials(hub: Hub, block: Any) -> list[Material]:

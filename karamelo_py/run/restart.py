@@ -70,8 +70,10 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
     import h5py
 
     path = path_of(hub, file)
-    if hub.settings.crew is not None and not hub.settings.crew.leads:
-        return path
+    if hub.settings.crew is not None and not within:
+        _ = hub.simulation.setup  # of all processes together
+        if not hub.settings.crew.leads:
+            return path
     arrays: list[np.ndarray] = []
     interpreter = hub.interpreter
     content = {
@@ -288,7 +290,9 @@ def described(hub: Hub) -> dict[str, str]:
         "boundary": update.boundary,
     }
     for solid in hub.solids.values():
-        where = zlib.crc32(np.ascontiguousarray(solid.x0).tobytes())
+        where = 0
+        for _, x in solid.pieces():
+            where = zlib.crc32(np.ascontiguousarray(x).tobytes(), where)
         kind = "-".join(type(part).__name__ for part in _parts_of(solid.material.law))
         words[f"solid '{solid.id}'"] = f"{solid.count} points of {kind}, {where:08x}"
     return words

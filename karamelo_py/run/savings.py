@@ -222,7 +222,7 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
     """In how many equal layers across direction k the points lie; 0 where these differ."""
     most = 0
     for solid in hub.solids.values():
-        if not len(solid.x0):
+        if not solid.count:
             continue
         places = np.rint(solid.x0 * (1e6 / solid.h)).astype(np.int64)
         across, counts = np.unique(places[:, k], return_counts=True)

@@ -142,6 +142,7 @@ class SharedTiles(Tiles):
 
         def parts(rank: int) -> list[list[np.ndarray]]:
             return [
+                # Contiguous, unlike what a mask gives.
                 [np.compress(to == rank, array, axis=-1) for _, array in arrays_of(block.points)]
                 for block, to in zip(s.blocks, own, strict=True)
             ]

@@ -46,7 +46,6 @@ from karamelo_py.kernels.step import (
 from karamelo_py.kernels.sweep import Serial, Threaded, Visit, sweep_nodes
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat
 from karamelo_py.output.fields import PIECE
-from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, law_kind, with_stress
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.by_id import ById
@@ -59,11 +58,12 @@ from karamelo_py.run.lowering import (
     thread_count,
     warms_by_friction,
 )
+from karamelo_py.run.motion import Motion, motions
 from karamelo_py.run.stable import ruling_limit, shares_of_limits
 from karamelo_py.run.state import changing, take_tiling
 from karamelo_py.run.tiles import Tiles, in_tiles, used
 from karamelo_py.run.trial import try_parts
-from karamelo_py.run.watch import internal_energy, unknown_heat, unknown_work
+from karamelo_py.run.watch import unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
 from karamelo_py.script.errors import ScriptError
@@ -147,6 +147,9 @@ def _(hooks, stage, target, s):
 
 @at_points.on(PythonHooks)
 def _(hooks, stage, then, s):
+    if stage == INITIAL_INTEGRATE and hooks.simulation.taken_up:
+        hooks.simulation.taken_up = False
+        return
     at_points(hooks.compiled, stage, then, s)
     if stage == INITIAL_INTEGRATE:
         hooks.simulation.clear_forces()
@@ -197,6 +200,7 @@ class Simulation(ById):
         self.mapped = False  # whether the nodes show a state of this simulation
 
     processes: ClassVar[dict[str, str]] = {}  # what a banner says of those that share the scene
+    taken_up = False  # a step goes on whose first moment has been, with other arrays
     follows = False  # another process says what this one does in a run
 
     @contextmanager
@@ -209,9 +213,9 @@ class Simulation(ById):
         function(s)
 
     @property
-    def stepped(self) -> Setup:
-        """The arrays that steps work on."""
-        return self.setup
+    def contact(self) -> Any:
+        """How solids touch."""
+        return self.setup.contact
 
     def _lowered(self, state: State | None) -> tuple[Setup, Tiles]:
         """The arrays of the whole scene, with the state of points that exist."""
@@ -313,8 +317,7 @@ class Simulation(ById):
     @property
     def bounces(self) -> int:
         """How often points were reflected at the edge of the domain."""
-        counts = self.declared(Bounces)
-        return 0 if counts is None else int(counts.sum())
+        return int(self.total("bounces"))
 
     def clear_forces(self) -> None:
         """Points bear no force of fixes, until these say so anew."""
@@ -341,7 +344,7 @@ class Simulation(ById):
         self._choose_dt()
         begun_before = len(self._begun)
         self._prepare_hooks()
-        update.method.begin(self.hub, self.setup.contact)
+        update.method.begin(self.hub, self.contact)
         self._choose_dt()
         if not np.isfinite(self.dt):
             raise ScriptError(
@@ -377,8 +380,7 @@ class Simulation(ById):
 
     def _watch_energy(self, begun_before: int) -> None:
         """Begin to watch the balance of energy, or go on where nothing was set since."""
-        s = self.setup
-        clock = s.control.clock[0]
+        clock = self.control.clock[0]
         clock.watch_energy = int(not unknown_work(self.hub))
         set_anew = len(self._begun) > begun_before or bool(self._first_fixes)
         anew = not self.followed or set_anew
@@ -386,24 +388,30 @@ class Simulation(ById):
         if anew:
             self.told_of_growth = False
         if clock.watch_energy:
-            mass = sum(float(block.points.mass.sum()) for block in s.blocks)
-            strain = COARSE * float(np.finfo(s.nodes.sums.dtype).eps)
-            clock.energy_floor = max(ROUND_OFF, strain**2) * mass * float(clock.rate) ** 2
-            clock.born_with = internal_energy(s.blocks)
             # Velocities belong to half a step before, stresses to the share strained before.
             level = 0.5 + getattr(self.hub.update.scheme, "strained_before", 0.0)
-            self._see_tiles()
-            begin_to_look(s, level, anew)
+            self.begin_to_look(level, anew)
         clock.watch_heat = int(self.hub.update.thermal and not unknown_heat(self.hub))
         if clock.watch_heat and anew:
-            measure_heat(s)
+            self.measure_heat()
             clock.coldest, clock.hottest = clock.T_low, clock.T_high
 
-    def _see_tiles(self) -> None:
-        """Energies are summed by tile: sort the points where they are not in tiles."""
-        if any(in_tiles(block.tiling) != block.points.mass.size for block in self.setup.blocks):
+    def begin_to_look(self, level: float, anew: bool) -> None:
+        """Measure the energies of all points, which the watch over them starts from."""
+        s = self.stepped
+        clock = s.control.clock[0]
+        strain = COARSE * float(np.finfo(s.nodes.sums.dtype).eps)
+        clock.energy_floor = max(ROUND_OFF, strain**2) * self.total("mass") * float(clock.rate) ** 2
+        clock.born_with = self.total("born with")
+        # Energies are summed by tile.
+        if any(in_tiles(block.tiling) != block.points.mass.size for block in s.blocks):
             self.sort()
             self.mapped = False
+        begin_to_look(s, level, anew)
+
+    def measure_heat(self) -> None:
+        """Measure the lowest and highest temperatures of all points."""
+        measure_heat(self.stepped)
 
     def go_on(self, end_time: float, halvings: int) -> None:
         """In place of `begin`: go on with a run whose state was put into the arrays.
@@ -416,7 +424,7 @@ class Simulation(ById):
             numba.set_num_threads(self.threads)
         update, clock = self.hub.update, self.control.clock[0]
         self._prepare_hooks()
-        update.method.begin(self.hub, self.setup.contact)
+        update.method.begin(self.hub, self.contact)
         other_end, clock.end_time = clock.end_time != end_time, end_time
         over_limit = clock.over_limit
         if self._ask_for_steps(halvings):
@@ -429,9 +437,23 @@ class Simulation(ById):
     def _choose_dt(self) -> None:
         if self._measured != self.version:
             # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
-            measure(self.setup)
+            self.measure()
             self._measured = self.version
         choose_dt(self.control)
+
+    def measure(self) -> None:
+        """Measure the rate of the fastest point."""
+        measure(self.stepped)
+
+    def fastest(self) -> float:
+        """The largest component of the velocities of all points."""
+        blocks = self.stepped.blocks
+        own = max((float(np.abs(b.points.v).max(initial=0)) for b in blocks), default=0.0)
+        return float(self.most(np.array([own]))[0])
+
+    def motions(self) -> list[Motion]:
+        """How the solids lie and move."""
+        return motions(self)
 
     def sort(self) -> None:
         """Sort the points by tile."""
@@ -531,17 +553,22 @@ class Simulation(ById):
         at_once = [fix for fix in new if _sets_initial_state(fix)]
         for fix in at_once:
             # Nothing happens in a step before this hook: the state shows it from the start.
-            for view in self._views(fix):
-                fix.hooks()["initial_integrate"](view)
-                if view.moved:
-                    self.control.clock[0].drift = np.inf
-            self.version += 1
+            self.set_initial(fix.id)
         self._begun |= set(at_once)
         self._first_fixes = [fix for fix in new if fix not in at_once]
         self._first = None
         if self._first_fixes:
             together = [fix for fix in fixes if fix in lasting or fix in self._first_fixes]
             self._first = PythonHooks(self, together)
+
+    def set_initial(self, ID: str) -> None:
+        """Let the fix `ID` set the state that a run begins with."""
+        fix = self.hub.fixes[ID]
+        for view in self._views(fix):
+            fix.hooks()["initial_integrate"](view)
+            if view.moved:
+                self.control.clock[0].drift = np.inf
+        self.version += 1
 
     def _views(self, fix: Any) -> Iterator[PointsView]:
         """The points of a fix, in pieces where it looks at each on its own."""
@@ -551,7 +578,7 @@ class Simulation(ById):
         chosen = None if fix.group.all else np.zeros(self.count, np.bool_)
         if chosen is not None:
             chosen[fix.group.ids] = True
-        for block in self.setup.blocks:
+        for block in self.stepped.blocks:
             ids = block.points.id
             for first in range(0, len(ids), PIECE):
                 rows = np.arange(first, min(first + PIECE, len(ids)))

@@ -95,17 +95,17 @@ def ruling_limit(simulation: Any) -> str:
     ``viscosity`` that of waves which viscosity slows down, ``speed`` that of points which move
     faster than waves, ``light_nodes`` that of usl, and ``waves`` that of the others.
     """
-    s = simulation.setup
-    clock = s.control.clock[0]
+    control = simulation.control
+    clock = control.clock[0]
     if clock.fixed_dt > 0:
         return "set_dt"
     waves = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     of_waves, of_heat = clock.dt_factor * waves, clock.heat_factor * clock.heat_limit
-    if s.control.values[DT] < min(of_waves, of_heat) * (1 - 1e-9):
+    if control.values[DT] < min(of_waves, of_heat) * (1 - 1e-9):
         return "end"
     if of_heat < of_waves:
         return "conduction"
-    speed = max((float(np.abs(b.points.v).max(initial=0)) for b in s.blocks), default=0.0)
+    speed = simulation.fastest()
     if speed > 0.5 * clock.rate:
         return "speed"
     without = _speed_without_viscosity(simulation)
@@ -123,7 +123,7 @@ def _speed_without_viscosity(simulation: Any) -> float:
             law, viscous = law._replace(viscosity=Absent()), True
         if getattr(getattr(law, "strength", None), "mu", 0) > 0:
             law, viscous = law._replace(strength=law.strength._replace(mu=0.0)), True
-        kin = simulation.setup.kin
+        kin = simulation.kin
         squared = wave_speed_squared(law, kin, initial_state(law, kin, 1.0))
         fastest = max(fastest, sqrt(float(squared)))
     return fastest if viscous else 0.0

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
-from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.watch import BORNE, LOOKS
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
-from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run.lowering import warms_by_friction
@@ -48,20 +46,6 @@ def unknown_work(hub: Hub) -> str:
         if hub.update.thermal and can(solid.material.law, initial_heat):
             return "heat"
     return ""
-
-
-def internal_energy(blocks: tuple) -> float:
-    """Internal energy of the gases of a scene as they were made.
-
-    The stored energy counts from there; beside it alone, all that a gas does would be much.
-    """
-    total = 0.0
-    for points, laws, _ in blocks:
-        law = elastic_law(laws)
-        if can(law, taken_heat):
-            of_eos = np.array(initial_energy(law.eos, 1.0)[0]) * law.eos.specific_volume
-            total += float((points.mass * of_eos[points.material]).sum())
-    return total
 
 
 def unknown_heat(hub: Hub) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.scene.domain import CHUNK, require_grid
+from karamelo_py.scene.domain import require_grid
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.region import Region, look_up
 from karamelo_py.scene.solid import Solid
@@ -115,9 +115,8 @@ class ParticleGroup(Group):
         if solids is None:
             solids = tuple(self.hub.solids.values())
         for solid in sorted(set(solids), key=lambda solid: solid.first_id):
-            for start in range(0, solid.count, CHUNK):
-                inside = region.inside(solid.x0[start : start + CHUNK])
-                found.append(np.flatnonzero(inside) + (solid.first_id + start))
+            for start, x in solid.pieces():
+                found.append(np.flatnonzero(region.inside(x)) + (solid.first_id + start))
         return np.concatenate(found)
 
 

@@ -168,13 +168,23 @@ def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np
     Each chunk is an int64 array (m, d) with about CHUNK / `weight` rows, so that `weight` items
     for every position stay a bounded amount of memory however large the box is.
     """
-    counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
-    total = math.prod(counts)
+    for begin, end in chunks(first, last, weight):
+        yield positions(first, last, begin, end)
+
+
+def chunks(first: Sequence[int], last: Sequence[int], weight: int) -> list[tuple[int, int]]:
+    """The numbers of the first position of each chunk, and of that behind its last."""
+    total = math.prod(b - a + 1 for a, b in zip(first, last, strict=True))
     step = max(1, CHUNK // weight)
-    for start in range(0, total, step):
-        number = np.arange(start, min(start + step, total), dtype=np.int64)
-        index = np.empty((len(number), len(counts)), dtype=np.int64)
-        for axis in range(len(counts) - 1, -1, -1):
-            number, index[:, axis] = np.divmod(number, counts[axis])
-            index[:, axis] += first[axis]
-        yield index
+    return [(begin, min(begin + step, total)) for begin in range(0, total, step)]
+
+
+def positions(first: Sequence[int], last: Sequence[int], start: int, end: int) -> np.ndarray:
+    """Those with the numbers from `start` to before `end`."""
+    counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
+    number = np.arange(start, end, dtype=np.int64)
+    index = np.empty((len(number), len(counts)), dtype=np.int64)
+    for axis in range(len(counts) - 1, -1, -1):
+        number, index[:, axis] = np.divmod(number, counts[axis])
+        index[:, axis] += first[axis]
+    return index

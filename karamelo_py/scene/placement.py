@@ -2,12 +2,13 @@
 
 import itertools
 import math
+from bisect import bisect_right
 from typing import NamedTuple
 
 import numpy as np
 
 from karamelo_py.scene.domain import Domain
-from karamelo_py.scene.lattice import Lattice, boxes
+from karamelo_py.scene.lattice import Lattice, chunks, positions
 from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
 
@@ -21,7 +22,7 @@ class Placement(NamedTuple):
 
     Attributes
     ----------
-    x0 : ndarray (n, d)
+    x0 : ndarray (n, d), or Filled
         Positions.
     volume : float or ndarray (n,)
         Volumes; per unit thickness in 2D, per unit area in 1D, without the radius.
@@ -37,7 +38,7 @@ class Placement(NamedTuple):
         Corners of the initial domains that are no boxes.
     """
 
-    x0: np.ndarray
+    x0: "np.ndarray | Filled"
     volume: float | np.ndarray
     half_size: np.ndarray
     lo: np.ndarray
@@ -45,6 +46,63 @@ class Placement(NamedTuple):
     outside: float = 0
     shape: str = "box"
     corners: np.ndarray | None = None
+
+
+class Filled:
+    """Positions of the points that were kept in some cells: an array (n, d), made when asked for.
+
+    What is remembered is which of the places in the cells were kept, one bit for each, and nothing
+    where all were, or none.
+    """
+
+    def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
+                 places: np.ndarray):  # fmt: skip
+        self._cells = first, last
+        self.chunks = chunks(first, last, len(places))
+        self._corner, self._h, self._places = corner, h, places
+        self._kept: list[np.ndarray | None] = []
+        self._ends = [0]
+
+    def candidates(self, k: int) -> np.ndarray:
+        """All places (m, d) in the k-th chunk of cells."""
+        return self._in_cells(*self.chunks[k])
+
+    def _in_cells(self, begin: int, end: int) -> np.ndarray:
+        index = positions(*self._cells, begin, end)
+        centre = self._corner + (index + 0.5) * self._h
+        return (centre[:, None, :] + self._places).reshape(-1, len(self._corner))
+
+    def keep(self, kept: np.ndarray) -> None:
+        """Take these (m,) of the next chunk."""
+        count = int(np.count_nonzero(kept))
+        self._kept.append(np.packbits(kept) if 0 < count < len(kept) else None)
+        self._ends.append(self._ends[-1] + count)
+
+    def __len__(self) -> int:
+        return self._ends[-1]
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        begin, end, _ = rows.indices(len(self))
+        out = np.empty((max(end - begin, 0), len(self._corner)))
+        for k in range(bisect_right(self._ends, begin) - 1, len(self._kept)):
+            first, last = self._ends[k : k + 2]
+            if first >= end:
+                break
+            low, high = max(first, begin), min(last, end)
+            if low < high:
+                out[low - begin : high - begin] = self._some(k, low - first, high - first)
+        return out
+
+    def _some(self, k: int, low: int, high: int) -> np.ndarray:
+        """Of the points of the k-th chunk those from `low` to before `high`."""
+        start, bits, m = self.chunks[k][0], self._kept[k], len(self._places)
+        if bits is None:
+            found = np.arange(low, high)
+        else:
+            found = np.flatnonzero(np.unpackbits(bits))[low:high]
+        begin, end = int(found[0]) // m, int(found[-1]) // m + 1
+        x = self._in_cells(start + begin, start + end)
+        return x[low - begin * m : high - begin * m] if bits is None else x[found - begin * m]
 
 
 class CellPattern(NamedTuple):
@@ -162,24 +220,22 @@ def fill(
     pattern = cell_pattern(ppc, dimension, rule)
     even = pattern.sizes.ndim == 1
     places = pattern.places * h
-    chunks: list[np.ndarray] = []
+    x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
     numbers: list[np.ndarray] = []  # which point of the pattern each one is
     outside = 0.0
-    for index in boxes([int(i) for i in first], [int(i) for i in last], len(places)):
-        centre = corner + (index + 0.5) * h
-        x = (centre[:, None, :] + places).reshape(-1, dimension)
+    for k in range(len(x0.chunks)):
+        x = x0.candidates(k)
         kept = region.inside(x)
         in_domain = domain.contains(x)
         if counted:
             outside += _beyond_closed_sides(x[kept & ~in_domain], lo, hi, domain)
         kept &= in_domain
-        if kept.any():
-            chunks.append(x[kept])
-            if not even:
-                numbers.append(np.flatnonzero(kept) % len(places))
+        x0.keep(kept)
+        if not even:
+            numbers.append(np.flatnonzero(kept) % len(places))
     if reaches_out.any() and not counted:
         outside = math.inf
-    placed = placed._replace(x0=_joined(chunks, dimension), outside=outside)
+    placed = placed._replace(x0=x0, outside=outside)
     if even:
         return placed
     sizes = pattern.sizes[np.concatenate(numbers)] * h if numbers else np.empty((0, dimension))
@@ -199,15 +255,3 @@ def _beyond_closed_sides(x: np.ndarray, lo: np.ndarray, hi: np.ndarray, domain: 
             else:
                 within_open &= ~out
     return int(np.count_nonzero(beyond & within_open))
-
-
-def _joined(chunks: list[np.ndarray], dimension: int) -> np.ndarray:
-    """The chunks in one array; each is freed once copied, so that memory holds the points once."""
-    x0 = np.empty((sum(len(chunk) for chunk in chunks), dimension))
-    start = 0
-    chunks.reverse()
-    while chunks:
-        chunk = chunks.pop()
-        x0[start : start + len(chunk)] = chunk
-        start += len(chunk)
-    return x0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.points.laws import can, law_kind, specific_volume
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.scene.domain import Domain, require_domain
+from karamelo_py.scene.domain import CHUNK, Domain, require_domain
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.scene.region import look_up
@@ -43,8 +44,8 @@ class Solid:
         0 for the first solid made, and so on.
     first_id : int
         Number (from 0) of its first point; point ids are these numbers plus 1.
-    x0 : ndarray (n, d)
-        Reference positions.
+    places : ndarray (n, d), or Filled
+        Reference positions; of a slice of points they are made where they are not kept.
     volume0 : ndarray (n,)
         Initial volumes: per unit thickness in 2D, per unit area in 1D, per radian where the domain
         is axisymmetric. Read only, as is all that follows.
@@ -132,7 +133,7 @@ class Solid:
         ScriptError
             For none, for too many, or for points left of the axis of symmetry.
         """
-        x0, count = placement.x0, len(placement.x0)
+        count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
                 "the solid has no points: "
@@ -144,13 +145,14 @@ class Solid:
             raise ScriptError(f"the scene has more than {MAX_POINTS} points", argument="h")
         volume = np.asarray(placement.volume, float)
         if self.domain.axisymmetric:
-            self._check_radii(x0)
-            volume = volume * x0[:, 0]
+            radius = placement.x0[:][:, 0]
+            self._check_radii(radius)
+            volume = volume * radius
         # Equal volumes are stored once, however many points there are.
-        self.x0 = x0
+        self.places = placement.x0
         self.volume0 = np.broadcast_to(volume, (count,))
         self.mass = np.broadcast_to(volume / float(specific_volume(self.material.law)), (count,))
-        self.half_size = np.broadcast_to(placement.half_size, x0.shape)
+        self.half_size = np.broadcast_to(placement.half_size, (count, d))
         self.shape, self.corners = placement.shape, placement.corners
         self.lo, self.hi = placement.lo, placement.hi
         if placement.outside:
@@ -175,18 +177,28 @@ class Solid:
     @property
     def count(self) -> int:
         """Number of points."""
-        return len(self.x0)
+        return len(self.places)
+
+    @property
+    def x0(self) -> np.ndarray:
+        """(n, d) reference positions; of many points they are made anew each time."""
+        return self.places[:]
+
+    def pieces(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Reference positions, so many at a time, with the number of the first of them."""
+        for first in range(0, self.count, CHUNK):
+            yield first, self.places[first : first + CHUNK]
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Solid:
         """The solid that `argument` names."""
         return look_up(hub.solids, argument)
 
-    def _check_radii(self, x0: np.ndarray) -> None:
+    def _check_radii(self, radius: np.ndarray) -> None:
         # A point on the axis itself would have no mass.
-        if len(x0) and x0[:, 0].min() <= 0:
+        if len(radius) and radius.min() <= 0:
             raise ScriptError(
-                f"points at x = {x0[:, 0].min():g}: in an axisymmetric domain x is the radius, "
+                f"points at x = {radius.min():g}: in an axisymmetric domain x is the radius, "
                 "and points lie at x > 0",
                 argument=self.source,
                 expected=f"a {self.described().split()[0]} at x >= 0",
@@ -228,15 +240,25 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 def coinciding(a: Solid, b: Solid) -> bool:
     """Whether points of `a` lie where points of `b` are; of many points, a sample is looked at."""
-    if not len(a.x0) or not len(b.x0):
+    if not a.count or not b.count:
         return False
-    lo = np.maximum(a.x0.min(axis=0), b.x0.min(axis=0))
-    hi = np.minimum(a.x0.max(axis=0), b.x0.max(axis=0))
+    (low, high), (other_low, other_high) = _box(a), _box(b)
+    lo, hi = np.maximum(low, other_low), np.minimum(high, other_high)
     if (lo > hi).any():
         return False
-    inside = [x[((x >= lo) & (x <= hi)).all(axis=1)] for x in (a.x0, b.x0)]
-    sample = inside[0][:: max(1, len(inside[0]) // _SAMPLE)]
-    return bool(np.isin(_keys(sample, a.h), _keys(inside[1], a.h)).any())
+    of_a = np.concatenate([_within(x, lo, hi) for _, x in a.pieces()])
+    sample = _keys(of_a[:: max(1, len(of_a) // _SAMPLE)], a.h)
+    return any(np.isin(sample, _keys(_within(x, lo, hi), a.h)).any() for _, x in b.pieces())
+
+
+def _box(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest coordinates of points."""
+    lows, highs = zip(*((x.min(axis=0), x.max(axis=0)) for _, x in solid.pieces()), strict=True)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
+def _within(x: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
+    return x[((x >= lo) & (x <= hi)).all(axis=1)]
 
 
 def _keys(x: np.ndarray, h: float) -> np.ndarray:

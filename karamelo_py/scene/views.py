@@ -193,7 +193,7 @@ class PointsView(View):
         return points.x[1 - now if self._then else now]
 
     def _place(self, points: Any) -> np.ndarray:
-        return self._places(points)[: self._simulation.setup.kin.dimension]
+        return self._places(points)[: self._simulation.kin.dimension]
 
     @Shown
     def position(self) -> np.ndarray:
@@ -337,10 +337,15 @@ class PieceView(PointsView):
         """(n, d) positions; read only."""
         return self._gather(self._place)
 
+    @Shown
+    def reference_position(self) -> np.ndarray:
+        """(n, d) positions before the first step; read only."""
+        return self._simulation.x0_of(self.ids)
+
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
         """See `PointsView.set_velocity_gradient`."""
         simulation, points, rows = self._simulation, self._block.points, self._rows
-        s, d = simulation.setup, simulation.setup.kin.dimension
+        s, d = simulation.stepped, simulation.kin.dimension
         kept = field(points.fields, Moment)
         if kept is None:
             return

@@ -19,6 +19,7 @@ from karamelo_py.script.terms import Term, alike, applied, constant, is_short, t
 from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
+FIRST = frozenset(POINT_SEEDS[3:])  # places before the first step
 GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 

@@ -5,7 +5,7 @@ from functools import partial
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
-from karamelo_py.script.expressions import Expression
+from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.styles.fixes.formulas import evaluated, gradient, per_direction
 
 
@@ -46,7 +46,9 @@ class InitialVelocityParticles(Fix):
     def initial_integrate(self, points: PointsView) -> None:
         """Set the velocities."""
         v = points.velocity
-        x, x0 = points.position, points.reference_position
+        x = x0 = points.position
+        if any(formula is not None and formula.names & FIRST for formula in self.formulas):
+            x0 = points.reference_position
         for k, formula in enumerate(self.formulas):
             if formula is not None:
                 v[:, k] = evaluated(formula, self.hub, x, x0)

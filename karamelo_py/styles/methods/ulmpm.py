@@ -49,7 +49,7 @@ class ULMPM(Method):
                 for solid, leads in zip(solids, rigid, strict=True)
             ]
 
-        counts = [len(solid.x0) for solid in solids]
+        counts = [solid.count for solid in solids]
         force, torque = slots(force_on), slots(torque_on)
         return RigidBodies(
             force=np.repeat(np.array(force, np.int64), counts),

@@ -1,0 +1,99 @@
+"""How the solids of a scene lie and move: sums over their points, without the points."""
+
+from collections.abc import Iterator
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.kernels.totals import LIMBS, add_all, rounded
+from karamelo_py.output.fields import PIECE
+
+
+class Motion(NamedTuple):
+    """A solid with points.
+
+    Attributes
+    ----------
+    mass
+        Its mass.
+    centre, velocity
+        (d,) Of the centre of mass.
+    spread
+        (d, d) sum m X X, with X from the centre.
+    shear
+        (d, d) sum m X V, with X and V from those of the centre.
+    low, high, slow, fast
+        (d,) Least and largest coordinates and velocities of points.
+    """
+
+    mass: float
+    centre: np.ndarray
+    velocity: np.ndarray
+    spread: np.ndarray
+    shear: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    slow: np.ndarray
+    fast: np.ndarray
+
+    @property
+    def size(self) -> float:
+        """Half of the longest side of the box around it."""
+        return float((self.high - self.low).max()) / 2
+
+    @property
+    def spin(self) -> float:
+        """Angular velocity, of the polar moment of inertia."""
+        inertia = float(np.trace(self.spread))
+        turning = self.shear - self.shear.T
+        return float(np.linalg.norm(turning)) / np.sqrt(2) / inertia if inertia > 0 else 0.0
+
+    @property
+    def rate(self) -> float:
+        """Largest stretching of the gradient that is nearest to the velocities of all points."""
+        gradient = np.linalg.lstsq(self.spread, self.shear, rcond=None)[0]
+        return float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
+
+
+def motions(simulation: Any) -> list[Motion]:
+    """How all solids with points move, as all processes know it.
+
+    Each looks at its own points, so many at a time; sums are without rounding.
+    """
+    d, count = simulation.kin.dimension, len(simulation.hub.solids)
+    limbs = np.zeros((count, 1 + 2 * d + 2 * d * d, LIMBS), np.int64)
+    ends = np.full((count, 4 * d), -np.inf)
+    for k, m, x, v in _pieces(simulation, d):
+        xv = np.concatenate([x, v])
+        terms = [m, *(m * a for a in xv), *(m * a * b for a, b in product(x, xv))]
+        for row, values in enumerate(terms):
+            add_all(limbs[k], row, values)
+        ends[k] = np.maximum(ends[k], np.concatenate([xv.max(axis=1), -xv.min(axis=1)]))
+    limbs, ends = simulation.of_all(limbs), simulation.most(ends)
+    found = []
+    for own, end in zip(limbs, ends, strict=True):
+        mass, *sums = map(rounded, own)
+        if not mass > 0:
+            continue
+        mean = np.array(sums[: 2 * d]) / mass
+        moments = np.array(sums[2 * d :]).reshape(d, 2 * d) - mass * np.outer(mean[:d], mean)
+        high, fast, low, slow = end.reshape(4, d) * [[1], [1], [-1], [-1]]
+        found.append(
+            Motion(mass, mean[:d], mean[d:], moments[:, :d], moments[:, d:], low, high, slow, fast)
+        )
+    return found
+
+
+def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+    """Number of a solid, masses (n,), places and velocities (d, n) of some of its points."""
+    firsts = [solid.first_id for solid in simulation.hub.solids.values()]
+    for block in simulation.stepped.blocks:
+        points = block.points
+        for begin in range(0, len(points.id), PIECE):
+            own = slice(begin, begin + PIECE)
+            solid = np.searchsorted(firsts, points.id[own], side="right") - 1
+            for k in np.unique(solid):
+                here = solid == k
+                x, v = points.x[simulation.now, :d, own], points.v[:, own]
+                yield k, *(a[..., here].astype(float) for a in (points.mass[own], x, v))
