@@ -181,3 +181,16 @@ def test_points_moved_by_python(state_interpreted, tmp_path, method):
         2, "fix(c, python, all, shoves.carry)", *DUMPS, *MOVING, "run(14)", ppc=3, size=(0.3, 0.2)
     ).replace("method(ulmpm,", f"method({method},")
     assert shared(state_interpreted, tmp_path, with_files(script, "restart(5, r.*.h5)\n"), ranks=3)
+
+
+def test_a_load_by_a_reaction(state_interpreted, tmp_path):
+    """What a fix publishes is read within the next step; other sums wait for the end of the run."""
+    lines = (
+        "region(low, block, INF, INF, 0.25, 0.35)", "group(low, nodes, region, low, all)",
+        "fix(wall, velocity_nodes, low, NULL, 0)", "fix(g, body_force, all, 0, 3*wall_y - 9)",
+        "log_modify(custom, step, wall_y, g_y)", "set_output(3)", "dt_factor(0.4)", "run(12)",
+    )  # fmt: skip
+    script = block(2, *lines, size=(0.3, 0.2))
+    assert shared(state_interpreted, tmp_path, with_files(script), ranks=3)
+    log = (tmp_path / "parts" / "log.mpm").read_text(encoding="utf-8")
+    assert float(log.split()[-2]) != 0

@@ -20,7 +20,8 @@ from zlib import crc32
 import numpy as np
 
 from karamelo_py.compiler.compile import address_of_python
-from karamelo_py.kernels.arrays import Block, Nodes, Setup, Tiling, arrays_of
+from karamelo_py.compiler.formula import GLOBAL, UNIFORM
+from karamelo_py.kernels.arrays import DT, Block, Nodes, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import (
     CALL,
@@ -108,6 +109,8 @@ class Ranks(Simulation):
         self._call = address_of_python(self._answer, CALL)
         self._parted = self._empty_part()
         self._work = Work(len(self._whole.blocks))
+        self._at_once = False  # what fixes publish is added up in each step
+        self._due: set[int] = set()  # or these values, when the last is over
         self._counted_at = self._learned_at = self.step
 
     # --- the whole --------------------------------------------------------------------------------
@@ -528,8 +531,10 @@ class Ranks(Simulation):
                 self._rebalance()
             self._counted_at = self.step
             self._work.pause()
+            self._at_once = self._reads_totals()
             status = super().advance(count)
             self._account()
+            self._publish()
             return status
         self._see_prepared()
         return self._all_do("advance", count)
@@ -727,9 +732,31 @@ class Ranks(Simulation):
         self._parted.tiles.take()
 
     def _totals(self, first: int, count: int) -> None:
-        of_all = self.crew.added(self.control.totals[first : first + count])
+        rows = slice(first, first + count)
+        if first > WORK and not self._at_once:
+            self._due.update(range(first, first + count))
+            self.control.answer[:count] = self.control.values[rows]
+            return
+        of_all = self.crew.added(self.control.totals[rows])
         for k in range(count):
             self.control.answer[k] = rounded(of_all[k])
+
+    def _reads_totals(self) -> bool:
+        """Whether what fixes publish is read within steps."""
+        if self._python.by_stage or self._first is not None:
+            return True
+        code = getattr(self.hooks, "code", np.empty((0, 2), np.int64))
+        return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())
+
+    def _publish(self) -> None:
+        """Values of the last step become those of all: their totals are kept until the next."""
+        rows, values = sorted(self._due), self.control.values
+        self._due.clear()
+        if rows:
+            for row, total in zip(rows, self.crew.added(self.control.totals[rows]), strict=True):
+                values[row] = rounded(total)
+            for of, to in getattr(self._part.contact, "copies", ()):
+                values[to : to + 3] = values[of : of + 3]
 
     def _reports(self, *_: int) -> None:
         self._agree((), ("move", "new_move", "new_rate", "wrong"))
