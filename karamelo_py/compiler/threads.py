@@ -25,7 +25,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from karamelo_py.compiler import inlining
-from karamelo_py.compiler.compile import by_type, define, kernel, left
+from karamelo_py.compiler.compile import by_type, define, kernel, left, subkernel
 from karamelo_py.compiler.held import HeldTuple, address, at_address, held_type, hold
 
 
@@ -257,7 +257,9 @@ def _task_of(name: str, items: Any, lines: tuple, **names: Any) -> Callable:
     """A function of the address of these items, `a` in its lines, and of a number k."""
     held = HeldTuple(tuple(map(held_type, items)))
     task = define("arguments, k", "a = at(arguments)", *lines, at=at_address(held), **names)
-    task.__qualname__ = f"{name}.task"
+    # Another for other arguments: their types are not in the type of a task, and code of one name
+    # that other processes have kept is taken to be the same.
+    task.__qualname__ = f"{name}.task.{held.name}"
     return left(task)
 
 
