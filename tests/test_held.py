@@ -12,7 +12,7 @@ from karamelo_py.compiler import packed
 from karamelo_py.compiler.compile import entered, kernel, loop, subkernel
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.held import at_hand, held_type, hold, is_held
-from karamelo_py.compiler.threads import Serial, Threaded, shared_out
+from karamelo_py.compiler.threads import Serial, Threaded, by_team, new_team, shared_out
 
 
 class Pair(NamedTuple):
@@ -170,6 +170,37 @@ def test_each_number_is_done_once(mode):
     out = Pair(np.zeros(1000), np.zeros(1))
     _count_all(mode, out, 2.0)
     assert out.a.tolist() == [2.0 * k for k in range(1000)]
+
+
+def _count_often(mode, out, factor, times):
+    done = 0
+    for n in range(times):
+        # Loops of all lengths, also of nothing and of less than there are threads.
+        _counted(mode, n % 7, out, factor)
+        _counted(mode, out.a.size, out, factor)
+        done += 1
+    return done
+
+
+_often = by_team(_count_often, "out, factor, times")
+
+
+@loop
+def _often_from_python(mode, out, factor, times):
+    return _often(mode, out, factor, times)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_a_team_does_each_number_of_each_loop_once(threads):
+    """Also where a thread of the team never begins, since there are fewer than it has."""
+    numba.set_num_threads(min(2, config.NUMBA_NUM_THREADS))
+    team = new_team(threads)
+    for mode in (Threaded(team.ctypes.data), Threaded(), Serial()):
+        out = Pair(np.zeros(500), np.zeros(1))
+        for _ in range(2):
+            assert _often_from_python(mode, out, 2.0, 300) == 300
+        more = [sum(k < n % 7 for n in range(300)) for k in range(500)]
+        assert out.a.tolist() == [2 * (300 + more[k]) * 2.0 * k for k in range(500)]
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

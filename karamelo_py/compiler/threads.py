@@ -3,18 +3,29 @@
 Numba compiles a loop over threads in five functions, and takes the tuples that it works with apart
 and puts them together again in each. Here the arguments stay where they are; what is done with them
 is a function of where that is, and a number.
+
+Threads that sleep between two loops take as long to wake up as a small loop takes. A kernel of many
+loops is therefore run by a *team* (`by_team`): its first thread leads, and goes through the kernel;
+the others wait for loops of it, and whoever has time takes the next number of a loop. The leader
+waits for numbers that were taken, never for threads: one that another program keeps from running
+holds nobody up.
 """
 
 from __future__ import annotations
 
+import platform
+import sys
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+from llvmlite import ir
 from numba import prange, types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from karamelo_py.compiler import inlining
-from karamelo_py.compiler.compile import by_type, define, kernel, left
+from karamelo_py.compiler.compile import by_type, define, kernel, left, subkernel
 from karamelo_py.compiler.held import HeldTuple, address, at_address, held_type, hold
 
 
@@ -23,7 +34,9 @@ class Serial(NamedTuple):
 
 
 class Threaded(NamedTuple):
-    """All threads that Numba was given."""
+    """All threads that Numba was given; `team` is where what a team shares lies (`new_team`)."""
+
+    team: int = 0
 
 
 _TASK = types.none(types.intp, types.intp)  # where its arguments are, and a number
@@ -67,6 +80,189 @@ inlining.claim(_in_parallel.__qualname__, "kept")
 _in_parallel = kernel(_in_parallel, parallel=True, no_cpython_wrapper=True)
 
 
+# --- words that threads share ---------------------------------------------------------------------
+
+_I64 = ir.IntType(64)
+
+
+def _word(builder: Any, place: Any) -> Any:
+    return builder.inttoptr(place, _I64.as_pointer())
+
+
+@intrinsic
+def _read(typing_context, place):
+    """The word at an address; all is seen that was written before it was."""
+
+    def codegen(context, builder, signature, values):
+        return builder.load_atomic(_word(builder, values[0]), "acquire", 8)
+
+    return types.intp(types.intp), codegen
+
+
+@intrinsic
+def _write(typing_context, place, value):
+    """Write a word; who sees it sees all that was written before."""
+
+    def codegen(context, builder, signature, values):
+        builder.store_atomic(values[1], _word(builder, values[0]), "release", 8)
+        return context.get_dummy_value()
+
+    return types.none(types.intp, types.intp), codegen
+
+
+@intrinsic
+def _add(typing_context, place, value):
+    """Add to a word, which others may do, too."""
+
+    def codegen(context, builder, signature, values):
+        builder.atomic_rmw("add", _word(builder, values[0]), values[1], "acq_rel")
+        return context.get_dummy_value()
+
+    return types.none(types.intp, types.intp), codegen
+
+
+@intrinsic
+def _replaced(typing_context, place, old, new):
+    """Put `new` in the place of `old`; false if the word was another one."""
+
+    def codegen(context, builder, signature, values):
+        found = builder.cmpxchg(_word(builder, values[0]), *values[1:], "acq_rel", "acquire")
+        return builder.extract_value(found, 1)
+
+    return types.boolean(types.intp, types.intp, types.intp), codegen
+
+
+@intrinsic
+def _pause(typing_context, long):
+    """Wait a moment; if `long`, sleep."""
+
+    def codegen(context, builder, signature, values):
+        def call(name, result, *numbers):
+            kind = ir.FunctionType(result, [ir.IntType(32)] * len(numbers))
+            function = cgutils.get_or_insert_function(builder.module, kind, name)
+            builder.call(function, [ir.Constant(ir.IntType(32), number) for number in numbers])
+
+        with builder.if_else(values[0]) as (then, otherwise):
+            with then:
+                if sys.platform == "win32":
+                    call("Sleep", ir.VoidType(), 0)
+                else:
+                    call("usleep", ir.IntType(32), 10)
+            with otherwise:
+                if platform.machine().lower() in ("x86_64", "amd64"):
+                    call("llvm.x86.sse2.pause", ir.VoidType())
+        return context.get_dummy_value()
+
+    return types.none(types.boolean), codegen
+
+
+# --- teams ------------------------------------------------------------------------------------
+
+# Words, each in a line of the caches of its own.
+_STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH, _RESULT, _TICKETS = range(0, 9 * 64, 64)
+_WAITS, _LEADS, _ENDED = range(3)  # in _STATE
+_SHORT = 3000  # pauses, some 0.1 ms; then threads sleep, since others may need their cores
+_PATIENCE = 6000  # pauses until a thread does not wait for a leader any more
+_LEFT = (1 << 32) - 1  # of a ticket: how many numbers are left; above them the loop
+
+
+def new_team(threads: int) -> np.ndarray:
+    """What a team of so many threads shares; its address is that in `Threaded`."""
+    words = np.zeros((_TICKETS // 64 + threads, 8), np.int64)
+    words[_SIZE // 64, 0] = threads
+    return words
+
+
+@subkernel
+def _taken(ticket):
+    """Take one of the numbers that are left on a ticket: how many were left, 0 if none."""
+    while True:
+        word = _read(ticket)
+        if word & _LEFT == 0:
+            return 0
+        if _replaced(ticket, word, word - 1):
+            return word & _LEFT
+
+
+@subkernel
+def _take_part(team, k):
+    """Do what thread `k` gets of the loop of now, its own part first; how many numbers."""
+    size = _read(team + _SIZE)
+    mine = 0
+    for j in range(size):
+        part = (k + j) % size
+        ticket = team + _TICKETS + 64 * part
+        left = _taken(ticket)
+        while left > 0:
+            # As long as a number is not done, the loop stays that of now.
+            end = _read(team + _COUNT) * (part + 1) // size
+            _call(_read(team + _TASK_AT), _read(team + _ARGUMENTS), end - left)
+            mine += 1
+            left = _taken(ticket)
+    return mine
+
+
+@subkernel
+def _share(team, count, task, arguments):
+    """Let the team do a loop; its leader calls this."""
+    size = _read(team + _SIZE)
+    _write(team + _TASK_AT, task)
+    _write(team + _ARGUMENTS, arguments)
+    _write(team + _COUNT, count)
+    _write(team + _DONE, 0)
+    epoch = _read(team + _EPOCH) + 1
+    for part in range(size):
+        numbers = count * (part + 1) // size - count * part // size
+        _write(team + _TICKETS + 64 * part, ((epoch & _LEFT) << 32) | numbers)
+    _write(team + _EPOCH, epoch)
+    mine = _take_part(team, 0)
+    pauses = 0
+    while _read(team + _DONE) + mine < count:
+        _pause(pauses > _SHORT)
+        pauses += 1
+
+
+@subkernel
+def _serve(team, k):
+    """Take part in loops until the leader ends, if there is one."""
+    seen = -1
+    pauses = 0
+    while True:
+        state = _read(team + _STATE)
+        if state == _ENDED or (state == _WAITS and pauses > _PATIENCE):
+            return
+        epoch = _read(team + _EPOCH)
+        if state == _LEADS and epoch != seen:
+            seen = epoch
+            pauses = 0
+            mine = _take_part(team, k)
+            if mine > 0:
+                _add(team + _DONE, mine)
+        _pause(pauses > _SHORT)
+        pauses += 1
+
+
+@subkernel
+def _distribute(team, count, task, arguments):
+    """Do a loop: by the team that is at work, if one is, else by threads that begin for it."""
+    if team == 0 or _read(team + _STATE) != _LEADS:
+        _in_parallel(count, task, arguments)
+    elif count > 1:
+        _share(team, count, task, arguments)
+    elif count == 1:
+        _call(task, arguments, 0)
+
+
+def _task_of(name: str, items: Any, lines: tuple, **names: Any) -> Callable:
+    """A function of the address of these items, `a` in its lines, and of a number k."""
+    held = HeldTuple(tuple(map(held_type, items)))
+    task = define("arguments, k", "a = at(arguments)", *lines, at=at_address(held), **names)
+    # Another for other arguments: their types are not in the type of a task, and code of one name
+    # that other processes have kept is taken to be the same.
+    task.__qualname__ = f"{name}.task.{held.name}"
+    return left(task)
+
+
 def shared_out(function: Callable, parameters: str) -> Callable:
     """Make ``f(mode, count, ...)``: ``function(..., k)`` for each k below `count`.
 
@@ -83,18 +279,58 @@ def shared_out(function: Callable, parameters: str) -> Callable:
         if mode.instance_class is not Threaded:
             lines = "for k in range(count):", f"    function({parameters}, k)"
             return define(names, *lines, function=function)
-        held = HeldTuple(tuple(held_type(argument) for argument in arguments))
-        items = ", ".join(f"a[{k}]" for k in range(len(held)))
-        task = define(
-            "arguments, k", "a = at(arguments)", f"function({items}, k)",
-            at=at_address(held), function=function,
-        )  # fmt: skip
-        task.__qualname__ = f"{function.__qualname__}.task"
+        items = ", ".join(f"a[{k}]" for k in range(len(arguments)))
+        call = (f"function({items}, k)",)
         return define(
             names,
-            f"in_parallel(count, address_of(body), address(hold(({parameters}))))",
-            in_parallel=_in_parallel, address_of=_address_of, body=left(task),
-            address=address, hold=hold,
+            f"distribute(mode.team, count, address_of(body), address(hold(({parameters}))))",
+            distribute=_distribute, address_of=_address_of, address=address, hold=hold,
+            body=_task_of(function.__qualname__, arguments, call, function=function),
         )  # fmt: skip
 
     return loop
+
+
+def by_team(function: Callable, parameters: str) -> Callable:
+    """Make ``f(mode, ...)``: ``function(mode, ...)``, a whole number, by a team where there is one.
+
+    `parameters` are the names of what stands behind the mode.
+    """
+
+    def run(mode, *arguments):
+        return function(mode, *arguments)
+
+    inner = subkernel(function)
+
+    @by_type(run)
+    def _(mode, *arguments):
+        names = f"mode, {parameters}"
+        if mode.instance_class is not Threaded:
+            return define(names, f"return function({names})", function=inner)
+        items = ", ".join(f"a[{k}]" for k in range(1 + len(arguments)))
+        lines = (
+            "team = a[0].team",
+            "if k > 0:",
+            "    serve(team, k)",
+            "else:",
+            "    write(team + STATE, LEADS)",
+            f"    write(team + RESULT, function({items}))",
+            "    write(team + STATE, ENDED)",
+        )
+        words = {"STATE": _STATE, "LEADS": _LEADS, "ENDED": _ENDED, "RESULT": _RESULT}
+        body = _task_of(
+            function.__qualname__, (mode, *arguments), lines,
+            serve=_serve, write=_write, function=inner, **words,
+        )  # fmt: skip
+        return define(
+            names,
+            "team = mode.team",
+            f"if team == 0: return function({names})",
+            "write(team + STATE, WAITS)",
+            f"in_parallel(read(team + SIZE), address_of(body), address(hold(({names}))))",
+            "return read(team + RESULT)",
+            in_parallel=_in_parallel, address_of=_address_of, address=address, hold=hold,
+            read=_read, write=_write, body=body, function=inner, WAITS=_WAITS, SIZE=_SIZE, **words,
+        )  # fmt: skip
+
+    return run

@@ -22,6 +22,7 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.threads import by_team
 from karamelo_py.compiler.tuples import clear_first, record, subtract
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import (
@@ -739,7 +740,18 @@ def run_steps(scheme, visits, mode, s, hooks, count):
     return DONE
 
 
-advance = loop(run_steps)
+def _led(mode, scheme, visits, s, hooks, count):
+    return run_steps(scheme, visits, mode, s, hooks, count)
+
+
+shared(run_steps)
+_by_team = by_team(_led, "scheme, visits, s, hooks, count")
+
+
+@loop
+def advance(scheme, visits, mode, s, hooks, count):
+    """`run_steps`, by a team of threads where there are some."""
+    return _by_team(mode, scheme, visits, s, hooks, count)
 
 
 @loop

@@ -10,6 +10,7 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.threads import Serial, Threaded, new_team
 from karamelo_py.kernels.arrays import (
     DT,
     INITIAL_INTEGRATE,
@@ -43,7 +44,7 @@ from karamelo_py.kernels.step import (
     step_size,
     sweep,
 )
-from karamelo_py.kernels.sweep import Serial, Threaded, Visit, sweep_nodes
+from karamelo_py.kernels.sweep import Visit, sweep_nodes
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat
 from karamelo_py.output.fields import PIECE
 from karamelo_py.points.laws import can, law_kind, with_stress
@@ -186,7 +187,8 @@ class Simulation(ById):
         if state is not None:
             self.present[: state.count] = state.present
         self.threads = thread_count(hub, self.count)
-        self.mode = Threaded() if self.threads > 1 else Serial()
+        self._team = new_team(self.threads)
+        self.mode = Threaded(self._team.ctypes.data) if self.threads > 1 else Serial()
         self.version = 0  # grows when fields change without a step
         self._measured = -1  # the version whose fastest point is known
         # Fixes of the first step that have acted: not again when the scene is lowered anew.
