@@ -217,7 +217,7 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
 @needs_mpi
 @pytest.mark.parametrize(
     "function",
-    [pytest.param("ranks.Ranks.go", marks=pytest.mark.full), "shares.SharedTiles.give"],
+    [pytest.param("ranks.Ranks._advance", marks=pytest.mark.full), "shares.SharedTiles.give"],
 )
 def test_only_one_fails(tmp_path, function):
     """In its steps, and in what kernels ask for: the others end, too."""

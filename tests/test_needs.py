@@ -20,8 +20,9 @@ from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import advance
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.report import bytes_per_point, node_fields, point_fields
+from karamelo_py.run.report import bytes_per_point
 from karamelo_py.run.savings import savings
+from karamelo_py.run.sizes import node_fields, point_fields
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit
 

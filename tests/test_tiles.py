@@ -10,7 +10,7 @@ import pytest
 
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.report import nodes_in_use
+from karamelo_py.run.sizes import nodes_in_use
 from karamelo_py.scene.hub import Hub
 
 # Two bodies that pass each other, at 0.7 of a cell a step and more: sorted at every other one.

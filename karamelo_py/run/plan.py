@@ -6,15 +6,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import Setup, Tiling
+from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
 from karamelo_py.kernels.step import Fused, Staged, step
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.run.crew import Crew
 from karamelo_py.run.shares import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.sizes import memory_of
 from karamelo_py.run.stable import sparse
-from karamelo_py.run.tiles import SHARES, Boxes, chosen_of, numbers
+from karamelo_py.run.tiles import SHARES, Boxes, buffers_of, chosen_of, numbers, summed
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 
@@ -30,6 +31,8 @@ class Share(NamedTuple):
         Processes that it passes something on to.
     given
         Bytes that it passes on in a step.
+    memory
+        Bytes that it touches in steps, and of a copy of its last good state.
     """
 
     points: int
@@ -37,6 +40,7 @@ class Share(NamedTuple):
     nodes: int
     others: int
     given: int
+    memory: int
 
 
 class _Sums(NamedTuple):
@@ -82,7 +86,7 @@ def bytes_of_node(simulation: Simulation) -> int:
     control = s.control
     kept = control.values.copy(), control.clock.copy(), control.totals.copy()
     visits = Staged() if simulation.staged else Fused()
-    step(simulation.hub.update.scheme, visits, sums, s, simulation.hooks, True)
+    step(simulation.hub.update.scheme, visits, sums, s, NoHooks(), True)
     control.values[:], control.clock[:], control.totals[:] = kept
     total = 0
     for what, nodes in sums.found:
@@ -108,20 +112,27 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
     boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
     for tiles in of_all:
         tiles.crew.others = boxes
-    return [_share(part, tiles, per_node) for part, tiles in zip(parts, of_all, strict=True)]
+    return [
+        _share(simulation, part, tiles, per_node) for part, tiles in zip(parts, of_all, strict=True)
+    ]
 
 
-def _share(s: Setup, tiles: SharedTiles, per_node: int) -> Share:
+def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) -> Share:
     none = s.nodes._replace(
         sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
     )  # boxes of nothing: only their places matter
-    tiles.lay_out(s._replace(buffers=tiles.empty_buffers(none)))
+    buffers = tiles.empty_buffers(none)
+    tiles.lay_out(s._replace(buffers=buffers))
+    given = [array for one in buffers_of(simulation.setup) for array in summed(one.nodes)]
+    row = sum(array.itemsize * array.shape[1] for array in given)
+    boxes = 0 if tiles.direct else row * len(buffers.nodes.sums)
     tilings = [block.tiling for block in s.blocks]
     points = sum(int(occupied(one)[1].sum()) for one in tilings)
     rows = sum(map(len, tiles.given.values()))
     count = sum(int(one.count[0]) for one in tilings)
     nodes = len(numbers(s.spans))
-    return Share(points, count, nodes, len(tiles.given), rows * per_node)
+    memory = sum(memory_of(simulation, s, boxes))
+    return Share(points, count, nodes, len(tiles.given), rows * per_node, memory)
 
 
 def _part(s: Setup, own: np.ndarray) -> Setup:
@@ -145,7 +156,11 @@ def told(simulation: Simulation, ranks: int) -> list[str]:
     columns = np.array(shares)
     mean = columns[:, 0].mean()
     lines = [f"shared out among {ranks} processes{'':<6}least     largest"]
-    words = ("points", "tiles", "nodes in use", "others to talk to", "bytes given in a step")
+    columns[:, -1] >>= 20
+    words = (
+        "points", "tiles", "nodes in use", "others to talk to", "bytes given in a step",
+        "memory, in MiB",
+    )  # fmt: skip
     lines += [
         f"  {word:<30}{low:>8} {high:>11}"
         for word, low, high in zip(words, columns.min(axis=0), columns.max(axis=0), strict=True)
@@ -156,4 +171,11 @@ def told(simulation: Simulation, ranks: int) -> list[str]:
         lines.append("  so few points are not shared out: the first process has them all")
     elif over > MAY_CHANGE:
         lines.append("  tiles are not cut: fewer processes would wait less for the largest share")
+    if acting := simulation.acting_from_python:
+        blocks = simulation.setup.blocks
+        moved = sum(array.nbytes for block in blocks for _, array in arrays_of(block.points))
+        lines.append(
+            f"  {acting[0]} acts on the whole scene: in each step the first process takes in and "
+            f"gives back {moved >> 20} MiB, and has the memory of a single one"
+        )
     return lines

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from math import inf
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import name_of
-from karamelo_py.kernels.arrays import Setup, arrays_of
-from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import Fused, Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
@@ -18,13 +14,11 @@ from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.plan import told
 from karamelo_py.run.savings import savings
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.sizes import memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.stable import ruling_limit, words_of_share
 from karamelo_py.run.watch import not_watched, unknown_work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
-
-# Bytes of each point beside its fields: first place, solid, whether it is there.
-ALONE = 8 * 3 + 4 + 1
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
@@ -52,7 +46,6 @@ def report(hub: Hub, end_time: float = inf) -> None:
     say(f"threads        {simulation.threads}")
     say("")
     say(f"{'':<34}numbers     bytes")
-    total = 0
     for block in s.blocks:
         say(f"fields of a point of {', '.join(m.words for m in materials(hub, block))}")
         of_one = 0
@@ -60,18 +53,13 @@ def report(hub: Hub, end_time: float = inf) -> None:
             say(f"  {name:<30}  {shape:<10} {size:>6}")
             of_one += size
         say(f"  {'together':<30}  {'':<10} {of_one:>6}")
-        total += of_one * len(block.points.id)
     say("fields of a node")
-    per_node = 0
     for name, array in node_fields(s):
-        size = array.itemsize * array.shape[1]
-        per_node += size
-        say(f"  {name:<30}  {array.shape[1]!s:<10} {size:>6}")
-    boxes = tiles.box_bytes(s)
-    say(f"boxes of tiles {boxes / 2**20:.3g} MiB")
-    touched = total + ALONE * simulation.count + per_node * nodes + boxes
-    say(f"memory         {touched / 2**20:.3g} MiB touched, and in a run")
-    say(f"               {total / 2**20:.3g} MiB for a copy of the last good state")
+        say(f"  {name:<30}  {array.shape[1]!s:<10} {array.itemsize * array.shape[1]:>6}")
+    say(f"boxes of tiles {tiles.box_bytes(s) / 2**20:.3g} MiB")
+    memory = memory_of(simulation, s, tiles.box_bytes(s))
+    say(f"memory         {memory.touched / 2**20:.3g} MiB touched, and in a run")
+    say(f"               {memory.copied / 2**20:.3g} MiB for a copy of the last good state")
     if hub.settings.ranks > 1:
         say("")
         for line in told(simulation, hub.settings.ranks):
@@ -89,12 +77,6 @@ def report(hub: Hub, end_time: float = inf) -> None:
         say(f"    instead: {saving.instead}")
 
 
-def nodes_in_use(s: Setup) -> int:
-    """How many nodes points may give to before they are sorted again."""
-    spans = s.spans[1 : 1 + s.spans[0, 0]]
-    return int(np.sum(spans[:, 1] - spans[:, 0]))
-
-
 def bytes_per_point(simulation: Simulation) -> int:
     """Bytes of all fields of a point, the mean over the points of all kinds."""
     counts = simulation.counts()
@@ -110,29 +92,6 @@ def materials(hub: Hub, block: Any) -> list[Material]:
         for material in used
         if law_kind(material.law) == without_rate(law_kind(block.laws))
     ]
-
-
-def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
-    """The arrays of the nodes, and of those that heat flows through, with their names."""
-    found = list(_arrays_of_nodes(s.nodes))
-    if isinstance(s.heat, Conducting):
-        found += [(f"{name} (heat)", array) for name, array in _arrays_of_nodes(s.heat.nodes)]
-    return found
-
-
-def _arrays_of_nodes(nodes: Any) -> Iterator[tuple[str, np.ndarray]]:
-    for name in ("sums", "update", "velocity"):
-        yield name, getattr(nodes, name)
-    for one in nodes.fields:
-        yield name_of(type(one)), one.array
-
-
-def point_fields(block: Any) -> list[tuple[str, str, int]]:
-    """Name, shape and bytes of each field that a point of this block carries."""
-    found = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
-    found += [(name, array) for name, array in arrays_of(block.points) if name != "x"]
-    sizes = [(name, len(array) if array.ndim > 1 else 1, array) for name, array in found]
-    return [(name, str(size), size * array.itemsize) for name, size, array in sizes]
 
 
 def stages(hub: Hub, simulation: Simulation) -> list[str]:

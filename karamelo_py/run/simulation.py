@@ -317,6 +317,12 @@ class Simulation(ById):
         self._begun = {self.hub.fixes[ID] for ID in IDs if ID in self.hub.fixes}
 
     @property
+    def acting_from_python(self) -> list[str]:
+        """Words for the fixes that act from Python in each step."""
+        acting = (fix for pairs in self._python.by_stage.values() for fix, _ in pairs)
+        return [f"fix {fix.style} '{fix.id}'" for fix in dict.fromkeys(acting)]
+
+    @property
     def bounces(self) -> int:
         """How often points were reflected at the edge of the domain."""
         return int(self.total("bounces"))

@@ -1,0 +1,65 @@
+"""What a scene, or the share of a process, takes of memory."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.fields import name_of
+from karamelo_py.kernels.arrays import Setup, arrays_of
+from karamelo_py.kernels.heat import Conducting
+from karamelo_py.run.shares import occupied
+
+THERE = 1  # bytes of each point of the whole scene: whether it was deleted
+
+
+class Memory(NamedTuple):
+    """Bytes that are touched by the steps, and of a copy of the last good state."""
+
+    touched: int
+    copied: int
+
+
+def memory_of(simulation: Any, s: Setup, boxes: int) -> Memory:
+    """What the points in the tiles of `s`, its nodes in use, and boxes of so many bytes take.
+
+    Places before the first step and members of groups, where fixes act on points by them, and
+    whether points are there, are known of the whole scene.
+    """
+    points = sum(
+        sum(size for *_, size in point_fields(b)) * int(occupied(b.tiling)[1].sum())
+        for b in s.blocks
+    )
+    nodes = sum(array.itemsize * array.shape[1] for _, array in node_fields(simulation.setup))
+    hooks = sum(getattr(simulation.hooks, name, np.empty(0)).nbytes for name in ("x0", "members"))
+    whole = THERE * simulation.count + hooks
+    return Memory(points + whole + nodes * nodes_in_use(s) + boxes, points)
+
+
+def nodes_in_use(s: Setup) -> int:
+    """How many nodes points may give to before they are sorted again."""
+    spans = s.spans[1 : 1 + s.spans[0, 0]]
+    return int(np.sum(spans[:, 1] - spans[:, 0]))
+
+
+def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
+    """The arrays of the nodes, and of those that heat flows through, with their names."""
+    found = list(_arrays_of_nodes(s.nodes))
+    if isinstance(s.heat, Conducting):
+        found += [(f"{name} (heat)", array) for name, array in _arrays_of_nodes(s.heat.nodes)]
+    return found
+
+
+def _arrays_of_nodes(nodes: Any) -> Iterator[tuple[str, np.ndarray]]:
+    for name in ("sums", "update", "velocity"):
+        yield name, getattr(nodes, name)
+    for one in nodes.fields:
+        yield name_of(type(one)), one.array
+
+
+def point_fields(block: Any) -> list[tuple[str, str, int]]:
+    """Name, shape and bytes of each field that a point of this block carries."""
+    found = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
+    found += [(name, array) for name, array in arrays_of(block.points) if name != "x"]
+    sizes = [(name, len(array) if array.ndim > 1 else 1, array) for name, array in found]
+    return [(name, str(size), size * array.itemsize) for name, size, array in sizes]
