@@ -547,20 +547,8 @@ class Ranks(Simulation):
 
     begin_to_look = by_all(Simulation.begin_to_look)
 
-    @by_all
-    def measure(self) -> None:
-        """Measure the rate of the fastest point."""
-        super().measure()
-        if self._stepping:
-            self._agree((), ("rate",))
-
-    @by_all
-    def measure_heat(self) -> None:
-        """Measure the lowest and highest temperatures of all points."""
-        super().measure_heat()
-        if self._stepping:
-            self._heat()
-
+    measure = by_all(Simulation.measure)
+    measure_heat = by_all(Simulation.measure_heat)
     fastest = by_all(Simulation.fastest)
     motions = by_all(Simulation.motions)
 

@@ -45,6 +45,7 @@ from karamelo_py.kernels.step import (
     sweep,
 )
 from karamelo_py.kernels.sweep import Visit, sweep_nodes
+from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat
 from karamelo_py.output.fields import PIECE
 from karamelo_py.points.laws import can, law_kind, with_stress
@@ -419,7 +420,9 @@ class Simulation(ById):
 
     def measure_heat(self) -> None:
         """Measure the lowest and highest temperatures of all points."""
-        measure_heat(self.stepped)
+        s = self.stepped
+        measure_heat(s)
+        agree_on_heat(s.control.ranks, s.control)
 
     def go_on(self, end_time: float, halvings: int) -> None:
         """In place of `begin`: go on with a run whose state was put into the arrays.
@@ -452,6 +455,8 @@ class Simulation(ById):
     def measure(self) -> None:
         """Measure the rate of the fastest point."""
         measure(self.stepped)
+        clock = self.control.clock[0]
+        clock.rate = self.most(np.array([clock.rate]))[0]
 
     def fastest(self) -> float:
         """The largest component of the velocities of all points."""

@@ -44,7 +44,8 @@ def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
         if name.startswith("contact/"):  # what touched before the last step is of no use
             found[name] = np.where(np.abs(found[name]) == simulation.step, found[name], 0)
     nodes = numbers(s.spans)
-    return found | {name: array[nodes] for name, array in of_nodes(s)}
+    # Of zeros without a sign: which nodes beside a body are visited depends on who has its tiles.
+    return found | {name: array[nodes] + 0 for name, array in of_nodes(s)}
 
 
 def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
