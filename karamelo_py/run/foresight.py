@@ -409,7 +409,7 @@ def _warn_about_groups(hub: Hub) -> None:
 
 def _warn_about_step(hub: Hub, simulation: Simulation, halves: bool) -> None:
     """Say so before the first step when the step is above the stable limit."""
-    update, limit = hub.update, simulation.limit
+    update, limit = hub.update, simulation.limit_moving
     asked = update.fixed_dt or (update.dt_factor or 0) * limit
     if not asked > limit * (1 + 1e-12):
         return

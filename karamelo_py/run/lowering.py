@@ -71,6 +71,7 @@ class State(NamedTuple):
     fields: dict[type, np.ndarray]  # declared fields that are kept
     contact: NamedTuple  # how solids touch, with what it remembers
     last_dt: float  # the step that the velocities belong to the middle of
+    path: float  # how far points have gone
 
 
 def check_scene(hub: Hub) -> None:
@@ -130,16 +131,6 @@ def thread_count(hub: Hub, points: int) -> int:
     return usable if points > SERIAL_UP_TO else 1
 
 
-def stable_courant(hub: Hub) -> float:
-    """The stable step as a share of cell size over wave speed, by scheme, basis and points."""
-    scheme, method = hub.update.scheme, hub.update.method
-    two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
-    if min(two, one) == 1:
-        return 1.0 if method.frame.moves else getattr(method.basis, "courant_still", 1.0)
-    # Nodes between the corners of cells make the highest frequency higher.
-    return (one if sparse(hub) else two) * (0.7 if method.basis.nodes_per_cell > 1 else 1)
-
-
 def stable_conduction(hub: Hub) -> float:
     """The stable step of conduction in undeformed bodies, of the worst.
 
@@ -190,7 +181,7 @@ def lower(hub: Hub, previous: State | None = None, *, points: bool = True) -> tu
         method.resume(contact, previous.contact)
     control = new_control(hub.values.array)
     clock = control.clock[0]
-    clock.last_dt = previous.last_dt if previous else 0.0
+    clock.last_dt, clock.path = (previous.last_dt, previous.path) if previous else (0.0, 0.0)
     clock.spacing = min(lattice.h for lattice in lattices)
     clock.heat_limit = clock.heat_reference = stable_conduction(hub)
     clock.kept = getattr(transfer, "alpha", 0)
