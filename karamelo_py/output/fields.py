@@ -172,7 +172,7 @@ class Fields:
 
     def kinetic_energy(self, group: Any) -> float:
         """sum m v^2 / 2 of a particle group."""
-        v, mass = self.velocity.astype(float), self.mass.astype(float)
+        v, mass = (a.astype(float, copy=False) for a in (self.velocity, self.mass))
         energy = 0.5 * mass * np.einsum("ij,ij->i", v, v)
         return float(energy.sum() if group.all else energy[group.ids].sum())
 

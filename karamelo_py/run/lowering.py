@@ -313,28 +313,36 @@ def lower_block(
     laws_of_solids = list(dict.fromkeys(known))
     laws = law_table(laws_of_solids, real)
 
-    def each(values: list, dtype: type) -> np.ndarray:
-        """(n,): the value of its solid for each point."""
-        return np.repeat(np.array(values, dtype), [len(s.x0) for s in solids])
+    ends = np.cumsum([len(s.x0) for s in solids])
+    count = int(ends[-1])
 
-    ids = np.concatenate([np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids])
-    states = [start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True)]
-    counts = [len(s.x0) for s in solids]
-    places = np.concatenate([method.places(kin, s, real) for s in solids])
-    places = np.ascontiguousarray(places.T)
+    def joined(values: Iterable, dtype: type) -> np.ndarray:
+        """(n,) or (k, n): of the values of each solid, a number or column, or one for each point.
+
+        Nothing of the length of all points is made beside it.
+        """
+        array = np.empty(0)
+        for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):
+            if not array.size:
+                array = np.empty((*value.shape[:-1], count), dtype)
+            array[..., end - len(s.x0) : end] = value
+        return array
+
+    states = (start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True))
+    places = joined((method.places(kin, s, real).T for s in solids), real)
     here = places if method.frame.moves else places[: kin.dimension]
     elastic = elastic_law(laws)
     own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
     points = Points(
         x=np.stack([here, here]),
         home=None if method.frame.moves else places,
-        v=np.zeros((kin.dimension, len(ids)), real),
-        mass=np.concatenate([s.mass for s in solids]).astype(real),
-        state=np.repeat(np.array(states, real).T, counts, axis=1),
-        material=each([laws_of_solids.index(law) for law in known], np.int32),
-        grid=each([method.lattice_of(hub, s) for s in solids], np.int32),
-        id=ids.astype(np.int64),
-        fields=tuple(fields.at_points(kind, kin, len(ids), real) for kind in own),
+        v=np.zeros((kin.dimension, count), real),
+        mass=joined((s.mass for s in solids), real),
+        state=joined((state[:, None] for state in states), real),
+        material=joined((laws_of_solids.index(law) for law in known), np.int32),
+        grid=joined((method.lattice_of(hub, s) for s in solids), np.int32),
+        id=joined((np.arange(s.first_id, s.first_id + len(s.x0)) for s in solids), np.int64),
+        fields=tuple(fields.at_points(kind, kin, count, real) for kind in own),
     )
     block = Block(points, laws, tiles.empty_tiling())
     return block if previous is None else resumed(block, previous)

@@ -86,7 +86,8 @@ def share_of_heat(hub: Hub) -> float:
 
 def moves_already(simulation: Any) -> bool:
     """Whether points are so fast that they are not at rest for a hundred steps."""
-    speed = max(float(np.abs(b.points.v).max(initial=0)) for b in simulation.setup.blocks)
+    all_of = (b.points.v for b in simulation.setup.blocks)  # no copy of them: there may be millions
+    speed = max(float(max(v.max(initial=0), -v.min(initial=0))) for v in all_of)
     clock = simulation.control.clock[0]
     return 100 * speed * clock.courant * clock.dt_factor > STILL * clock.rate
 
