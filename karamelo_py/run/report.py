@@ -68,10 +68,10 @@ def report(hub: Hub, end_time: float = inf) -> None:
         per_node += size
         say(f"  {name:<30}  {array.shape[1]!s:<10} {size:>6}")
     boxes = tiles.box_bytes(s)
-    say(f"boxes of tiles {boxes / 2**20:.3g} MiB")
+    say(f"boxes of tiles {_size(boxes)}")
     touched = total + ALONE * simulation.count + per_node * nodes + boxes
-    say(f"memory         {touched / 2**20:.3g} MiB touched, and in a run")
-    say(f"               {total / 2**20:.3g} MiB for a copy of the last good state")
+    say(f"memory         {_size(touched + total)} in a run, of which")
+    say(f"               {_size(total)} are a copy of the last good state")
     if hub.settings.ranks > 1:
         say("")
         for line in told(simulation, hub.settings.ranks):
@@ -87,6 +87,12 @@ def report(hub: Hub, end_time: float = inf) -> None:
     for saving in found:
         say(f"  {saving.cost}")
         say(f"    instead: {saving.instead}")
+
+
+def _size(count: float) -> str:
+    """So many bytes, in words."""
+    mib = count / 2**20
+    return f"{mib:.0f} MiB" if mib > 100 else f"{mib:.3g} MiB"
 
 
 def nodes_in_use(s: Setup) -> int:
