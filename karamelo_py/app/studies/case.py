@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 import karamelo_py
+from karamelo_py.output.files import write_whole
 
 KEPT = "case.json"
 # Facts are indented by 2, the parts of the time by 4.
@@ -143,9 +144,7 @@ class Launch:
             "reason": outcome.reason,
             "facts": outcome.facts,
         }
-        part = folder / (KEPT + ".part")
-        part.write_text(json.dumps(record, indent=1), encoding="utf-8")
-        part.replace(folder / KEPT)
+        write_whole(folder / KEPT, json.dumps(record, indent=1))
         return outcome
 
     def _once(self, case: Mapping[str, str], folder: Path) -> Outcome:
