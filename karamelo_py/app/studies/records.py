@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 import karamelo_py
-from karamelo_py.app.studies.case import COLUMNS, Outcome, read_log
+from karamelo_py.app.logs import read_log
+from karamelo_py.app.studies.case import COLUMNS, Outcome
 from karamelo_py.app.studies.variables import Scope, number
 from karamelo_py.output.files import write_whole
 from karamelo_py.output.quantity import KEYWORDS

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.app.logs import read_log
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.case import read_log
 from karamelo_py.app.studies.frontier import Cell, explore, unseen
 from karamelo_py.app.studies.options import (
     add_family,
