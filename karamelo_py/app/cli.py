@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from karamelo_py import __version__
 from karamelo_py.app.launch import launch
+from karamelo_py.app.leaving import INTERRUPTED, leaving_at_once
 from karamelo_py.app.options import (
     VARIABLE,
     add_output_options,
@@ -21,7 +22,6 @@ from karamelo_py.app.options import (
     positive,
     threads_option,
 )
-from karamelo_py.app.start import INTERRUPTED, leaving_at_once
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
 from karamelo_py.run.crew import Crew, launched
 from karamelo_py.scene.hub import Hub
