@@ -222,6 +222,7 @@ CLOCK = np.dtype(
         ("new_move", np.float64),
         ("drift", np.float64),  # since the points were sorted, in cells
         ("drift_limit", np.float64),
+        ("pace", np.float64),  # of the point that went furthest in a step since then
         ("path", np.float64),  # of the points that went furthest, since the start, in cells
         ("spacing", np.float64),  # smallest cell size
         ("courant", np.float64),  # stable step over cell size / rate

@@ -291,6 +291,7 @@ def finish(control):
     control.values[TIMESTEP] += 1
     clock.drift += clock.move
     clock.path += clock.move
+    clock.pace = max(clock.pace, clock.move)
     clock.move = 0.0
     if clock.path > STILL:
         clock.courant, clock.dt_factor = clock.courant_moving, clock.dt_factor_moving
