@@ -57,13 +57,20 @@ class Threads(Crew):
         return sum(self.everyone(array))
 
     def largest(self, array: np.ndarray) -> np.ndarray:
-        return np.max(self.everyone(array), axis=0)
+        array[...] = np.max(self.everyone(array), axis=0)
+        return array
 
-    def send(self, given: list, taken: list) -> Any:
+    def linked(self, given: list, taken: list) -> Any:
         return given, taken
 
-    def wait(self, sent: Any) -> None:
-        given, taken = sent
+    def start(self, link: Any) -> None:
+        pass
+
+    def unlink(self, link: Any) -> None:
+        pass
+
+    def finish(self, link: Any) -> None:
+        given, taken = link
         of_all = self.everyone(given)
         for rank in {rank for rank, _ in taken}:
             mine = [array for to, array in of_all[rank] if to == self.rank]

@@ -287,12 +287,16 @@ COUNTS = """
 from karamelo_py.run import tiles
 from karamelo_py.run.crew import Crew
 tiles.DIRECT_UP_TO, tiles.TILES = 0, {2: 2}
-send = Crew.send
+linked, start = Crew.linked, Crew.start
 def counting(self, given, taken):
+    return sum(array.nbytes for _, array in given), linked(self, given, taken)
+def starting(self, link):
     with open(f"passed.{self.rank}", "a") as file:
-        print(sum(array.nbytes for _, array in given), file=file)
-    return send(self, given, taken)
-Crew.send = counting
+        print(link[0], file=file)
+    start(self, link[1])
+Crew.linked, Crew.start = counting, starting
+Crew.finish = lambda self, link, finish=Crew.finish: finish(self, link[1])
+Crew.unlink = lambda self, link, unlink=Crew.unlink: unlink(self, link[1])
 """
 
 

@@ -279,7 +279,7 @@ class Control(NamedTuple):
     clock: np.ndarray  # (1,) CLOCK
     totals: np.ndarray  # (values, LIMBS) sums that come to be published: see kernels.totals
     digits: np.ndarray  # (LIMBS,) scratch
-    answer: np.ndarray  # (8,) rounded totals
+    answer: np.ndarray  # (16,) rounded totals, and what processes agree on
     ranks: NamedTuple  # whether there are other processes
 
 
@@ -287,7 +287,7 @@ def new_control(values: np.ndarray) -> Control:
     """A control of these published values, its clock at zero."""
     clock = np.zeros(1, CLOCK).view(np.recarray)
     totals = np.zeros((len(values), LIMBS), np.int64)
-    return Control(values, clock, totals, np.zeros(LIMBS, np.int64), np.zeros(8), Alone())
+    return Control(values, clock, totals, np.zeros(LIMBS, np.int64), np.zeros(16), Alone())
 
 
 class Setup(NamedTuple):

@@ -25,7 +25,7 @@ from karamelo_py.kernels.totals import (
 )
 
 CALL = types.int64(types.int64, types.int64, types.int64)
-SWEEP, NEXT, GIVE, TAKE, TOTALS, REPORTS, HEAT, NUMBER = range(8)
+SWEEP, NEXT, GIVE, TAKE, TOTALS, LARGEST, NUMBER = range(7)
 
 _call = caller_of(CALL)
 
@@ -71,14 +71,38 @@ def _(ranks, control, number):
     return _ask(ranks.address, NUMBER, number, 0)
 
 
+@entered
+def _agree_on_reports(address, control):
+    clock, answer = control.clock[0], control.answer
+    answer[0], answer[1], answer[2] = clock.move, clock.new_move, clock.new_rate
+    answer[3] = clock.wrong
+    _call(address, LARGEST, 4, 0)
+    clock.move, clock.new_move, clock.new_rate = answer[0], answer[1], answer[2]
+    clock.wrong = int(answer[3])
+
+
 @agree_on_reports.on(Linked)
 def _(ranks, control):
-    _ask(ranks.address, REPORTS, 0, 0)
+    _agree_on_reports(ranks.address, control)
+
+
+@entered
+def _agree_on_heat(address, control):
+    clock, answer = control.clock[0], control.answer
+    answer[0], answer[1] = -clock.T_low, -clock.coldest
+    answer[2], answer[3] = -clock.set_low, -clock.fall
+    answer[4], answer[5] = clock.T_high, clock.hottest
+    answer[6], answer[7], answer[8] = clock.set_high, clock.rise, clock.own_heat
+    _call(address, LARGEST, 9, 0)
+    clock.T_low, clock.coldest = -answer[0], -answer[1]
+    clock.set_low, clock.fall = -answer[2], -answer[3]
+    clock.T_high, clock.hottest = answer[4], answer[5]
+    clock.set_high, clock.rise, clock.own_heat = answer[6], answer[7], answer[8]
 
 
 @agree_on_heat.on(Linked)
 def _(ranks, control):
-    _ask(ranks.address, HEAT, 0, 0)
+    _agree_on_heat(ranks.address, control)
 
 
 @entered

@@ -7,8 +7,7 @@ import signal
 import socket
 import time
 import traceback
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from math import inf
 from typing import Any
 
@@ -43,11 +42,6 @@ def launched() -> tuple[int, int]:
 class Crew:
     """All processes of a run, in the order of their ranks. The first leads.
 
-    Parameters
-    ----------
-    world
-        A communicator of mpi4py; that of all processes by default.
-
     Attributes
     ----------
     beside
@@ -69,19 +63,18 @@ class Crew:
     waited = 0.0
     amid = parted = False
 
-    def __init__(self, world: Any = None):
-        if world is None:
-            try:
-                from mpi4py import MPI
-                from mpi4py.util import pkl5
-            except (ImportError, RuntimeError) as error:
-                raise ScriptError(
-                    f"several processes of one scene need mpi4py, which does not load: {error}",
-                    hint=INSTALL,
-                ) from None
-            # Its messages may be longer than 2 GB.
-            world = pkl5.Intracomm(MPI.COMM_WORLD)
-        self.world = world
+    def __init__(self):
+        try:
+            from mpi4py import MPI
+            from mpi4py.util import pkl5
+        except (ImportError, RuntimeError) as error:
+            raise ScriptError(
+                f"several processes of one scene need mpi4py, which does not load: {error}",
+                hint=INSTALL,
+            ) from None
+        self.mpi = MPI
+        # Its messages may be longer than 2 GB.
+        self.world = world = pkl5.Intracomm(MPI.COMM_WORLD)
         self.rank, self.size = world.Get_rank(), world.Get_size()
         self._aside = world.Dup()  # where they meet, whatever is under way elsewhere
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
@@ -106,12 +99,6 @@ class Crew:
                 return None
             time.sleep(PAUSE)
         return found
-
-    @contextmanager
-    def _waiting(self) -> Iterator[None]:
-        begun = time.perf_counter()
-        yield
-        self.waited += time.perf_counter() - begun
 
     def told(self, thing: Any = None) -> Any:
         """What the first says to all."""
@@ -149,31 +136,37 @@ class Crew:
 
     def added(self, array: np.ndarray) -> np.ndarray:
         """The sum of whole numbers over all: for such, order does not matter."""
-        out = np.empty_like(array)
-        with self._waiting():
-            self.world.Allreduce(array, out)
+        out, begun = np.empty_like(array), time.perf_counter()
+        self.world.Allreduce(array, out)
+        self.waited += time.perf_counter() - begun
         return out
 
     def largest(self, array: np.ndarray) -> np.ndarray:
-        """The largest of each number of all."""
-        from mpi4py import MPI
+        """Let each number be the largest of all."""
+        begun = time.perf_counter()
+        self.world.Allreduce(self.mpi.IN_PLACE, array, self.mpi.MAX)
+        self.waited += time.perf_counter() - begun
+        return array
 
-        out = np.empty_like(array)
-        with self._waiting():
-            self.world.Allreduce(array, out, op=MPI.MAX)
-        return out
+    def linked(self, given: list[tuple[int, Any]], taken: list[tuple[int, Any]]) -> Any:
+        """Ways on which arrays go to others (rank, array), again and again, and theirs come."""
+        requests = [self.world.Recv_init(array, rank) for rank, array in taken]
+        return requests + [self.world.Send_init(array, rank) for rank, array in given]
 
-    def send(self, given: list[tuple[int, Any]], taken: list[tuple[int, Any]]) -> Any:
-        """Begin to send arrays to others (rank, array), and to fill those that they send."""
-        waiting = [self.world.Irecv(array, rank) for rank, array in taken]
-        return waiting + [self.world.Isend(array, rank) for rank, array in given]
+    def start(self, link: Any) -> None:
+        """Begin to send what is in the arrays, and to fill others."""
+        self.mpi.Prequest.Startall(link)
 
-    def wait(self, sent: Any) -> None:
-        """Wait until all is there that `send` has begun."""
-        from mpi4py import MPI
+    def finish(self, link: Any) -> None:
+        """Wait until all is sent and there."""
+        begun = time.perf_counter()
+        self.mpi.Request.Waitall(link)
+        self.waited += time.perf_counter() - begun
 
-        with self._waiting():
-            MPI.Request.Waitall(sent)
+    def unlink(self, link: Any) -> None:
+        """Give up ways."""
+        for request in link:
+            request.Free()
 
     def fail(self, error: BaseException) -> None:
         """End all processes because of an error that cannot be raised here."""

@@ -26,10 +26,9 @@ from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import (
     CALL,
     GIVE,
-    HEAT,
+    LARGEST,
     NEXT,
     NUMBER,
-    REPORTS,
     SWEEP,
     TAKE,
     TOTALS,
@@ -725,8 +724,8 @@ class Ranks(Simulation):
     def _go_on(self, *_: int) -> None:
         """Only the time is taken."""
 
-    def _give(self, number: int, arrays: int) -> None:
-        self._parted.tiles.give(self._part, number, arrays)
+    def _give(self, number: int, what: int) -> None:
+        self._parted.tiles.give(self._part, number, what)
 
     def _take(self, *_: int) -> None:
         self._parted.tiles.take()
@@ -758,26 +757,15 @@ class Ranks(Simulation):
             for of, to in getattr(self._part.contact, "copies", ()):
                 values[to : to + 3] = values[of : of + 3]
 
-    def _reports(self, *_: int) -> None:
-        self._agree((), ("move", "new_move", "new_rate", "wrong"))
-
-    def _heat(self, *_: int) -> None:
-        least = ("T_low", "coldest", "set_low", "fall")
-        self._agree(least, ("T_high", "hottest", "set_high", "rise", "own_heat"))
-
-    def _agree(self, least: tuple, largest: tuple) -> None:
-        clock = self.control.clock[0]
-        own = [-clock[name] for name in least] + [clock[name] for name in largest]
-        found = self.crew.largest(np.array(own, float))
-        for name, value in zip((*least, *largest), found, strict=True):
-            clock[name] = -value if name in least else value
+    def _largest(self, count: int, _: int) -> None:
+        self.crew.largest(self.control.answer[:count])
 
     def _number(self, number: int, _: int) -> int:
         return int(self.crew.added(np.array([number]))[0])
 
     _answers: ClassVar[dict[int, Callable]] = {
         SWEEP: _go_on, NEXT: _go_on, GIVE: _give, TAKE: _take, TOTALS: _totals,
-        REPORTS: _reports, HEAT: _heat, NUMBER: _number,
+        LARGEST: _largest, NUMBER: _number,
     }  # fmt: skip
 
     # --- state that can be returned to ------------------------------------------------------------

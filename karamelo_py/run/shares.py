@@ -85,6 +85,7 @@ class SharedTiles(Tiles):
         self._marked = np.empty(0, np.int64)
         self.given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
         self._taken: dict[int, slice] = {}
+        self._links: dict[tuple[int, int], tuple[list, Any]] = {}  # by number of buffers, arrays
         self._from = np.empty(0, np.int64)  # whose the boxes of others are
 
     # --- points -----------------------------------------------------------------------------------
@@ -173,6 +174,9 @@ class SharedTiles(Tiles):
         return super().empty_tiling()._replace(share=np.zeros(2 * SHARES + 1, np.int64))
 
     def lay_out(self, s: Setup) -> None:
+        for _, link in self._links.values():
+            self.crew.unlink(link)
+        self._links.clear()
         super().lay_out(s)
         if not self.direct:
             self._border_first(s)
@@ -292,18 +296,29 @@ class SharedTiles(Tiles):
 
     def give(self, s: Setup, number: int, what: int) -> None:
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
-        arrays = chosen_of(buffers_of(s)[number].nodes, what)
-        given = [
-            (rank, np.take(array, rows, axis=0))
-            for rank, rows in self.given.items()
-            for array in arrays
-        ]
-        taken = [(rank, array[rows]) for rank, rows in self._taken.items() for array in arrays]
-        self._under_way = self.crew.send(given, taken)
+        link = self._links.get((number, what))
+        if link is None:
+            link = self._link(chosen_of(buffers_of(s)[number].nodes, what))
+            self._links[number, what] = link
+        packed, self._under_way = link
+        for array, rows, room in packed:
+            np.take(array, rows, axis=0, out=room, mode="clip")
+        self.crew.start(self._under_way)
 
     def take(self) -> None:
         """Wait for what others give."""
-        self.crew.wait(self._under_way)
+        self.crew.finish(self._under_way)
+
+    def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:
+        """What is packed of these arrays of the buffers, and the requests that pass it on."""
+        packed, given, taken = [], [], []
+        for array in arrays:
+            for rank, rows in self.given.items():
+                room = np.empty((len(rows), array.shape[1]), array.dtype)
+                packed.append((array, rows, room))
+                given.append((rank, room))
+            taken += [(rank, array[rows]) for rank, rows in self._taken.items()]
+        return packed, self.crew.linked(given, taken)
 
 
 def work_of(points: np.ndarray, costs: np.ndarray) -> np.ndarray:
