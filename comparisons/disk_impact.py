@@ -44,4 +44,4 @@ def compare(run, axes, full):
     inset = axes.inset_axes([0.44, 0.05, 0.46, 0.6])
     coloured(inset, last.x, last.y, last.ep, "plastic strain", s=0.6)
     inset.set(aspect="equal", xticks=[], yticks=[])
-    axes.set(xlabel="time (us)", ylabel="depth of the foot of the disk (mm)")
+    axes.set(xlabel="time (µs)", ylabel="depth of the foot of the disk (mm)")

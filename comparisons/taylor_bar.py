@@ -42,5 +42,5 @@ def compare(run, axes, full):
     if full:
         for what, a, b in zip(("length", "foot"), found["tlmpm"], found["ulmpm"], strict=True):
             yield Row(f"{what}, tlmpm / ulmpm", 1.0, a / b, 0.02, "two methods")
-    axes.plot([DIAMETER / 2, WAIST / 2, 0], [0, 0.2 * L0, LENGTH], "k+", ms=12, label="experiment")
-    axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(-10, 20))
+    axes.plot([DIAMETER / 2, WAIST / 2, 0], [0, 0.2 * L0, LENGTH], "k+", ms=7, label="experiment")
+    axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(-9, 9))

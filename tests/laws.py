@@ -3,9 +3,19 @@
 import numpy as np
 from tensors import flat, symmetric_matrix
 
-from karamelo_py.points.laws import advance, cauchy_stress, kirchhoff_stress
+from karamelo_py.points.laws import advance, cauchy_stress, initial_state, kirchhoff_stress
 
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+
+
+def start(law, kin):
+    """The state before the first step."""
+    return initial_state(law, kin, 1.0)
+
+
+def isochoric(e):
+    """An increment of strain along x that keeps the volume."""
+    return np.diag([e, -e / 2, -e / 2])
 
 
 def stretched(law, kin, state, full, steps, dt=1.0):

@@ -1,12 +1,16 @@
 """Flat tuples of a kinematics as NumPy matrices (3, 3), and back; strategies for Hypothesis."""
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 
 KINEMATICS = [Line(), PlaneStrain(), Space()]  # those of a dimension
 ALL_KINEMATICS = [*KINEMATICS, Axisymmetric()]
+every_kinematics = pytest.mark.parametrize(
+    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
+)
 # Places of the symmetric components xx yy zz xy xz yz in a matrix.
 SYMMETRIC = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
 
@@ -70,3 +74,11 @@ def deformations(kin):
     return numbers(kin.tensor_size, -0.3 / d, 0.3 / d).map(
         lambda a: tuple(float(x) for x in np.add(unit, a))
     )
+
+
+def rotation(w):
+    """exp of the cross product with w (Rodrigues)."""
+    angle = np.linalg.norm(w)
+    x, y, z = np.asarray(w) / (angle or 1.0)
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k

@@ -168,11 +168,14 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
 def test_curves_of_a_sweep(folder, capsys):
     words = ["sweep", "in.law", "-var", "law=1,2", "-o", "s.csv", "-jobs", "1"]
     assert main(words) == 0
-    assert main(["chart", "s.csv", "-curve", "err", "-names", "line,parabola", "-o", "c.svg"]) == 0
+    draw = ["chart", "s.csv", "-curve", "err", "-names", "line,parabola", "-o", "c.svg"]
+    assert main([*draw, "-axes", "time (s),error (m)"]) == 0
     out = capsys.readouterr().out
     assert "line: err 4 at the end" in out and "parabola: err 16 at the end" in out
     text = (folder / "c.svg").read_text(encoding="utf-8")
-    assert text.startswith("<?xml")
+    assert text.startswith("<?xml") and "time (s)" in text and "error (m)" in text
+    assert main([*draw, "-axes", "time (s)"]) == 1
+    assert "two, such as -axes" in capsys.readouterr().err
     assert main(["chart", "s.csv", "-curve", "er"]) == 1
     assert "did you mean 'err'?" in capsys.readouterr().err
     (folder / "s/law=1/log.mpm").unlink()

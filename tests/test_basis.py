@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
-from tensors import ALL_KINEMATICS, flat
+from tensors import ALL_KINEMATICS, every_kinematics, flat
 
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.basis import (
@@ -46,9 +46,6 @@ SIZES = [(7, 4.3, 4), (1, 2, 3), (3, 1, 2), (2, 3, 1), (1.4, 2.5, 3.2), (0.6, 0.
 BASES = [Linear, QuadraticSpline, CubicSpline, BernsteinQuadratic, UGIMP, CPGIMPDet]
 SMOOTH = [QuadraticSpline, CubicSpline, UGIMP, CPGIMPDet]
 every_basis = pytest.mark.parametrize("basis", BASES, ids=lambda basis: basis.__name__)
-every_kinematics = pytest.mark.parametrize(
-    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
-)
 sizes = st.sampled_from(SIZES)
 # Half sizes of domains, in cells: of ppc = 1 and less.
 halves = st.tuples(*[st.one_of(st.just(0.5), st.floats(0.01, 0.5))] * 3)

@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -97,6 +98,24 @@ def test_the_house_counts_its_arrows_and_lines():
     for name, lines in re.findall(r"^\| [^|]* \| 1 \| `([\w/]+\.py)` \| (\d+) \|$", page, re.M):
         path = ROOT / name if name.startswith("tests") else ROOT / "karamelo_py" / name
         assert int(lines) == pytest.approx(len(path.read_text("utf-8").splitlines()), abs=3), name
+
+
+def test_no_imports_in_a_circle():
+    """Those inside of functions, too."""
+    modules = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in (ROOT / "karamelo_py").rglob("*.py")
+    }
+    taken = {}
+    for module, path in modules.items():
+        found = re.findall(
+            r"^ *from (karamelo_py[\w.]*) import (\([^)]*\)|.*)", path.read_text("utf-8"), re.M
+        )
+        pairs = [(package, name) for package, names in found for name in re.findall(r"\w+", names)]
+        # What is imported is a module, or stands in one.
+        named = [f"{p}.{name}" if f"{p}.{name}" in modules else p for p, name in pairs]
+        taken[module] = {name for name in named if name != module}
+    TopologicalSorter(taken).prepare()  # raises CycleError, which names the circle
 
 
 def test_readme_tells_the_whole_script():

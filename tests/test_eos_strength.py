@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tensors import ALL_KINEMATICS, flat, symmetric_flat, symmetric_matrix, symmetric_tensors
+from tensors import (
+    ALL_KINEMATICS,
+    every_kinematics,
+    flat,
+    symmetric_flat,
+    symmetric_matrix,
+    symmetric_tensors,
+)
 
 from karamelo_py.app.cli import main
 from karamelo_py.compiler.compile import real
@@ -40,9 +47,6 @@ from karamelo_py.script.values import Values
 RHO, K, G, Y = 2.0, 160.0, 80.0, 0.4
 ELASTIC = EosStrength(LinearPressure(1 / RHO, K), Elastic(G))
 YIELDING = EosStrength(LinearPressure(1 / RHO, K), Plastic(G, Y))
-every_kinematics = pytest.mark.parametrize(
-    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
-)
 every_law = pytest.mark.parametrize("law", [ELASTIC, YIELDING], ids=["elastic", "yielding"])
 
 

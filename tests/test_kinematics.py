@@ -11,10 +11,12 @@ from numba import njit, typeof
 from tensors import (
     ALL_KINEMATICS,
     deformations,
+    every_kinematics,
     flat,
     gradients,
     matrix,
     numbers,
+    rotation,
     symmetric_flat,
     symmetric_matrix,
     symmetric_tensors,
@@ -57,9 +59,6 @@ from karamelo_py.points.kinematics import (
 )
 
 ROUND_OFF = 1e-12
-every_kinematics = pytest.mark.parametrize(
-    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
-)
 
 
 def close(a, b, tolerance=ROUND_OFF):
@@ -255,14 +254,6 @@ def test_spin_keeps_the_invariants(kin, data):
     assert close(invariants(after), invariants(before))
 
 
-def rotation(w):
-    """exp of the cross product with w (Rodrigues)."""
-    angle = np.linalg.norm(w)
-    x, y, z = w / angle
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
-
-
 def axial(w):
     """The velocity gradient of the rotation vector w, (3, 3)."""
     x, y, z = w
@@ -273,7 +264,7 @@ def axial(w):
 def test_spin_turns_by_the_angle_in_the_plane(angle, s):
     """The error of the angle is |w|^5/120: 3e-11 at |w| = 0.02, a large turn for a step."""
     kin = PlaneStrain()
-    turn = rotation(np.array([0, 0, angle])) if abs(angle) > 1e-12 else np.eye(3)
+    turn = rotation([0, 0, angle])
     exact = turn @ symmetric_matrix(kin, s) @ turn.T
     turned = spin(kin, flat(kin, axial((0, 0, angle))), s)
     assert close(turned, symmetric_flat(kin, exact), 1e-9)

@@ -4,8 +4,8 @@ from math import exp, log
 
 import numpy as np
 import pytest
-from laws import TURN, pressure_of, stress, stretched, worked
-from tensors import ALL_KINEMATICS, symmetric_flat
+from laws import TURN, isochoric, pressure_of, start, stress, stretched, worked
+from tensors import every_kinematics, symmetric_flat
 
 from karamelo_py.points.kinematics import Axisymmetric, Space
 from karamelo_py.points.laws import (
@@ -14,7 +14,6 @@ from karamelo_py.points.laws import (
     dissipated_energy,
     elastic_strain,
     energy_density,
-    initial_state,
     plastic_strain,
     temperature,
     wave_speed_squared,
@@ -39,17 +38,6 @@ COOK = JohnsonCook.given(G, 0.4, 0.3, 0.3, 1.0, 0.05, 1.1, TR, TM)
 ALL_PARTS = EosStrength(
     Shock(0.125, K, 1.5, 0.05, TR), COOK, damage=WEAR, temperature=HEAT._replace(chi=0.9)
 )
-every_kinematics = pytest.mark.parametrize(
-    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
-)
-
-
-def start(law, kin):
-    return initial_state(law, kin, 1.0)
-
-
-def shear(e):
-    return np.diag([e, -e / 2, -e / 2])
 
 
 @pytest.mark.parametrize("mean", [-0.6, 0.0, 0.4])
@@ -57,7 +45,7 @@ def test_failure_strain(mean):
     """w = ep / (d1 + d2 exp(d3 t)) at a triaxiality t that stays, at low rates and Tr."""
     kin = Axisymmetric()
     state = with_stress(BREAKING, kin, start(BREAKING, kin), (mean, mean, mean, 0.0))
-    state = stretched(BREAKING, kin, state, shear(1e-4), 400, 1.0)
+    state = stretched(BREAKING, kin, state, isochoric(1e-4), 400, 1.0)
     ep, w = plastic_strain(BREAKING, kin, state), damage_initiation(BREAKING, kin, state)
     assert 0 < w < 1 and damage(BREAKING, kin, state) == 0
     t = -pressure_of(BREAKING, kin, state) / (Y + 1e-3 * abs(mean))
@@ -71,10 +59,10 @@ def test_rate_and_temperature(rate):
     """(1 + d4 ln(rate)), 1 at and below the reference rate, and (1 + d5 T*)."""
     kin, law = Axisymmetric(), BREAKING._replace(temperature=HEAT)
     state = with_temperature(law, kin, start(law, kin), 800.0)
-    state = stretched(law, kin, state, shear(Y / (3 * G)), 1)  # to yield
+    state = stretched(law, kin, state, isochoric(Y / (3 * G)), 1)  # to yield
     assert damage_initiation(law, kin, state) == pytest.approx(0, abs=1e-12)
     before = plastic_strain(law, kin, state)
-    state = stretched(law, kin, state, shear(1e-3), 1, 1e-3 / rate)
+    state = stretched(law, kin, state, isochoric(1e-3), 1, 1e-3 / rate)
     ep = plastic_strain(law, kin, state) - before
     t = -pressure_of(law, kin, state) / Y
     failure = (D1 + D2 * exp(D3 * t)) * (1 + D4 * log(max(rate, 1))) * (1 + D5 / 2)
@@ -131,7 +119,7 @@ def test_the_share_of_damage_is_taken_once():
 def test_nothing_fails_under_high_pressure():
     kin = Axisymmetric()
     state = with_stress(BREAKING, kin, start(BREAKING, kin), (-20.0, -20.0, -20.0, 0.0))
-    state = stretched(BREAKING, kin, state, shear(-1e-2), 20)
+    state = stretched(BREAKING, kin, state, isochoric(-1e-2), 20)
     assert plastic_strain(BREAKING, kin, state) > 0.1
     assert damage_initiation(BREAKING, kin, state) == 0
 

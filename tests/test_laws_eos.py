@@ -5,7 +5,7 @@ from math import log, sqrt
 import numpy as np
 import pytest
 from laws import closed_to, pressure_of, stretched, worked
-from tensors import ALL_KINEMATICS
+from tensors import ALL_KINEMATICS, every_kinematics
 
 from karamelo_py.points.kinematics import Line, PlaneStrain, Space
 from karamelo_py.points.laws import (
@@ -40,9 +40,6 @@ COPPER = Shock(1 / RHO, RHO * C0**2, S, GAMMA * RHO * CV, TR)
 WATER = Tait(1.0, 3.0, 7.0)
 AIR = IdealGas(1 / 1.2, 1.4, 2.5)
 LINEAR = LinearPressure(0.5, 160.0)
-every_kinematics = pytest.mark.parametrize(
-    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
-)
 every_curve = pytest.mark.parametrize(
     "eos",
     [COPPER, COPPER._replace(S=0.0), COPPER._replace(S=0.5), WATER, Tait(1.0, 3.0, 1.0), LINEAR],

@@ -4,9 +4,9 @@ from math import exp, log, sqrt
 
 import numpy as np
 import pytest
-from laws import mises, pressure_of, stress, stretched
+from laws import isochoric, mises, pressure_of, start, stress, stretched
 from numba import njit
-from tensors import ALL_KINEMATICS, flat
+from tensors import every_kinematics, flat
 
 from comparisons.results import read_log
 from karamelo_py.compiler.formula import CONSTANT, OPERATIONS, POINT
@@ -17,7 +17,6 @@ from karamelo_py.points.laws import (
     advance,
     columns_of,
     dissipated_energy,
-    initial_state,
     plastic_strain,
     shown,
 )
@@ -33,18 +32,6 @@ from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
 RHO, K, G = 8.0, 160.0, 80.0
 EOS = LinearPressure(1 / RHO, K)
 HEAT = PlasticWork(0.0, 0.5, 0.0, 0.0, 400.0, 2000.0)  # 400 K, and no work becomes heat
-
-every_kinematics = pytest.mark.parametrize(
-    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
-)
-
-
-def start(law, kin):
-    return initial_state(law, kin, 1.0)
-
-
-def isochoric(e):
-    return np.diag([e, -e / 2, -e / 2])
 
 
 # ---- Zerilli and Armstrong ----------------------------------------------------------------------

@@ -4,8 +4,8 @@ from math import log, sqrt
 
 import numpy as np
 import pytest
-from laws import TURN, integrated, mises, stress, stretched, worked
-from tensors import ALL_KINEMATICS, symmetric_flat
+from laws import TURN, integrated, isochoric, mises, start, stress, stretched, worked
+from tensors import every_kinematics, symmetric_flat
 
 from karamelo_py.kernels.laws import law_in
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
@@ -35,20 +35,9 @@ COOK = JohnsonCook.given(G, A, B, N, RATE0, C, M, TR, TM)
 HARDENING = LinearHardening(G, 0.4, 2.0)
 SWIFT = Swift(G, 0.4, 0.5, 0.002, 0.5)
 HEAT = PlasticWork(0.9, 0.5, 0.0, 0.0, TR, TM)
-every_kinematics = pytest.mark.parametrize(
-    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
-)
 every_strength = pytest.mark.parametrize(
     "strength", [Plastic(G, 0.4), HARDENING, SWIFT, COOK], ids=lambda s: type(s).__name__
 )
-
-
-def start(law, kin):
-    return initial_state(law, kin, 1.0)
-
-
-def isochoric(e):
-    return np.diag([e, -e / 2, -e / 2])
 
 
 def static_flow(strength, ep):

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from laws import TURN, stress, stretched, worked
-from tensors import ALL_KINEMATICS, flat, symmetric_flat, symmetric_matrix, symmetric_tensors
+from laws import TURN, start, stress, stretched, worked
+from tensors import (
+    every_kinematics,
+    flat,
+    symmetric_flat,
+    symmetric_matrix,
+    symmetric_tensors,
+)
 
 from karamelo_py.points.kinematics import (
     Axisymmetric,
@@ -35,9 +41,6 @@ from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb, returned
 RHO, K, G = 2.0, 100.0, 60.0
 COHESION, PHI, PSI = 0.3, 30.0, 10.0
 EOS = LinearPressure(1 / RHO, K)
-every_kinematics = pytest.mark.parametrize(
-    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
-)
 FITS = ("compression", "extension", "plane-strain")
 
 
@@ -51,10 +54,6 @@ def drucker(c=COHESION, phi=PHI, psi=PSI, **options):
 
 LAWS = [mohr(), mohr(psi=0), mohr(phi=0, psi=0), mohr(c=0), drucker(), drucker(fit="plane-strain")]
 every_law = pytest.mark.parametrize("law", LAWS, ids=range(len(LAWS)))
-
-
-def start(law, kin):
-    return initial_state(law, kin, 1.0)
 
 
 def mohr_excess(full, c=COHESION, phi=PHI):

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from laws import stretched
-from tensors import ALL_KINEMATICS, flat
+from tensors import every_kinematics, flat
 
 from karamelo_py.app.cli import main
 from karamelo_py.kernels.laws import law_on
@@ -29,9 +29,6 @@ from karamelo_py.points.laws.neo_hookean import NeoHookean
 E, NU, ALPHA, T0 = 200.0, 0.25, 1e-4, 300.0
 K = E / (3 * (1 - 2 * NU))
 styles = pytest.mark.parametrize("style", [LinearElastic, NeoHookean])
-every_kinematics = pytest.mark.parametrize(
-    "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
-)
 
 
 def warm(style, kin, T):

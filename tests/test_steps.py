@@ -35,26 +35,48 @@ def test_a_body_at_rest_steps_at_its_wave_speed(run_interpreted):
 
 
 @pytest.mark.parametrize(
-    "scheme, transfer, ppc, share",
+    "scheme, transfer, ppc, still, share",
     [
-        ("musl", "FLIP", 2, 0.4),
-        ("musl", "FLIP", 1, 0.2),
-        ("usf", "FLIP", 2, 0.4),
-        ("usf", "FLIP quadratic", 1, 0.6),
-        ("usavg", "FLIP", 2, 0.9),
-        ("usavg", "FLIP", 1, 0.5),
-        ("musl", "FLIP quadratic", 1, 0.9),
-        ("musl", "FLIP 0.9", 2, 0.9),
-        ("musl", "PIC", 1, 0.9),
+        ("musl", "FLIP", 2, 0.9, 0.4),
+        ("musl", "FLIP", 1, 0.9, 0.2),
+        ("usf", "FLIP", 2, 0.9, 0.4),
+        ("usf", "FLIP quadratic", 1, 0.9 * 1.25, 0.6),
+        ("usavg", "FLIP", 2, 0.9, 0.9),
+        ("usavg", "FLIP", 1, 0.9, 0.5),
+        ("musl", "FLIP quadratic", 1, 0.9 * 1.25, 0.9),
+        ("musl", "FLIP 0.9", 2, 0.9, 0.9),
+        ("musl", "PIC", 1, 0.9, 0.9),
+        ("musl", "APIC", 2, 0.9, 0.9),
     ],
 )
-def test_the_programs_own_share_of_the_stable_step(run_interpreted, scheme, transfer, ppc, share):
+def test_the_programs_own_step(run_interpreted, scheme, transfer, ppc, still, share):
     """Where gradients jump, points keep their velocities and no dt_factor is given, it is smaller.
 
     The shares are those of docs/energy.md, whose table shows that bodies keep their energy by them.
+    At rest it is that of the highest frequency (docs/studies.md).
     """
-    log = run_interpreted(block(2, LOG, "run(1)", scheme=scheme, transfer=transfer, ppc=ppc)).log
-    assert log.dt[0] == pytest.approx(share * H / SPEED, rel=1e-9)
+    words = {"scheme": scheme, "transfer": transfer, "ppc": ppc}
+    log = run_interpreted(block(2, LOG, "run(1)", **words), folder="still").log
+    assert log.dt[0] == pytest.approx(still * H / SPEED, rel=1e-9)
+    v = 0.01 * SPEED
+    start = f"fix(v, initial_velocity_particles, all, {v!r}, NULL)"
+    log = run_interpreted(block(2, start, LOG, "run(1)", **words), folder="moving").log
+    assert log.dt[0] == pytest.approx(share * H / (SPEED + v), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "transfer, still, share",
+    [("FLIP", 0.9, 0.4), ("FLIP quadratic", 1.125, 0.9), ("APIC", 0.9, 0.9)],
+)
+def test_the_step_of_rest_ends_with_a_quarter_of_a_cell(run_interpreted, transfer, still, share):
+    """Also where a second run begins on the way, and where the scene is made anew for it."""
+    v = 0.0022 * SPEED
+    start = f"fix(v, initial_velocity_particles, all, {v!r}, NULL)"
+    lines = [start, LOG, "run(30)", "compute(Ek, kinetic_energy, all)", "run(110)"]
+    log = run_interpreted(block(2, *lines, transfer=transfer, size=(0.1, 0.1))).log
+    dt = np.where(v * log.Time < 0.25 * H, still, share) * H / (SPEED + v)
+    assert np.abs(log.dt / dt - 1).max() < 1e-6
+    assert (log.dt[-1] < log.dt[0]) == (share < still)
 
 
 def test_set_dt(run_interpreted):

@@ -13,6 +13,7 @@ import pandas
 import pytest
 
 from karamelo_py.app.cli import main
+from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies import case, records, study, variables
 from karamelo_py.script.errors import ScriptError
 
@@ -78,7 +79,7 @@ def test_a_run_that_breaks_off_has_no_values(folder):
     assert main(["sweep", "in.flight", *words]) == 0
     good, bad = records.read(folder / "sweep.csv")
     assert good["v_x"] == "3" and bad["status"] == "failed" and "moves by 6 cells" in bad["reason"]
-    assert case.read_log(folder / bad["folder"])["v_x"].size > 0  # though it has a log
+    assert read_log(folder / bad["folder"])["v_x"].size > 0  # though it has a log
     assert bad["v_x"] == bad["max:c_x"] == ""
 
 
@@ -265,7 +266,7 @@ Run finished
     assert facts["particle_steps_per_s"] == pytest.approx(352 * 1234 / 0.75)
     assert facts["cpu_seconds"] == pytest.approx(0.6)
     (tmp_path / "log.mpm").write_text("Step a\n0 1\n1 2\n# Step b\n2 nan\n3 4\n3 ", "utf-8")
-    log = case.read_log(tmp_path)
+    log = read_log(tmp_path)
     assert list(log["Step"]) == [0, 1, 2, 3] and list(log["a"]) == [1, 2]
     assert np.isnan(log["b"][0]) and log["b"][1] == 4
 

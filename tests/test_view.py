@@ -5,8 +5,9 @@ import pytest
 from fakes import FakeHub
 from PIL import Image
 
-from karamelo_py.app import plot, view
+from karamelo_py.app import view
 from karamelo_py.app.cli import main
+from karamelo_py.app.logs import read_rows
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import read
 from karamelo_py.styles.dumps.hdf5 import Hdf5
@@ -145,7 +146,7 @@ def test_plot_draws_columns_of_a_log(tmp_path, monkeypatch, capsys, name):
     hub = FakeHub(tmp_path)
     hub.output.log.file = tmp_path / name
     hub.run(4)
-    rows = plot.read(tmp_path / name)
+    rows = read_rows(tmp_path / name)
     assert [row["Step"] for row in rows] == [0, 1, 2, 3, 4]
     assert [row["Time"] for row in rows] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4])
     assert call(capsys, "plot", name)[:2] == (0, "Step dt Time\n")
@@ -164,7 +165,7 @@ def test_plot_draws_columns_of_a_log(tmp_path, monkeypatch, capsys, name):
 
 def test_plot_reads_a_log_whose_columns_change(tmp_path):
     (tmp_path / "log.mpm").write_text("Step Time\n0 0\n1 0.5\n# Step Time Ek\n1 0.5 7\n")
-    rows = plot.read(tmp_path / "log.mpm")
+    rows = read_rows(tmp_path / "log.mpm")
     assert rows[0] == {"Step": 0, "Time": 0} and rows[-1] == {"Step": 1, "Time": 0.5, "Ek": 7}
 
 
@@ -187,7 +188,7 @@ def test_log_and_out(run_interpreted, tmp_path):
     run = run_interpreted(SCRIPT, "-out", "results/here", "-log", "table.csv")
     made = tmp_path / "run/results/here"
     assert sorted(p.name for p in run.folder.iterdir()) == ["in.script", "results"]
-    rows = plot.read(made / "table.csv")
+    rows = read_rows(made / "table.csv")
     assert [row["Step"] for row in rows] == [0, 10, 20, 25]
     steps = sorted(int(p.name.split(".")[1]) for p in made.glob("p.*.dump"))
     assert steps == [0, 4, 8, 12, 16, 20, 24, 25]
@@ -204,3 +205,11 @@ def test_by_time_goes_on_in_a_further_run():
     every = ByTime(0.1)
     times = (0, 0.05, 0.1 - 1e-17, 0.1, 0.30000000000000004)
     assert [every.now(time) for time in times] == [0, 0, 1, 1, 3]
+
+
+def test_words_of_a_log_are_no_numbers(tmp_path):
+    """What limits the step is a word: the other columns of its rows can be read all the same."""
+    (tmp_path / "log.mpm").write_text("Step limit dt\n0 waves 0.5\n1 waves 0.25\n2 wav")
+    rows = read_rows(tmp_path / "log.mpm")
+    assert [(row["Step"], row["dt"]) for row in rows] == [(0, 0.5), (1, 0.25)]
+    assert np.isnan(rows[0]["limit"])

@@ -13,8 +13,15 @@ from typing import Any, NoReturn
 
 from karamelo_py import __version__
 from karamelo_py.app.launch import launch
-from karamelo_py.app.outputs import add_output_options, direct
-from karamelo_py.app.start import INTERRUPTED, leaving_at_once
+from karamelo_py.app.leaving import INTERRUPTED, leaving_at_once
+from karamelo_py.app.options import (
+    VARIABLE,
+    add_output_options,
+    add_variables,
+    direct,
+    positive,
+    threads_option,
+)
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
 from karamelo_py.run.crew import Crew, launched
 from karamelo_py.scene.hub import Hub
@@ -38,7 +45,6 @@ karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [-log FILE]
                           [-out FOLDER] [-restart FILE]
                           [--trust-geometries] [--quiet] [--debug]
        karamelo-py COMMAND ..."""
-VARIABLE = ("-var", "--var", "-v")
 RESTART = ("-restart", "--restart")
 RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 
@@ -230,7 +236,7 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
             help="threads to use (default: all cores where the scene is large enough)",
         )  # fmt: skip
         script.add_argument(
-            "--ranks", type=ranks_option, metavar="N", default=None,
+            "--ranks", type=positive, metavar="N", default=None,
             help="processes that share the scene (MPI); threads are those of each",
         )  # fmt: skip
         script.add_argument(
@@ -254,30 +260,6 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
         else:
             commands.add_parser(name, help=summary)
     return parser, commands
-
-
-def add_variables(parser: CommandLine, text: str) -> None:
-    """Let a command line set variables of scripts."""
-    parser.add_argument(
-        *VARIABLE, nargs=2, action="append", default=[], metavar=("NAME", "VALUE"),
-        help=text,
-    )  # fmt: skip
-
-
-def threads_option(text: str) -> int | None:
-    """The value of --threads: a number, or None for auto."""
-    if text == "auto":
-        return None
-    if not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number of threads (1, 2, ... or auto)")
-    return int(text)
-
-
-def ranks_option(text: str) -> int:
-    """The value of --ranks."""
-    if not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number of processes (1, 2, ...)")
-    return int(text)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -1,11 +1,11 @@
 """karamelo-py plot: columns of the log of an earlier run against each other."""
 
 import argparse
-import csv
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from karamelo_py.app.logs import read_rows
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import Curve, Plots
 from karamelo_py.script.errors import ScriptError, nearest_few
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
             expected="the name of a log, and then the columns",
             hint=f"karamelo-py plot log.mpm {options.log}",
         )
-    rows = read(options.log)
+    rows = read_rows(options.log)
     known = list(dict.fromkeys(name for row in rows for name in row))
     if not options.columns and not options.right:
         print(" ".join(known))
@@ -73,33 +73,3 @@ def run(options: argparse.Namespace) -> int:
     plots.finish()
     print(options.output)
     return 0
-
-
-def read(path: Path) -> list[dict[str, float]]:
-    """The rows of a log; a line that begins with # names the columns anew.
-
-    Raises
-    ------
-    ScriptError
-        If the file cannot be read, or is no log.
-    """
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            if path.suffix == ".csv":
-                lines = list(csv.reader(file))
-            else:
-                lines = [line.split() for line in file]
-        names, *lines = lines
-        rows = []
-        for cells in lines:
-            if cells[0].startswith("#"):
-                first = [cells[0].removeprefix("#").strip()]
-                names = [name for name in (*first, *cells[1:]) if name]
-            else:
-                numbers = [float(cell) for cell in cells]
-                rows.append(dict(zip(names, numbers, strict=True)))
-        return rows
-    except OSError as error:
-        raise ScriptError(f"cannot read {path}: {error.strerror or error}") from error
-    except (ValueError, IndexError) as error:
-        raise ScriptError(f"{path} is not a log", expected="log.mpm or log.csv of a run") from error

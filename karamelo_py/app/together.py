@@ -12,7 +12,7 @@ from math import inf
 from typing import NamedTuple, TextIO
 
 from karamelo_py.app.launch import SOCKET
-from karamelo_py.app.start import INTERRUPTED
+from karamelo_py.app.leaving import INTERRUPTED
 from karamelo_py.run.crew import FAILED, WELL, Crew, launched
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError

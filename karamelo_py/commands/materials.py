@@ -1,6 +1,6 @@
 """Commands about materials and the parts of composed ones: eos, strength, damage, temperature."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
@@ -40,13 +40,25 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
     define(hub, hub.materials, ID, style, arguments)
 
 
-def eos(hub: Hub, ID: str, style: StyleOf("eos"), *arguments: Argument) -> None:
-    """Define an equation of state: the pressure of a material, and its density.
+def _part(kind: str, summary: str, example: str, others: str) -> Callable:
+    """The command that defines a part of this kind."""
+
+    def command(hub: Hub, ID: str, style: StyleOf(kind), *arguments: Argument) -> None:
+        if (kind, style) == ("strength", "JC") and not registry.knows(kind, style):
+            raise ScriptError(
+                "unknown strength style 'JC'",
+                argument="style",
+                expected="the style johnson_cook, with G, A, B, n, epsdot0, C, m, Tr, Tm",
+                hint=longer("strength johnson_cook", arguments),
+            )
+        define(hub, hub.parts[kind], ID, style, arguments)
+
+    command.__doc__ = f"""{summary}
 
     Parameters
     ----------
     ID
-        Name of the equation of state.
+        Name of the {"equation of state" if kind == "eos" else kind}.
     style
         The law.
     arguments
@@ -54,89 +66,39 @@ def eos(hub: Hub, ID: str, style: StyleOf("eos"), *arguments: Argument) -> None:
 
     Example
     -------
-    eos(bulk, linear, 7850, 160e9)
+    {example}
 
     See Also
     --------
-    strength, material, material eos-strength
+    {others}, material, material eos-strength
     """
-    define(hub, hub.parts["eos"], ID, style, arguments)
+    return command
 
 
-def strength(hub: Hub, ID: str, style: StyleOf("strength"), *arguments: Argument) -> None:
-    """Define a strength: the deviatoric stress of a material.
-
-    Parameters
-    ----------
-    ID
-        Name of the strength.
-    style
-        The law.
-    arguments
-        What the style asks for; see its page.
-
-    Example
-    -------
-    strength(mild, plastic, 80e9, 400e6)
-
-    See Also
-    --------
-    eos, damage, temperature, material, material eos-strength
-    """
-    if style == "JC" and not registry.knows("strength", style):
-        raise ScriptError(
-            "unknown strength style 'JC'",
-            argument="style",
-            expected="the style johnson_cook, with G, A, B, n, epsdot0, C, m, Tr, Tm",
-            hint=longer("strength johnson_cook", arguments),
-        )
-    define(hub, hub.parts["strength"], ID, style, arguments)
-
-
-def damage(hub: Hub, ID: str, style: StyleOf("damage"), *arguments: Argument) -> None:
-    """Define a damage: how a material loses its strength.
-
-    Parameters
-    ----------
-    ID
-        Name of the damage.
-    style
-        The law.
-    arguments
-        What the style asks for; see its page.
-
-    Example
-    -------
-    damage(ductile, damage_johnson_cook, 0.54, 4.89, -3.03, 0.014, 1.12, 1, 298, 1356)
-
-    See Also
-    --------
-    strength, temperature, material, material eos-strength
-    """
-    define(hub, hub.parts["damage"], ID, style, arguments)
-
-
-def temperature(hub: Hub, ID: str, style: StyleOf("temperature"), *arguments: Argument) -> None:
-    """Define a temperature: how a material heats, and what heat does to its pressure.
-
-    Parameters
-    ----------
-    ID
-        Name of the temperature.
-    style
-        The law.
-    arguments
-        What the style asks for; see its page.
-
-    Example
-    -------
-    temperature(warm, plastic_work, 0.9, 385, 0, 0, 298, 1356)
-
-    See Also
-    --------
-    strength, damage, material, material eos-strength
-    """
-    define(hub, hub.parts["temperature"], ID, style, arguments)
+eos = _part(
+    "eos",
+    "Define an equation of state: the pressure of a material, and its density.",
+    "eos(bulk, linear, 7850, 160e9)",
+    "strength",
+)
+strength = _part(
+    "strength",
+    "Define a strength: the deviatoric stress of a material.",
+    "strength(mild, plastic, 80e9, 400e6)",
+    "eos, damage, temperature",
+)
+damage = _part(
+    "damage",
+    "Define a damage: how a material loses its strength.",
+    "damage(ductile, damage_johnson_cook, 0.54, 4.89, -3.03, 0.014, 1.12, 1, 298, 1356)",
+    "strength, temperature",
+)
+temperature = _part(
+    "temperature",
+    "Define a temperature: how a material heats, and what heat does to its pressure.",
+    "temperature(warm, plastic_work, 0.9, 385, 0, 0, 298, 1356)",
+    "strength, damage",
+)
 
 
 def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Sequence[Argument]):

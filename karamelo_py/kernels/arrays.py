@@ -211,6 +211,7 @@ CLOCK = np.dtype(
     [
         ("fixed_dt", np.float64),  # step of set_dt, or 0
         ("dt_factor", np.float64),  # share of the stable step of waves
+        ("dt_factor_moving", np.float64),  # the same once points have moved: see kernels.step
         ("heat_factor", np.float64),  # of that of conduction
         ("end_time", np.float64),
         ("last_dt", np.float64),  # of the last step; of the present one before there was any
@@ -221,8 +222,11 @@ CLOCK = np.dtype(
         ("new_move", np.float64),
         ("drift", np.float64),  # since the points were sorted, in cells
         ("drift_limit", np.float64),
+        ("pace", np.float64),  # of the point that went furthest in a step since then
+        ("path", np.float64),  # of the points that went furthest, since the start, in cells
         ("spacing", np.float64),  # smallest cell size
         ("courant", np.float64),  # stable step over cell size / rate
+        ("courant_moving", np.float64),  # the same once points have moved
         ("heat_limit", np.float64),  # stable step of conduction, infinite where there is none
         ("heat_reference", np.float64),  # the same in undeformed bodies
         ("kept", np.float64),  # share of its own velocity that a point keeps (FLIP)

@@ -245,6 +245,10 @@ def kick(s):
 NEXT_TO_NOTHING = 1e-9  # of a step
 ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
 
+# Points that go from cell to cell feed energy to a body, by so much a cell, and the more the longer
+# the step. Until they have gone so far, in cells, a scene takes the steps of bodies at rest.
+STILL = 0.25
+
 
 @entered
 def choose_dt(control):
@@ -286,7 +290,11 @@ def finish(control):
     control.values[TIME] = clock.end_time if clock.end_time - control.values[TIME] == dt else time
     control.values[TIMESTEP] += 1
     clock.drift += clock.move
+    clock.path += clock.move
+    clock.pace = max(clock.pace, clock.move)
     clock.move = 0.0
+    if clock.path > STILL:
+        clock.courant, clock.dt_factor = clock.courant_moving, clock.dt_factor_moving
     choose_dt(control)
 
 

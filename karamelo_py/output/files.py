@@ -32,6 +32,12 @@ def whole(path: Path) -> Iterator[BinaryIO]:
             raise
 
 
+def write_whole(path: Path, text: str) -> None:
+    """Write a text to a file, which holds all of it or what it held before."""
+    with whole(path) as file:
+        file.write(text.encode())
+
+
 @contextmanager
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
     """Open `path` to go on at byte `start` (0: a new file).

@@ -43,8 +43,8 @@ from karamelo_py.styles.fixes.body_force import BodyForce
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
 FAST = 0.2  # of the speed of waves, from where on usf and usavg feed moments
 STRETCH = 0.3  # strain beyond which one is said to stretch
-DRIFT = 0.05  # of the speed of waves, from where on it feeds the noise of FLIP ...
-LONG = 5000  # ... in so many steps
+DRIFT = 0.01  # of the speed of waves, from where on it feeds the noise of FLIP ...
+FAR = 25, 150, 150  # ... over so many cells, by dimension
 SWING = 0.05  # strain of vibrations that bodies do not bear for long
 SEPARATE = 0.1  # of ASFLIP's strength of separation, which elastic bodies bear
 SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
@@ -195,14 +195,14 @@ def _drift_noise(s: Foreseen) -> Iterator[Failure]:
     feeds = isinstance(s.transfer, FLIP) and isinstance(s.scheme, (MUSL, USF))
     if not (smooth and feeds and s.transfer.alpha > 0.9 and s.solids(*ELASTIC)):
         return
-    dt = s.simulation.dt
-    if DRIFT < s.speed < 1 and s.duration > LONG * dt > 0:
-        steps = s.duration / dt
+    cells = s.speed * s.waves * s.duration / s.simulation.control.clock[0].spacing
+    if DRIFT < s.speed < 1 and cells > FAR[s.d - 1]:
         yield Failure(
             "noise of a drift",
-            f"points move at {s.speed:.2g} times the speed of waves for about {steps:.0f} steps, "
-            "and with musl and usf what the grid does not see of the velocities grows, whatever "
-            "the step (its energy by e in 150 steps in 1D, 400 in the plane; cubic splines, 600)",
+            f"points move at {s.speed:.2g} times the speed of waves through about {cells:.0f} "
+            "cells, and with musl and usf what the grid does not see of the velocities grows, "
+            "whatever the step (its energy by e in 3 to 8 cells in 1D, in 15 to 25 in the plane "
+            "with ugimp, cpgimp or one point a cell, later with two)",
             "scheme(usavg), with which it does not",
         )
 
@@ -383,7 +383,7 @@ def _warn_about_groups(hub: Hub) -> None:
 
 def _warn_about_step(hub: Hub, simulation: Simulation, halves: bool) -> None:
     """Say so before the first step when the step is above the stable limit."""
-    update, limit = hub.update, simulation.limit
+    update, limit = hub.update, simulation.limit_moving
     asked = update.fixed_dt or (update.dt_factor or 0) * limit
     if not asked > limit * (1 + 1e-12):
         return

@@ -71,6 +71,7 @@ class State(NamedTuple):
     fields: dict[type, np.ndarray]  # declared fields that are kept
     contact: NamedTuple  # how solids touch, with what it remembers
     last_dt: float  # the step that the velocities belong to the middle of
+    path: float  # how far points have gone
 
 
 def check_scene(hub: Hub) -> None:
@@ -130,16 +131,6 @@ def thread_count(hub: Hub, points: int) -> int:
     return usable if points > SERIAL_UP_TO else 1
 
 
-def stable_courant(hub: Hub) -> float:
-    """The stable step as a share of cell size over wave speed, by scheme, basis and points."""
-    scheme, method = hub.update.scheme, hub.update.method
-    two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
-    if min(two, one) == 1:
-        return 1.0 if method.frame.moves else getattr(method.basis, "courant_still", 1.0)
-    # Nodes between the corners of cells make the highest frequency higher.
-    return (one if sparse(hub) else two) * (0.7 if method.basis.nodes_per_cell > 1 else 1)
-
-
 def stable_conduction(hub: Hub) -> float:
     """The stable step of conduction in undeformed bodies, of the worst.
 
@@ -192,7 +183,7 @@ def lower(
         method.resume(contact, previous.contact)
     control = new_control(hub.values.array)
     clock = control.clock[0]
-    clock.last_dt = previous.last_dt if previous else 0.0
+    clock.last_dt, clock.path = (previous.last_dt, previous.path) if previous else (0.0, 0.0)
     clock.spacing = min(lattice.h for lattice in lattices)
     clock.heat_limit = clock.heat_reference = stable_conduction(hub)
     clock.kept = getattr(transfer, "alpha", 0)
@@ -327,28 +318,36 @@ def lower_block(
     laws_of_solids = list(dict.fromkeys(known))
     laws = law_table(laws_of_solids, real)
 
-    def each(values: list, dtype: type) -> np.ndarray:
-        """(n,): the value of its solid for each point."""
-        return np.repeat(np.array(values, dtype), [s.count for s in solids])
+    ends = np.cumsum([s.count for s in solids])
+    count = int(ends[-1])
 
-    ids = np.concatenate([np.arange(s.first_id, s.first_id + s.count) for s in solids])
-    states = [start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True)]
-    counts = [s.count for s in solids]
-    places = np.concatenate([method.places(kin, s, real) for s in solids])
-    places = np.ascontiguousarray(places.T)
+    def joined(values: Iterable, dtype: type) -> np.ndarray:
+        """(n,) or (k, n): of the values of each solid, a number or column, or one for each point.
+
+        Nothing of the length of all points is made beside it.
+        """
+        array = np.empty(0)
+        for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):
+            if not array.size:
+                array = np.empty((*value.shape[:-1], count), dtype)
+            array[..., end - s.count : end] = value
+        return array
+
+    states = (start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True))
+    places = joined((method.places(kin, s, real).T for s in solids), real)
     here = places if method.frame.moves else places[: kin.dimension]
     elastic = elastic_law(laws)
     own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
     points = Points(
         x=np.stack([here, here]),
         home=None if method.frame.moves else places,
-        v=np.zeros((kin.dimension, len(ids)), real),
-        mass=np.concatenate([s.mass for s in solids]).astype(real),
-        state=np.repeat(np.array(states, real).T, counts, axis=1),
-        material=each([laws_of_solids.index(law) for law in known], np.int32),
-        grid=each([method.lattice_of(hub, s) for s in solids], np.int32),
-        id=ids.astype(np.int64),
-        fields=tuple(fields.at_points(kind, kin, len(ids), real) for kind in own),
+        v=np.zeros((kin.dimension, count), real),
+        mass=joined((s.mass for s in solids), real),
+        state=joined((state[:, None] for state in states), real),
+        material=joined((laws_of_solids.index(law) for law in known), np.int32),
+        grid=joined((method.lattice_of(hub, s) for s in solids), np.int32),
+        id=joined((np.arange(s.first_id, s.first_id + s.count) for s in solids), np.int64),
+        fields=tuple(fields.at_points(kind, kin, count, real) for kind in own),
     )
     block = Block(points, laws, tiles.empty_tiling())
     return block if previous is None else resumed(block, previous)

@@ -56,10 +56,10 @@ def report(hub: Hub, end_time: float = inf) -> None:
     say("fields of a node")
     for name, array in node_fields(s):
         say(f"  {name:<30}  {array.shape[1]!s:<10} {array.itemsize * array.shape[1]:>6}")
-    say(f"boxes of tiles {tiles.box_bytes(s) / 2**20:.3g} MiB")
+    say(f"boxes of tiles {_size(tiles.box_bytes(s))}")
     memory = memory_of(simulation, s, tiles.box_bytes(s))
-    say(f"memory         {memory.touched / 2**20:.3g} MiB touched, and in a run")
-    say(f"               {memory.copied / 2**20:.3g} MiB for a copy of the last good state")
+    say(f"memory         {_size(sum(memory))} in a run, of which")
+    say(f"               {_size(memory.copied)} are a copy of the last good state")
     if hub.settings.ranks > 1:
         say("")
         for line in told(simulation, hub.settings.ranks):
@@ -75,6 +75,12 @@ def report(hub: Hub, end_time: float = inf) -> None:
     for saving in found:
         say(f"  {saving.cost}")
         say(f"    instead: {saving.instead}")
+
+
+def _size(count: float) -> str:
+    """So many bytes, in words."""
+    mib = count / 2**20
+    return f"{mib:.0f} MiB" if mib > 100 else f"{mib:.3g} MiB"
 
 
 def bytes_per_point(simulation: Simulation) -> int:

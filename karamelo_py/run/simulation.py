@@ -32,6 +32,7 @@ from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.step import (
     DONE,
     SORT,
+    STILL,
     SUMS,
     Fused,
     Staged,
@@ -56,12 +57,11 @@ from karamelo_py.run.lowering import (
     State,
     chosen,
     lower,
-    stable_courant,
     thread_count,
     warms_by_friction,
 )
 from karamelo_py.run.motion import Motion, motions
-from karamelo_py.run.stable import ruling_limit, shares_of_limits
+from karamelo_py.run.stable import moves_already, ruling_limit, share_of_heat, steps_of_waves
 from karamelo_py.run.state import changing, take_tiling
 from karamelo_py.run.tiles import Tiles, in_tiles, used
 from karamelo_py.run.trial import try_parts
@@ -255,6 +255,7 @@ class Simulation(ById):
             {kind: self.declared(kind).T for kind in kept},
             self.setup.contact,
             float(self.control.clock[0].last_dt),
+            float(self.control.clock[0].path),
         )
 
     def set_stress(self, ids: np.ndarray, given: dict[str, np.ndarray]) -> None:
@@ -345,7 +346,6 @@ class Simulation(ById):
             numba.set_num_threads(self.threads)
         update = self.hub.update
         clock = self.control.clock[0]
-        clock.courant = stable_courant(self.hub)
         self._ask_for_steps(0)
         clock.end_time = end_time
         clock.over_limit = 0
@@ -354,6 +354,9 @@ class Simulation(ById):
         begun_before = len(self._begun)
         self._prepare_hooks()
         update.method.begin(self.hub, self.contact)
+        if self.step == 0 and moves_already(self):
+            clock.path = np.inf
+            self._ask_for_steps(0)
         self._choose_dt()
         if not np.isfinite(self.dt):
             raise ScriptError(
@@ -375,10 +378,14 @@ class Simulation(ById):
     def _ask_for_steps(self, halvings: int) -> bool:
         """Tell the clock which steps are asked for; whether these are others than before."""
         clock = self.control.clock[0]
-        before = clock.fixed_dt, clock.dt_factor, clock.heat_factor
-        asked = self.hub.update.fixed_dt or 0.0, *shares_of_limits(self.hub)
-        now = tuple(number / 2**halvings for number in asked)
-        clock.fixed_dt, clock.dt_factor, clock.heat_factor = now
+        names = "fixed_dt", "heat_factor", "dt_factor", "dt_factor_moving"
+        before = [clock[name] for name in names]
+        (courant, share), moving = steps_of_waves(self.hub, still=clock.path <= STILL)
+        clock.courant, clock.courant_moving = courant, moving[0]
+        asked = self.hub.update.fixed_dt or 0.0, share_of_heat(self.hub), share, moving[1]
+        now = [number / 2**halvings for number in asked]
+        for name, number in zip(names, now, strict=True):
+            clock[name] = number
         return now != before
 
     def _watch_limit(self) -> None:
@@ -460,9 +467,10 @@ class Simulation(ById):
 
     def fastest(self) -> float:
         """The largest component of the velocities of all points."""
-        blocks = self.stepped.blocks
-        own = max((float(np.abs(b.points.v).max(initial=0)) for b in blocks), default=0.0)
-        return float(self.most(np.array([own]))[0])
+        velocities = (block.points.v for block in self.stepped.blocks)
+        # No copy of them: there may be millions.
+        own = max((max(v.max(initial=0), -v.min(initial=0)) for v in velocities), default=0.0)
+        return float(self.most(np.array([own], float))[0])
 
     def motions(self) -> list[Motion]:
         """How the solids lie and move."""
@@ -488,9 +496,17 @@ class Simulation(ById):
         """The name of what limits the step now."""
         return ruling_limit(self)
 
+    @property
+    def limit_moving(self) -> float:
+        """The stable step once points go from cell to cell."""
+        clock = self.control.clock[0]
+        waves = clock.courant_moving * clock.spacing / clock.rate if clock.rate > 0 else np.inf
+        return float(min(waves, clock.heat_limit))
+
     def above_limit(self) -> bool:
-        """Whether the chosen step is above the stable limit already."""
-        return self.control.values[DT] > self.limit * (1 + 1e-12)
+        """Whether the step is above the stable limit; that of set_dt, once points have moved."""
+        limit = self.limit_moving if self.control.clock[0].fixed_dt > 0 else self.limit
+        return self.control.values[DT] > limit * (1 + 1e-12)
 
     @property
     def dt(self) -> float:

@@ -34,7 +34,11 @@ LONGER = 16  # times, along the rows of nodes in space, where cells have one poi
 SHARES = 64  # of the points of a block, nearly equal: threads share them out
 SPAN = 256  # nodes of a span at most: threads share out spans
 DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
-DRIFT = 1.0  # cells that points may go before they are sorted again
+DRIFT = 1.0  # cells that points may go at most before they are sorted again
+# By dimension, the least they may go: boxes are smaller then, and more points beside each other see
+# the same nodes; in the plane that brings less than it costs to sort.
+LEAST_DRIFT = {1: DRIFT, 2: DRIFT, 3: 0.25}
+STEPS = 32  # that are to be between two sorts where points may go further for that
 
 
 class Boxes(NamedTuple):
@@ -152,8 +156,10 @@ class Tiles:
     def sort(self, s: Setup) -> None:
         """Sort all points by tile and find the nodes in use; all sums at nodes are zero then."""
         self.empty_nodes(s)
-        s.control.clock[0].drift = 0.0
-        s.control.clock[0].drift_limit = DRIFT if s.frame.moves else np.inf
+        clock = s.control.clock[0]
+        limit = min(max(LEAST_DRIFT[self.dimension], STEPS * clock.pace), DRIFT)
+        clock.drift_limit = limit if s.frame.moves else np.inf
+        clock.drift = clock.pace = 0.0
         occupied = [self._sort_block(s, block) for block in s.blocks]
         self.occupied = len(np.unique(np.concatenate(occupied)))
         self.lay_out(s)
@@ -166,7 +172,7 @@ class Tiles:
             far = widest(s.kin, s.basis, s.grids, x, block.points.grid)
         cells = float(self._cells.max())
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
-        drift = DRIFT + rounding if s.frame.moves else 0.0
+        drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
         return far + drift if far < cells else cells  # also where it is not a number
 
     def _by_tile(self, s: Setup, block: Block) -> tuple[np.ndarray, ...]:

@@ -6,13 +6,12 @@ this command, since machines are shared and their clocks change.
 
 import re
 from argparse import ArgumentTypeError, Namespace
-from math import inf
 from pathlib import Path
 from typing import Any
 
 from karamelo_py.app.bench import measure, record, scaling
 from karamelo_py.app.bench.workloads import WORKLOADS
-from karamelo_py.app.cli import add_variables, threads_option
+from karamelo_py.app.options import above_zero, add_variables, threads_option
 from karamelo_py.app.studies.options import out_file
 from karamelo_py.script.errors import ScriptError, unknown
 
@@ -45,7 +44,7 @@ workloads:
         f"is, and on one as many times as large (default workloads: {', '.join(scaling.USUAL)})",
     )  # fmt: skip
     parser.add_argument(
-        "--seconds", type=_positive, default=2.0, metavar="S",
+        "--seconds", type=above_zero, default=2.0, metavar="S",
         help="how long each scene is measured (default: 2)",
     )  # fmt: skip
     parser.add_argument("-o", type=Path, metavar="FILE", help="write what is measured, as JSON")
@@ -108,16 +107,6 @@ def _counts(text: str) -> list[int]:
     if not all(word.isdigit() and int(word) for word in words):
         raise ArgumentTypeError(f"'{text}' is no list of numbers of processes, such as 1,2,4")
     return [int(word) for word in words]
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value < inf:
-        raise ArgumentTypeError(f"'{text}' is not a number of seconds above 0")
-    return value
 
 
 def _print(name: str, one: measure.Measured, *, published: bool) -> None:

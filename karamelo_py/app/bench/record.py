@@ -11,6 +11,7 @@ import karamelo_py
 from karamelo_py.app.bench.measure import Measured
 from karamelo_py.app.bench.scaling import Scaled
 from karamelo_py.app.studies.records import surroundings
+from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError
 
 KIND = "karamelo-py bench"
@@ -84,12 +85,7 @@ def commit() -> str | None:
 
 def write(path: Path, found: Mapping[str, Any]) -> None:
     """Write a bench in one piece."""
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise ScriptError(f"cannot write {path}: {error.strerror or error}") from None
+    write_whole(path, json.dumps(found, indent=1) + "\n")
 
 
 def read(path: Path) -> dict[str, Any]:

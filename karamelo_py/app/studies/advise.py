@@ -9,6 +9,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import environment
 from karamelo_py.app.studies.curves import column, order, usable
@@ -19,8 +20,6 @@ from karamelo_py.app.studies.options import (
     family,
     new_parser,
     out_file,
-    positive,
-    seconds,
     zipped,
 )  # fmt: skip
 from karamelo_py.app.studies.study import Study, shown, terminal
@@ -164,7 +163,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="COLUMN",
         help="log column: err, max:err, or a formula: off=abs(max:u/3.28 - 1)",
     )
-    parser.add_argument("-target", required=True, type=seconds, help="the error that is allowed")
+    parser.add_argument("-target", required=True, type=above_zero, help="the error that is allowed")
     parser.add_argument("-cost", default="seconds", help="what counts as cost (seconds)")
     parser.add_argument("-along", metavar="NAME", help="the variable that makes the scene finer")
     parser.add_argument("-pilot", type=positive, default=3, help="runs of each choice at first (3)")

@@ -19,6 +19,7 @@ from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import environment
 from karamelo_py.app.studies.options import new_parser
 from karamelo_py.output.console import duration
+from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError, meant
 
 DESCRIPTION = """\
@@ -227,10 +228,8 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
         if done.returncode:
             print(done.stdout, end="")
             return "failed"
-    part = record.with_name(KEPT + ".part")
     made = {"key": key, "commands": lines, **records.surroundings()}
-    part.write_text(json.dumps(made, indent=1), encoding="utf-8")
-    part.replace(record)
+    write_whole(record, json.dumps(made, indent=1))
     return "done"
 
 

@@ -16,9 +16,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import karamelo_py
+from karamelo_py.output.files import write_whole
 
 KEPT = "case.json"
 # Facts are indented by 2, the parts of the time by 4.
@@ -143,9 +142,7 @@ class Launch:
             "reason": outcome.reason,
             "facts": outcome.facts,
         }
-        part = folder / (KEPT + ".part")
-        part.write_text(json.dumps(record, indent=1), encoding="utf-8")
-        part.replace(folder / KEPT)
+        write_whole(folder / KEPT, json.dumps(record, indent=1))
         return outcome
 
     def _once(self, case: Mapping[str, str], folder: Path) -> Outcome:
@@ -257,27 +254,6 @@ def reason_in(complaint: str) -> str:
             return match[1].strip()
     lines = [line for line in complaint.splitlines() if line.strip()]
     return lines[-1].strip() if lines else "ended without a message"
-
-
-def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
-    """The columns of a log in a folder; where they change between runs, all rows of a column."""
-    columns: dict[str, list[float]] = {}
-    names: list[str] = []
-    try:
-        lines = (folder / name).read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return {}
-    for k, line in enumerate(lines):
-        if k == 0 or line.startswith("#"):
-            names = line.lstrip("# ").split()
-            continue
-        cells = line.split()
-        # The last line of a run that was killed may be cut.
-        if len(cells) == len(names):
-            with contextlib.suppress(ValueError):
-                for name, value in zip(names, [float(cell) for cell in cells], strict=True):
-                    columns.setdefault(name, []).append(value)
-    return {name: np.array(values) for name, values in columns.items()}
 
 
 def folder_name(case: Mapping[str, Any]) -> str:

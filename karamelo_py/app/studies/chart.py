@@ -56,6 +56,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("-exact", metavar="COLUMN", help="of -curve: the exact log column")
     parser.add_argument("-names", default="", help="of -curve: what to call the runs, with commas")
+    parser.add_argument(
+        "-axes", metavar="X,Y", help="of -curve: what to write along them, such as 'time (s),F (N)'"
+    )
     parser.add_argument("-log", default="log.mpm", metavar="FILE", help="of -curve: another log")
     parser.add_argument("-where", action="append", default=[], help="rows that fulfil a condition")
     parser.add_argument("-title", help="heads the chart (the name of the script)")
@@ -162,6 +165,9 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     differing = [name for name in by if len({row[name] for row in rows}) > 1]
     over = options.x or "Time"
     names = [name.strip() for name in options.names.split(",") if name.strip()]
+    axes = [words.strip() for words in (options.axes or f"{over},{options.curve}").split(",")]
+    if len(axes) != 2:
+        raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
 
     def read(column: str) -> list[histories.History]:
         return histories.histories(
@@ -174,7 +180,7 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
         exact = whole._replace(label=options.exact)
     title = options.title if options.title is not None else Path(made.get("script", "")).name
     found = read(options.curve)
-    histories.draw(found, out, x=over, y=options.curve, title=title, exact=exact)
+    histories.draw(found, out, x=axes[0], y=axes[1], title=title, exact=exact)
     for each in found:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")

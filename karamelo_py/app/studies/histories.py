@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.case import read_log
 from karamelo_py.app.studies.curves import Line
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tidy

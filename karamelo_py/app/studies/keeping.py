@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.app.studies.case import read_log
+from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies.curves import missing
 
 WITHIN = 0.1  # of what it was, which still counts as kept

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from karamelo_py.app.options import VARIABLE, above_zero, positive
 from karamelo_py.app.studies.case import Launch
 from karamelo_py.app.studies.study import default_jobs
 from karamelo_py.app.studies.variables import VALUES, check_script, choices, texts
@@ -24,7 +25,7 @@ def add_family(parser: Any) -> None:
     """Options of a family of runs."""
     parser.add_argument("script", type=Path, help="the script")
     parser.add_argument(
-        "-var", "--var", "-v", action="append", default=[], metavar="NAME=VALUES",
+        *VARIABLE, action="append", default=[], metavar="NAME=VALUES",
         help=f"values of a variable of the script: {VALUES}; again for each variable",
     )  # fmt: skip
     parser.add_argument(
@@ -34,7 +35,7 @@ def add_family(parser: Any) -> None:
         "--threads", type=positive, default=None, help="threads of each run (default: 1)"
     )
     parser.add_argument(
-        "-limit", type=seconds, metavar="SECONDS", help="give up a run that takes longer"
+        "-limit", type=above_zero, metavar="SECONDS", help="give up a run that takes longer"
     )
     parser.add_argument(
         "-again", action="store_true", help="run also what is known from an earlier study"
@@ -109,21 +110,3 @@ def out_file(path: Path, *suffixes: str) -> Path:
     if path.is_dir():
         raise ScriptError(f"{path} is a folder", expected="the name of a file")
     return path
-
-
-def positive(text: str) -> int:
-    """A whole number of at least 1."""
-    if not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
-    return int(text)
-
-
-def seconds(text: str) -> float:
-    """A number above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
-    return value

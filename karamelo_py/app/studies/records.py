@@ -1,6 +1,7 @@
 """The table of a study: one row a run, as CSV, and what it was made with beside it."""
 
 import csv
+import io
 import json
 import os
 import platform
@@ -14,8 +15,10 @@ from typing import Any
 import numpy as np
 
 import karamelo_py
-from karamelo_py.app.studies.case import COLUMNS, Outcome, read_log
+from karamelo_py.app.logs import read_log
+from karamelo_py.app.studies.case import COLUMNS, Outcome
 from karamelo_py.app.studies.variables import Scope, number
+from karamelo_py.output.files import write_whole
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, meant, nearest
 from karamelo_py.script.evaluation import evaluate
@@ -188,16 +191,12 @@ def row(
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write a table, in one piece: a reader sees the old one or the new one."""
-    part = path.with_name(path.name + ".part")
-    try:
-        with part.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            for each in rows:
-                writer.writerow({name: _cell(value) for name, value in each.items()})
-        part.replace(path)
-    except OSError as error:
-        raise ScriptError(f"cannot write {path}: {error.strerror or error}") from None
+    file = io.StringIO()
+    writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    for each in rows:
+        writer.writerow({name: _cell(value) for name, value in each.items()})
+    write_whole(path, file.getvalue())
 
 
 def _cell(value: Any) -> str:

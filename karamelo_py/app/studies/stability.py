@@ -11,16 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.app.logs import read_log
+from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.case import read_log
 from karamelo_py.app.studies.frontier import Cell, explore, unseen
 from karamelo_py.app.studies.options import (
     add_family,
     family,
     new_parser,
     out_file,
-    positive,
-    seconds,
 )
 from karamelo_py.app.studies.study import Study
 from karamelo_py.app.studies.variables import logged, number
@@ -61,7 +60,7 @@ def add_parser(subparsers: Any) -> None:
     add_family(parser)
     parser.add_argument("-energy", metavar="COLUMN", help="log column that should not grow")
     parser.add_argument(
-        "-bound", type=seconds, default=2.0,
+        "-bound", type=above_zero, default=2.0,
         help="growing: energy above this times the largest of the first tenth of the log (2)",
     )  # fmt: skip
     parser.add_argument("-stride", type=positive, default=6, help="cells between first runs (6)")

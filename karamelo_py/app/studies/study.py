@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies.case import Launch, Outcome, folder_name, read_log
+from karamelo_py.app.logs import read_log
+from karamelo_py.app.studies.case import Launch, Outcome, folder_name
 from karamelo_py.app.studies.records import Recorded, row
 from karamelo_py.app.studies.variables import number
 from karamelo_py.output.console import duration

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from karamelo_py.app.options import positive
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.options import (
     add_combinations,
@@ -11,7 +12,6 @@ from karamelo_py.app.studies.options import (
     family,
     new_parser,
     out_file,
-    positive,
     zipped,
 )
 from karamelo_py.app.studies.study import Study, results_table, terminal

@@ -26,6 +26,9 @@ steady_moment
 gradient_jumps
     whether gradients jump at the faces of cells (not, where a class does not say): points that move
     from cell to cell then feed energy to a body, the less the smaller the step;
+courant_still, courant_total
+    the stable step over h/c while points are where they were, in the updated frame, and in the
+    total one (1, where a class does not say);
 steep_edge
     whether |grad N|^2 / N exceeds 2 / h^2 a direction where a weight vanishes: usl then limits what
     light nodes do to the strain.

@@ -2,9 +2,8 @@
 
 import numpy as np
 
+from karamelo_py.output.fields import COMPONENTS
 from karamelo_py.scene.modify import Compute
-
-COMPONENTS = ("11", "22", "33", "12", "13", "23")
 
 
 class AverageStress(Compute):

@@ -11,12 +11,11 @@ import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
+from karamelo_py.output.fields import AXES, COMPONENTS
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.script.errors import ScriptError, unknown
 
-AXES = "xyz"
-COMPONENTS = ("11", "22", "33", "12", "13", "23")
 VECTORS = {"displacement": "u", "velocity": "v"}
 TENSORS = {"stress": "s", "strain": "e"}
 DISPLACEMENTS = ("ux", "uy", "uz")

@@ -1,10 +1,47 @@
-"""Options of the command line that say where the files of a run go."""
+"""Options that subcommands share: variables, numbers, where the files of a run go."""
 
 import argparse
 from pathlib import Path
 
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
+
+VARIABLE = ("-var", "--var", "-v")
+
+
+def add_variables(parser: argparse.ArgumentParser, text: str) -> None:
+    """Let a command line set variables of scripts."""
+    parser.add_argument(
+        *VARIABLE, nargs=2, action="append", default=[], metavar=("NAME", "VALUE"),
+        help=text,
+    )  # fmt: skip
+
+
+def threads_option(text: str) -> int | None:
+    """The value of --threads: a number, or None for auto."""
+    if text == "auto":
+        return None
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of threads (1, 2, ... or auto)")
+    return int(text)
+
+
+def positive(text: str) -> int:
+    """A whole number of at least 1."""
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
+    return int(text)
+
+
+def above_zero(text: str) -> float:
+    """A number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return value
 
 
 def add_output_options(parser: argparse.ArgumentParser) -> None:

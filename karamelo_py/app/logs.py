@@ -1,0 +1,61 @@
+"""Logs of earlier runs, read back: log.mpm or log.csv."""
+
+import csv
+from math import nan
+from pathlib import Path
+
+import numpy as np
+
+from karamelo_py.script.errors import ScriptError
+
+
+def read_rows(path: Path) -> list[dict[str, float]]:
+    """The rows of a log, by column; words, such as what limits the step, are NaN.
+
+    A line that begins with # names the columns anew; one that a killed run has left half is passed
+    over.
+
+    Raises
+    ------
+    ScriptError
+        If the file cannot be read, or is no log.
+    """
+    names: list[str] = []
+    rows = []
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            of_cells = csv.reader(file) if path.suffix == ".csv" else map(str.split, file)
+            for cells in filter(None, of_cells):
+                if not names or cells[0].startswith("#"):
+                    names = [name for name in (cells[0].lstrip("# "), *cells[1:]) if name]
+                    continue
+                numbers = [_number(cell) for cell in cells]
+                if len(cells) == len(names) and any(number == number for number in numbers):
+                    rows.append(dict(zip(names, numbers, strict=True)))
+    except OSError as error:
+        raise ScriptError(f"cannot read {path}: {error.strerror or error}") from error
+    except UnicodeDecodeError:
+        rows = []
+    if not rows:
+        raise ScriptError(f"{path} is not a log", expected="log.mpm or log.csv of a run")
+    return rows
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return nan
+
+
+def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
+    """The columns of a log in a folder, those of no log where it cannot be read.
+
+    Where they change between runs, all rows of a column.
+    """
+    try:
+        rows = read_rows(folder / name)
+    except ScriptError:
+        return {}
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: np.array([row[name] for row in rows if name in row]) for name in names}
