@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from karamelo_py.compiler.compile import address_of_python
-from karamelo_py.kernels.arrays import Control
+from karamelo_py.compiler.formula import GLOBAL, UNIFORM
+from karamelo_py.kernels.arrays import DT, Control
 from karamelo_py.kernels.ranks import CALL, GIVE, LARGEST, NEXT, NUMBER, SWEEP, TAKE, TOTALS
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.crew import Crew
@@ -90,3 +91,9 @@ class Answers:
         SWEEP: _go_on, NEXT: _go_on, GIVE: _give, TAKE: _take, TOTALS: _totals,
         LARGEST: _largest, NUMBER: _number,
     }  # fmt: skip
+
+
+def reads_totals(hooks: Any) -> bool:
+    """Whether formulas read within steps what fixes publish."""
+    code = getattr(hooks, "code", np.empty((0, 2), np.int64))
+    return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())

@@ -2,79 +2,43 @@
 
 All processes carry out the script, up to a run. There the first leads: it does what a single
 process does, and has the others step with it. Each has the points of its tiles. What is to be seen
-between two steps (by logs, dumps, computes, files to go on from) the first gathers into the arrays
-of a whole scene, and hands out anew where something has changed them.
+between two steps by what knows nothing of parts (most computes, pictures, files to go on from) the
+first gathers into the arrays of a whole scene, and hands out anew where something has changed them.
 """
 
 from __future__ import annotations
 
-import signal
-import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from functools import wraps
+from contextlib import contextmanager
 from typing import Any, NamedTuple
-from zlib import crc32
 
 import numpy as np
 
-from karamelo_py.compiler.formula import GLOBAL, UNIFORM
-from karamelo_py.kernels.arrays import DT, Block, Setup, arrays_of
+from karamelo_py.kernels.arrays import Block, Setup, arrays_of
 from karamelo_py.kernels.totals import WORK
+from karamelo_py.run.answers import reads_totals
 from karamelo_py.run.by_id import ById, Piece
-from karamelo_py.run.crew import ENDING, FAILED, Crew
-from karamelo_py.run.handing import by_tile, join_tilings
+from karamelo_py.run.gathering import join, lined_up, spread
+from karamelo_py.run.leading import Abandoned, HandedOutAnew, Leading, by_all
 from karamelo_py.run.lowering import State, lower
 from karamelo_py.run.part import Part
 from karamelo_py.run.shares import joined, sized, work_of
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.state import of_nodes
-from karamelo_py.run.tiles import (
-    DIRECT_UP_TO,
-    SHARES,
-    Tiles,
-    in_tiles,
-    numbers,
-)
+from karamelo_py.run.tiles import DIRECT_UP_TO, Tiles, in_tiles, numbers
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Quit, ScriptError
 
-OVER = "over"
 CHANGING = ("advance", "set_initial")  # what changes the points
 
 
-def by_all(method: Callable) -> Callable:
-    """A method of each process for its part, where the whole is not there: of all together."""
-
-    @wraps(method)
-    def act(self: Ranks, *arguments: Any) -> Any:
-        if self._stepping or self._shown or not self._leading:
-            return method(self, *arguments)
-        return self._all_do(method.__name__, *arguments)
-
-    return act
-
-
-class Abandoned(Exception):
-    """The first process has found a fault in the midst of a step, and tells of it."""
-
-
-class HandedOutAnew(Exception):
-    """A fix in Python has moved points at the start of a step: others have them now."""
-
-
-class Ranks(Simulation):
+class Ranks(Leading):
     """The arrays of a scene that several processes share."""
 
     def __init__(self, hub: Hub, previous: Ranks | None = None):
-        self.crew: Crew = hub.settings.crew
         self._whole: Setup | None = None
         self._shown = True  # the whole has the present state
         self._handed_out = -1  # the version of the whole that the parts have
-        self._leading = False
         self._stepping = False  # arrays are those of the part
-        self._joint = False  # all processes do the same, and wait for each other
-        self._prepared = False
         self._bare = False
         super().__init__(hub, previous)
         # Nobody has points yet: each makes those of a share when a run begins.
@@ -143,84 +107,7 @@ class Ranks(Simulation):
         alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
         return {"processes": f"{self.crew.size}{alone if self.tiles.direct else ''}"}
 
-    # --- leading and following --------------------------------------------------------------------
-
-    @property
-    def follows(self) -> bool:
-        """Another process says what this one does in a run."""
-        return not self.crew.leads
-
-    @contextmanager
-    def leading(self) -> Iterator[None]:
-        """While a run goes on: the others follow."""
-        self._meet()
-        self._leading, self._prepared = True, False
-        well = False
-        try:
-            yield
-            well = True
-        finally:
-            self._leading = False
-            if self._joint:
-                # In the midst of what all do together: the others would wait for ever.
-                self.crew.amid = True
-            else:
-                if well and self.hub.interpreter.has_more and not self._bare:
-                    self._see_parts()
-                deleted = np.flatnonzero(~self.present)
-                self.crew.told((OVER, well, deleted, self.hub.values.array))
-
-    def _meet(self) -> None:
-        """See that all processes are about to do the same run."""
-        hub, crew = self.hub, self.crew
-        present = [hub.place and (hub.place.file, hub.place.line), len(hub.runs), self.count]
-        words = crew.meet(1 + crc32(repr((present, hub.interpreter.presets)).encode()))
-        if (words == words[0]).all():
-            return
-        crew.parted = True
-        # One that has failed tells of it.
-        if (words == FAILED).any() or crew.rank != int((words > 0).argmax()):
-            raise Quit
-        raise ScriptError(
-            "the processes do not come to the same run",
-            place=hub.place,
-            expected="the same script, files and variables for all of them",
-        )
-
-    def follow(self) -> None:
-        """Do what the first process says, until its run is over."""
-        if threading.current_thread() is threading.main_thread():
-            for number in ENDING:  # the first hears of them
-                signal.signal(number, signal.SIG_IGN)
-        self._meet()
-        hub = self.hub
-        hub.restart = hub.interpreter.replay = None
-        while True:
-            what, *arguments = self.crew.told()
-            if what == OVER:
-                well, deleted, values = arguments
-                hub.values.array[:] = values
-                self.present[deleted] = False
-                if not well:
-                    raise Quit
-                return
-            try:
-                with suppress(Abandoned):
-                    getattr(self, what)(*arguments)
-            except BaseException:
-                self.crew.amid = True
-                raise
-
-    def _tell(self, what: str, *arguments: Any) -> None:
-        self.crew.told((what, *arguments))
-
-    def _together(self, what: str, *arguments: Any, **own: Any) -> Any:
-        """Have all call a method with these arguments, this process with its `own` ones, too."""
-        before, self._joint = self._joint, True
-        self._tell(what, *arguments)
-        found = getattr(self, what)(*arguments, **own)
-        self._joint = before  # not where it failed: then the others wait
-        return found
+    # --- before steps -----------------------------------------------------------------------------
 
     def prepare(self, begun: list[str]) -> None:
         """Make ready for the steps of a run: the hooks of the fixes that are left to act."""
@@ -239,6 +126,11 @@ class Ranks(Simulation):
             self._prepared = True
 
     # --- handing out and gathering ----------------------------------------------------------------
+
+    def _settle(self) -> None:
+        """See that all processes have the state that the run has ended with."""
+        if not self._bare:
+            self._see_parts()
 
     def _let_go(self) -> None:
         """From here on the parts alone have the present state."""
@@ -302,11 +194,12 @@ class Ranks(Simulation):
         if self.crew.leads:
             self.control.totals[WORK] = sum(part["work"] for part in parts)
         self._shown = True
-        self._line_up(parts)
+        blocks = lined_up(self.crew, self._whole.blocks, self.part.setup.blocks, parts)
         if everywhere:
-            self._spread()
+            blocks = spread(self.crew, blocks)
+        self._whole = self._whole._replace(blocks=blocks)
         if parts is not None:
-            self._join(parts)
+            join(self._whole, self.tiles, self.part.memory(), parts)
 
     def pieces(self) -> Iterator[ById]:
         """All points, so many at a time: not even the first needs the memory of all."""
@@ -324,53 +217,6 @@ class Ranks(Simulation):
     def give_piece(self, first: int, end: int) -> list | None:
         """Own points with ids from `first` to before `end`, for the first process those of all."""
         return self.crew.gathered(self.part.piece(first, end, last=end == self.count))
-
-    def _line_up(self, parts: list[dict] | None) -> None:
-        """Put the points of all into the whole of the first, tile after tile."""
-        whole = []
-        for k, (block, own) in enumerate(
-            zip(self._whole.blocks, self.part.setup.blocks, strict=True)
-        ):
-            counts = [part["counts"][k] for part in parts] if parts is not None else []
-            order = by_tile([part["tiling"][k] for part in parts]) if parts else None
-            points = sized(block.points, sum(counts)) if self.crew.leads else block.points
-            rows = [array for _, array in arrays_of(points)]
-            for row, (_, array) in zip(rows, arrays_of(own.points), strict=True):
-                for c in np.ndindex(array.shape[:-1]):
-                    self.crew.lined_up(array[c], row[c] if self.crew.leads else None, counts)
-                    if self.crew.leads:
-                        row[c] = row[c][order]
-            whole.append(block._replace(points=points))
-        self._whole = self._whole._replace(blocks=tuple(whole))
-
-    def _spread(self) -> None:
-        """Give the points of the whole to all."""
-        blocks = self._whole.blocks
-        own = [[a for _, a in arrays_of(b.points)] for b in blocks] if self.crew.leads else None
-        found = self.crew.told(own)
-        self._whole = self._whole._replace(
-            blocks=tuple(
-                block._replace(points=joined(block.points, [arrays]))
-                for block, arrays in zip(blocks, found, strict=True)
-            )
-        )
-
-    def _join(self, parts: list[dict]) -> None:
-        """Tiles and nodes of the whole from those of all."""
-        whole = self._whole
-        for k, block in enumerate(whole.blocks):
-            block.tiling.count[1] = 1 if self.tiles.direct else SHARES
-            join_tilings(block.tiling, [part["tiling"][k] for part in parts])
-        self.tiles.empty_nodes(whole)
-        self.tiles.lay_out(whole)
-        nodes = numbers(whole.spans)
-        for _, array in of_nodes(whole):
-            array[nodes] = 0  # also those that no box reaches: nobody has them
-        for part in parts:
-            for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):
-                array[part["nodes"]] = rows
-            for array, rows in zip(self.part.memory(), part["memory"], strict=True):
-                array[part["nodes"]] = rows
 
     # --- steps ------------------------------------------------------------------------------------
 
@@ -397,7 +243,8 @@ class Ranks(Simulation):
         """Take up to `count` steps, all processes together; DONE, or why it stopped."""
         if self._stepping:
             part = self.part
-            part.answers.at_once = self._reads_totals()
+            from_python = self._python.by_stage or self._first is not None
+            part.answers.at_once = bool(from_python) or reads_totals(self.hooks)
             part.begin()
             status = super().advance(count)
             part.account()
@@ -511,13 +358,6 @@ class Ranks(Simulation):
         for k, block in enumerate(s.blocks):
             for name, array in arrays_of(block.points):
                 array[...] = found[f"points/{k}/{name}"]
-
-    def _reads_totals(self) -> bool:
-        """Whether what fixes publish is read within steps."""
-        if self._python.by_stage or self._first is not None:
-            return True
-        code = getattr(self.hooks, "code", np.empty((0, 2), np.int64))
-        return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())
 
     @contextmanager
     def _steps(self) -> Iterator[None]:
