@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.run.crew import Crew
+from karamelo_py.run.work import Work
 
 PATIENCE = 60  # seconds that one waits for the others
 
@@ -80,6 +81,12 @@ class Threads(Crew):
 
     def abandon(self, status: int = 1) -> None:
         self._barrier.abort()
+
+
+def learn_at_random(work: Work, _: Crew) -> None:
+    """In the place of measured costs, others each time: tiles go to and fro, alike in all runs."""
+    work.looks = getattr(work, "looks", 0) + 1
+    work.costs = np.random.default_rng(work.looks).uniform(size=len(work.costs)) ** 4
 
 
 def together(size: int, act: Callable[[Crew], Any]) -> list:

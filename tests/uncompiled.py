@@ -18,13 +18,14 @@ from pathlib import Path
 def save_state(request: dict) -> int:
     """Run a script and save its final state or columns; a failure is told, not raised."""
     import numpy as np
+    from crews import learn_at_random
     from states import final_columns, final_state
 
-    from karamelo_py.run import ranks, tiles
+    from karamelo_py.run import ranks, shares, tiles, work
 
     script, columns = request["arguments"][0], request["columns"]
     usual = tiles.DIRECT_UP_TO, tiles.TILES
-    ranks.LEARN_EVERY = 2
+    ranks.LEARN_EVERY, shares.IMBALANCE, work.Work.learn = 2, 1.0, learn_at_random
     if request["boxes"]:
         tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 2, 3: 2}
     try:

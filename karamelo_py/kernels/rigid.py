@@ -46,6 +46,8 @@ def _lead(kin, nodes, led, spans, dt, kept):
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
             if not led[n, MASS] > 0:
+                for k in range(d):
+                    led[n, of_force(kin) + k] = 0
                 continue
             mass = nodes.sums[n, MASS]
             for k in range(d):
