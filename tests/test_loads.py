@@ -84,6 +84,12 @@ def test_loads_around_the_axis(run_interpreted):
     assert log.T_y[-1] == pytest.approx(5 * 0.3**2 / 2, rel=1e-9)
 
 
+def test_points_that_a_region_cuts_show_no_faces(run_interpreted):
+    cut = DISK.replace("rubber, 0.1)", "rubber, 0.1, points=cut)")
+    said = run_interpreted(cut + "fix(F, edge_pressure, all, disk, 3)\n", status=1).err
+    assert "the points of solid 'disk' are cut at its edge" in said
+
+
 def test_an_edge_without_points_is_told(run_interpreted):
     lines = "region(off, block, 0.9, 1, 0.9, 1)\nfix(F, edge_pressure, all, off, 5)\nset_dt(1e-4)\nrun(1)"  # noqa: E501
     assert "no point of the group lies at this edge" in run_interpreted(block(2, lines)).err

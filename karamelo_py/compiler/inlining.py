@@ -169,3 +169,5 @@ _use()
 # The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in
 # registers and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
 llvm.set_option("", "--unroll-threshold=4000")
+# In loops of hundreds of instructions a counter for each array takes registers from the numbers.
+llvm.set_option("", "--disable-lsr")

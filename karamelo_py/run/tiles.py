@@ -23,7 +23,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.sorting import order_in_tiles, order_points, widest
 from karamelo_py.kernels.sweep import ROUNDING
-from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
 # By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
 # stay in caches, large ones share less of their nodes with others.
@@ -310,6 +310,8 @@ class Tiles:
 
     def _make_room(self, s: Setup, rows: int) -> None:
         """Make the buffers as large as the boxes of all tiles need."""
+        if rows > MAX_NODES:
+            raise MemoryError(f"tiles of points would need {rows} records of nodes")
         for one in buffers_of(s):
             for array in summed(one.nodes):
                 grow(array, rows)

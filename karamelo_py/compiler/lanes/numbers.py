@@ -341,12 +341,10 @@ _truth(in_any, "!=", 0)
 
 @intrinsic
 def _truncated(typing_context, a):
-    whole = Lanes(types.int64, a.width)
+    whole = Lanes(types.int32, a.width)  # every processor has that, and cells are no more
 
     def codegen(context, builder, sig, arguments):
-        # By way of 32 bits: every processor has that, and cells are no more.
-        narrow = ir.VectorType(I32, a.width)
-        return builder.sext(builder.fptosi(arguments[0], narrow), vector_of(whole))
+        return builder.fptosi(arguments[0], vector_of(whole))
 
     return whole(a), codegen
 

@@ -9,6 +9,7 @@ from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
 from karamelo_py.scene.region import Region
+from karamelo_py.script.errors import ScriptError
 
 SIDES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
@@ -70,7 +71,20 @@ class EdgeFix(Fix):
         self._known: tuple[np.ndarray, Faces] | None = None
 
     def defined(self) -> None:
-        """Warn where there is nothing to load."""
+        """Warn where there is nothing to load.
+
+        Raises
+        ------
+        ScriptError
+            If a region has cut the boxes of points.
+        """
+        for solid in self.hub.solids.values():
+            own = self.group.ids - solid.first_id
+            if getattr(solid, "cut", False) and ((own >= 0) & (own < solid.count)).any():
+                raise ScriptError(
+                    f"the points of solid '{solid.id}' are cut at its edge: no faces are whole",
+                    hint="points=regular in its line",
+                )
         if not self.hub.rehearsing and not self.region.unknown:
             faces = self.chosen(faces_on(self.hub, self.region, self.group.ids))
             if len(self.group.ids) and not len(faces.point):

@@ -35,7 +35,11 @@ class RegionSolid(Solid):
         share out the volume. Left out: at equal distances with equal volumes, but for ``ppc`` 3,
         where the points stand at the Gauss points (as Karamelo has it, with equal volumes). With
         domains around the points (ugimp, cpgimp, cpdi) those of 3 are at equal distances, too:
-        domains tile the cell.
+        domains tile the cell. ``cut``: at equal distances, and what the region cuts of the boxes of
+        the points at its edge is left out: these have the volume and stand in the middle of what
+        is left, where that is a tenth of a box or more. Round bodies so have their volume and no
+        steps of h/ppc at the rim, which contact would feel. For edge_pressure and edge_traction
+        points are whole boxes: they refuse these.
     GlueToSolid
         A solid that came before, whose velocity field this one shares, in methods where each
         solid has its own.
@@ -44,6 +48,7 @@ class RegionSolid(Solid):
     -------
     solid(s1, region, disk, 2, steel, 0.1, 0)
     solid(s2, region, disk, 3, steel, 0.1, points=gauss)
+    solid(s3, region, disk, 2, steel, 0.1, points=cut)
 
     Notes
     -----
@@ -55,7 +60,7 @@ class RegionSolid(Solid):
     mesh, region, material
     """
 
-    syntax = "regionID, ppc, material, h[, T0][, points=regular|gauss][, GlueToSolid=solidID]"
+    syntax = "regionID, ppc, material, h[, T0][, points=regular|gauss|cut][, GlueToSolid=solidID]"
 
     def __init__(
         self,
@@ -66,13 +71,14 @@ class RegionSolid(Solid):
         h: Annotated[float, Positive],
         T0: float | None = None,
         *,
-        points: Literal["regular", "gauss"] | None = None,
+        points: Literal["regular", "gauss", "cut"] | None = None,
         GlueToSolid: Solid | None = None,
     ):
         domain = require_domain(hub)
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.region = region
         self.ppc = ppc
+        self.cut = points == "cut"
         lattice = lattice_of(region, domain, self.h, own=own_grids(hub))
         if points is None and hub.update.method.regular_points:
             points = "regular"
