@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.terms import number_of
 
 
 def read_rows(path: Path) -> list[dict[str, float]]:
@@ -29,9 +30,10 @@ def read_rows(path: Path) -> list[dict[str, float]]:
                 if not names or cells[0].startswith("#"):
                     names = [name for name in (cells[0].lstrip("# "), *cells[1:]) if name]
                     continue
-                numbers = [_number(cell) for cell in cells]
-                if len(cells) == len(names) and any(number == number for number in numbers):
-                    rows.append(dict(zip(names, numbers, strict=True)))
+                numbers = [number_of(cell) for cell in cells]
+                if len(cells) == len(names) and any(number is not None for number in numbers):
+                    kept = (nan if number is None else number for number in numbers)
+                    rows.append(dict(zip(names, kept, strict=True)))
     except OSError as error:
         raise ScriptError(f"cannot read {path}: {error.strerror or error}") from error
     except UnicodeDecodeError:
@@ -39,13 +41,6 @@ def read_rows(path: Path) -> list[dict[str, float]]:
     if not rows:
         raise ScriptError(f"{path} is not a log", expected="log.mpm or log.csv of a run")
     return rows
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return nan
 
 
 def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:

@@ -88,6 +88,15 @@ def sum_energies(s):
     _take_sums(s.control)
 
 
+@shared
+def _sum_before(s, step):
+    """The energies of a step whose next is looked at."""
+    sum_energies(s)
+    clock = s.control.clock[0]
+    clock.stored_before = clock.stored
+    clock.stored_at = step
+
+
 @entered
 def judge(control):
     """Take the present sums into account; whether energy keeps within its bound."""
@@ -183,9 +192,7 @@ def begin_to_look(s, level, anew):
         clock.sum_of_balance = clock.largest_energy = 0.0
     step = int(s.control.values[TIMESTEP])
     if step % LOOK == 0 and (anew or clock.stored_at != step):
-        sum_energies(s)
-        clock.stored_before = clock.stored
-        clock.stored_at = step
+        _sum_before(s, step)
 
 
 @shared
@@ -194,12 +201,10 @@ def look(s):
     clock = s.control.clock[0]
     if clock.watch_energy == 0:
         return True
-    phase = int(s.control.values[TIMESTEP]) % LOOK
-    if phase == 0:
-        sum_energies(s)
-        clock.stored_before = clock.stored
-        clock.stored_at = int(s.control.values[TIMESTEP])
-    elif phase == 1 and clock.stored_at == int(s.control.values[TIMESTEP]) - 1:
+    step = int(s.control.values[TIMESTEP])
+    if step % LOOK == 0:
+        _sum_before(s, step)
+    elif step % LOOK == 1 and clock.stored_at == step - 1:
         sum_energies(s)
         return judge(s.control)
     return True

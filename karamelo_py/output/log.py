@@ -11,6 +11,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.output.quantity import LIMIT, Quantity
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.terms import number_of
 
 FILE = "log.mpm"
 STEP_WIDTH = 10
@@ -180,17 +181,10 @@ def _is_log(path: Path) -> bool:
         return not head or bool({"Step", "dt", "Time"} & set(head))
     words = {k for k, name in enumerate(head) if name == LIMIT}
     return all(
-        row[0] == "#" or all(k in words or _is_number(cell) for k, cell in enumerate(row))
+        row[0] == "#"
+        or all(k in words or number_of(cell) is not None for k, cell in enumerate(row))
         for row in rows
     )
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _claim(file: TextIO) -> None:

@@ -1,7 +1,5 @@
 """The edge of a grid that reflects points (boundary reflect); other grids let them go."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@ with respect to reference positions, and forces from the first Piola-Kirchhoff s
 needs the deformation gradient F of the points.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real

@@ -3,8 +3,6 @@
 A :class:`Grid` is a row of a table: a scene may have several grids, each with nodes of its own.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import shared

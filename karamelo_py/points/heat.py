@@ -1,7 +1,5 @@
 """Heat at one point."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 from karamelo_py.compiler.compile import point_function, real

@@ -1,7 +1,5 @@
 """Forces between two points of different bodies. The laws are tags; bodies touch as spheres do."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
 from typing import NamedTuple
 

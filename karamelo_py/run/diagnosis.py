@@ -20,7 +20,7 @@ from karamelo_py.run import restart
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead
 from karamelo_py.run.tiles import in_tiles
-from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain, grown_little
+from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain, grown_little, has_grown
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError
 
@@ -41,8 +41,7 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> tuple[str, str]:
         return _heated(hub, simulation)
     message, hint = _wrong_point(hub, simulation)
     message = f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}"
-    clock = simulation.control.clock[0]
-    if clock.watch_energy and clock.grown > IN_ALL:
+    if has_grown(simulation):
         cause, cure = cause_of_gain(hub, simulation)
         message += f", after energy had come from nowhere. Known to do that here: {cause}"
         hint = cure

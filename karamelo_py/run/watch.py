@@ -131,12 +131,18 @@ def _torn(hub: Hub) -> bool:
     return bool(np.nanmax(_volume_ratio(hub), initial=0.0) > 1.5)
 
 
+def has_grown(simulation: Any) -> bool:
+    """Whether energy has come from nowhere, as far as the means of a hundred steps tell."""
+    clock = simulation.control.clock[0]
+    return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > IN_ALL))
+
+
 def growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
     """What to say where energy comes from nowhere, and its cure."""
     clock = simulation.control.clock[0]
-    fast = clock.windows >= TOLD
-    if not clock.watch_energy or not (fast or clock.grown > IN_ALL):
+    if not has_grown(simulation):
         return None
+    fast = clock.windows >= TOLD
     cause, cure = cause_of_gain(hub, simulation)
     much = (
         f"{100 * clock.growth:.2g} % of the largest so far in the last hundred steps"
@@ -153,15 +159,15 @@ def growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
 def grown_little(simulation: Any) -> bool:
     """Whether the present state is a good one, as far as its energy and its last step tell."""
     clock = simulation.control.clock[0]
-    if clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit:
+    swings = clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit
+    if swings or has_grown(simulation):
         return False
     if not clock.watch_energy:
         return True
     # The last look, too: noise that grows by half in a hundred steps is there in the state already.
     before = clock.first_mean if clock.looks > LOOKS else clock.first_balance
     unit = max(clock.largest_energy, clock.energy_floor)
-    little = clock.balance - before < IN_ALL * unit
-    return bool(little and clock.windows < TOLD and clock.grown < IN_ALL)
+    return bool(clock.balance - before < IN_ALL * unit)
 
 
 def forget_growth(simulation: Any) -> None:

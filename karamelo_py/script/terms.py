@@ -149,6 +149,14 @@ def number_text(value: float) -> str:
     return text.removesuffix(".0")
 
 
+def number_of(text: str) -> float | None:
+    """The number that a text is, or None."""
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
 def is_short(root: Term) -> bool:
     """Whether a term can be written down, where what is shared is written again and again."""
     levels: dict[int, int] = {}

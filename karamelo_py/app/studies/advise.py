@@ -23,8 +23,9 @@ from karamelo_py.app.studies.options import (
     zipped,
 )  # fmt: skip
 from karamelo_py.app.studies.study import Study, shown, terminal
-from karamelo_py.app.studies.variables import cases, logged, number
+from karamelo_py.app.studies.variables import cases, logged
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
 Runs the small members of a family, fits how error and cost go on, and says which variant meets a
@@ -181,7 +182,7 @@ def run(options: Any) -> int:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     if options.cost not in records.COLUMNS:
         raise ScriptError(f"-cost {options.cost}", expected="one of " + ", ".join(records.COLUMNS))
-    numeric = [name for name in values if all(number(v) is not None for v in values[name])]
+    numeric = [name for name in values if all(number_of(v) is not None for v in values[name])]
     name = options.along or max(numeric, key=lambda n: len(values[n]), default=None)
     if name not in numeric or len(values[name]) < 3:
         raise ScriptError(
@@ -267,7 +268,7 @@ def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
     values = {**best.choice.values, adviser.name: adviser.values[best.step]}
     print(f"\nfor {adviser.accuracy} <= {adviser.target:g} at the least {adviser.cost}:")
     for name, value in values.items():
-        print(f"  {name} = {value}" if number(value) is not None else f'  {name} = "{value}"')
+        print(f"  {name} = {value}" if number_of(value) is not None else f'  {name} = "{value}"')
     words = " ".join(f"-var {name} {value}" for name, value in values.items())
     print(f"or: karamelo-py {script} {words}")
     print(sureness(adviser, best))

@@ -9,8 +9,8 @@ import numpy as np
 
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.records import value
-from karamelo_py.app.studies.variables import number
 from karamelo_py.script.errors import ScriptError, unknown
+from karamelo_py.script.terms import number_of
 
 NONE = "mechanical"  # what a script says where a method has no such word
 
@@ -89,7 +89,7 @@ class Line:
 
 
 def _tells(value: str) -> bool:
-    return number(value) is None and value not in ("true", "false", NONE)
+    return number_of(value) is None and value not in ("true", "false", NONE)
 
 
 class Family:
@@ -137,7 +137,7 @@ class Family:
         differing = [name for name in variables if len(values[name]) > 1]
         numbers = [
             name for name in differing
-            if name not in by and all(number(v) is not None for v in values[name])
+            if name not in by and all(number_of(v) is not None for v in values[name])
         ]  # fmt: skip
         self.along = along or max(numbers, key=lambda name: len(values[name]), default=None)
         self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
@@ -153,7 +153,7 @@ class Family:
             line.rows.append(row)
         for line in found.values():
             if self.along:
-                line.rows.sort(key=lambda row: number(row[self.along]))
+                line.rows.sort(key=lambda row: number_of(row[self.along]))
             line.x = column(line.rows, self.along) if self.along else np.zeros(len(line.rows))
             line.cost, line.error = column(line.rows, self.cost), column(line.rows, self.accuracy)
         return list(found.values())

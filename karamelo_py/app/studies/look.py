@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies.variables import number
 from karamelo_py.output.plot_style import tick_text
+from karamelo_py.script.terms import number_of
 
 # After Okabe & Ito, for eyes that see colours differently; each has a marker of its own, so that a
 # chart printed in grey can still be read.
@@ -71,7 +71,7 @@ def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
         return [(PALETTE[0], 0, 0)] * len(choices)
     values = {name: list(dict.fromkeys(choice[name] for choice in choices)) for name in names}
     heads = values[names[0]]
-    numbers = len(heads) > 1 and all(number(v) is not None for v in heads)
+    numbers = len(heads) > 1 and all(number_of(v) is not None for v in heads)
     taken: dict[str, dict[tuple, int]] = {}
     found = []
     for choice in choices:
@@ -91,7 +91,7 @@ def _in_order(value: str, values: Sequence[str]) -> str:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    ranked = sorted(values, key=number)
+    ranked = sorted(values, key=number_of)
     return to_hex(colormaps["viridis"](0.85 * ranked.index(value) / (len(ranked) - 1)))
 
 

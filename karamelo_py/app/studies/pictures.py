@@ -8,9 +8,9 @@ import numpy as np
 
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import Family, column, usable
-from karamelo_py.app.studies.variables import number
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
+from karamelo_py.script.terms import number_of
 
 
 def lines(family: Family, path: Path, *, convergence: bool, title: str = "") -> None:
@@ -127,7 +127,9 @@ def heat(family: Family, rows: Sequence[Any], x: str, y: str, path: Path, title:
         axes.set_xticks(np.arange(len(across)) + 0.5, across)
         axes.set_yticks(np.arange(len(up)) + 0.5, up)
         axes.set_facecolor("0.93")
-        said = [v if number(v) is None else f"{n} = {v}" for n, v in zip(others, key, strict=True)]
+        said = [
+            v if number_of(v) is None else f"{n} = {v}" for n, v in zip(others, key, strict=True)
+        ]
         axes.set_title(", ".join(said), fontsize=9)
     for axes in all_axes[len(panels) :]:
         axes.set_visible(False)
@@ -148,4 +150,4 @@ def norm_ends(norm: Any) -> tuple[float, float]:
 
 def _sorted(rows: Sequence[Any], name: str) -> list[str]:
     found = list(dict.fromkeys(row[name] for row in rows))
-    return sorted(found, key=number) if all(number(v) is not None for v in found) else found
+    return sorted(found, key=number_of) if all(number_of(v) is not None for v in found) else found

@@ -17,13 +17,14 @@ import numpy as np
 import karamelo_py
 from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies.case import COLUMNS, Outcome
-from karamelo_py.app.studies.variables import Scope, number
+from karamelo_py.app.studies.variables import Scope
 from karamelo_py.output.files import write_whole
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, meant, nearest
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse_text
+from karamelo_py.script.terms import number_of
 
 REDUCTIONS = {
     "last": lambda v: v[-1], "first": lambda v: v[0], "max": np.max, "min": np.min,
@@ -41,7 +42,7 @@ class Part:
     def __init__(self, reduction: str, column: str, level: str | None, word: str):
         column = "".join(column.split())
         self.reduction, self.column = reduction, KEYWORDS.get(column, column)
-        self.level = None if level is None else number(level)
+        self.level = None if level is None else number_of(level)
         known = [*REDUCTIONS, "when"]
         if reduction not in known or not column or (reduction == "when") == (self.level is None):
             close = nearest(reduction, known) if reduction not in known else None
@@ -118,7 +119,7 @@ class Recorded:
             return found[""]
         for name in self.names:
             last = Part("last", name, None, self.text)
-            found[name] = number(case[name]) if name in case else last.of(log)
+            found[name] = number_of(case[name]) if name in case else last.of(log)
         if None in found.values():
             return None
         try:
@@ -237,7 +238,7 @@ def value(each: Mapping[str, Any], name: str) -> float | None:
     cell = each.get(name)
     if cell is None or isinstance(cell, float):
         return cell
-    return number(str(cell))
+    return number_of(str(cell))
 
 
 def describe(path: Path, **said: Any) -> None:

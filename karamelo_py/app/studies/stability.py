@@ -22,10 +22,11 @@ from karamelo_py.app.studies.options import (
     out_file,
 )
 from karamelo_py.app.studies.study import Study
-from karamelo_py.app.studies.variables import logged, number
+from karamelo_py.app.studies.variables import logged
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure
 from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
 Maps where a script is stable over one or two of its variables: stable, growing (its energy exceeds
@@ -73,7 +74,7 @@ def run(options: Any) -> int:
     values, launch, jobs = family(options)
     axes = [name for name in values if len(values[name]) > 1]
     for name in axes:
-        if any(number(value) is None for value in values[name]):
+        if any(number_of(value) is None for value in values[name]):
             raise ScriptError(f"-var {name}: not numbers", expected=f"-var {name}=0.1:2:20")
     if not 1 <= len(axes) <= 2:
         raise ScriptError(

@@ -15,8 +15,8 @@ import numpy as np
 from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies.case import Launch, Outcome, folder_name
 from karamelo_py.app.studies.records import Recorded, row
-from karamelo_py.app.studies.variables import number
 from karamelo_py.output.console import duration
+from karamelo_py.script.terms import number_of
 
 _FACTS = ("seconds", "points", "steps")
 _STATUS = 24  # characters at least, for what became of a run
@@ -225,7 +225,7 @@ class _Display:
 
 def kind_of(case: Mapping[str, str]) -> tuple[str, ...]:
     """What the loops of a case are compiled for, as far as variables tell: words, not numbers."""
-    return tuple(value for value in case.values() if number(value) is None)
+    return tuple(value for value in case.values() if number_of(value) is None)
 
 
 def growth(
@@ -242,7 +242,7 @@ def growth(
     def features(case: Mapping[str, str]) -> list[float]:
         have = {_term(n, v): v for n, v in case.items()}
         return [
-            0.0 if t not in have else np.log(number(have[t])) if t[1] is None else 1.0
+            0.0 if t not in have else np.log(number_of(have[t])) if t[1] is None else 1.0
             for t in terms
         ]
 
@@ -256,7 +256,7 @@ def growth(
 
 
 def _term(name: str, value: str) -> tuple[str, Any]:
-    as_number = number(value)
+    as_number = number_of(value)
     return (name, None) if as_number is not None and as_number > 0 else (name, value)
 
 

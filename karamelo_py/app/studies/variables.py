@@ -12,18 +12,11 @@ from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text
 from karamelo_py.script.syntax import Assignment, Call
+from karamelo_py.script.terms import number_of
 
 VALUES = "NAME=value,value,... or NAME=first:last:count"
 _NAME = re.compile(r"[^\W\d]\w*")
 _MOST = 100_000
-
-
-def number(text: str) -> float | None:
-    """The number that a text says, or None."""
-    try:
-        return float(text)
-    except ValueError:
-        return None
 
 
 def choices(words: Iterable[str], in_step: Container[str] = ()) -> dict[str, list[str]]:
@@ -56,7 +49,7 @@ def _spread(name: str, value: str) -> list[str]:
     parts = value.split(":")
     if len(parts) == 1:
         return [value]
-    ends = [number(part) for part in parts[:2]]
+    ends = [number_of(part) for part in parts[:2]]
     if len(parts) != 3 or None in ends or not parts[2].isdigit() or int(parts[2]) < 2:
         raise ScriptError(
             f"-var {name}={value}: this is not a range",
@@ -145,7 +138,7 @@ class Scope:
     def name(self, name: str, node: Any, raw: Any) -> Any:
         if name in self.known:
             value = self.known[name]
-            plain = number(value) if isinstance(value, str) else value
+            plain = number_of(value) if isinstance(value, str) else value
             return value if plain is None else plain
         if name in self.words:
             return name

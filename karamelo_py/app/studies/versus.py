@@ -11,10 +11,10 @@ from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import missing, require, usable
 from karamelo_py.app.studies.records import value
 from karamelo_py.app.studies.study import shown, terminal
-from karamelo_py.app.studies.variables import number
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tidy
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.terms import number_of
 
 
 @dataclass
@@ -75,7 +75,7 @@ def pairs(
         if len(two) < 2:
             continue
         said = dict(zip(others, case, strict=True))
-        parts = [said[n] if number(said[n]) is None else f"{n} = {said[n]}" for n in differing]
+        parts = [said[n] if number_of(said[n]) is None else f"{n} = {said[n]}" for n in differing]
         numbers = [
             tuple(_number(two[word], column) for word in values)
             for column in (accuracy, cost, "bytes_per_particle")

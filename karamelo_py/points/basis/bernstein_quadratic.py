@@ -1,7 +1,5 @@
 """Quadratic Bernstein polynomials: nodes every h/2, the three of the own cell in each direction."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real

@@ -1,7 +1,5 @@
 """Contiguous-particle GIMP: hat functions averaged over a box that deforms with the point."""
 
-from __future__ import annotations
-
 from math import prod
 from types import MappingProxyType
 from typing import NamedTuple

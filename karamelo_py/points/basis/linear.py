@@ -1,7 +1,5 @@
 """Linear hat functions: two nodes a direction, 1 - |x - X_I| / h."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real

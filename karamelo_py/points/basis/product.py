@@ -4,8 +4,6 @@ The one-dimensional part is the point function `along`; everything else is the s
 number of directions, unrolled from one definition.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import prod

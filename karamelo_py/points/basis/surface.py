@@ -1,7 +1,5 @@
 """Where the surface of a body is, from what a node knows of the body's points."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Uniform GIMP: hat functions averaged over a domain around the point, of a constant size."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

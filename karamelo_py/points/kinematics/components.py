@@ -6,8 +6,6 @@
 a function that is chosen by the class of `kin`.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable
 from functools import wraps

@@ -1,7 +1,5 @@
 """Tensors such as the deformation gradient F and the increment dl = dt grad v."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Principal values and directions of symmetric tensors, and back."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 from karamelo_py.compiler.compile import choose, point_function, real, round_off, shared

@@ -1,7 +1,5 @@
 """Symmetric tensors such as stress and strain."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 from karamelo_py.compiler.compile import fma, real, shared

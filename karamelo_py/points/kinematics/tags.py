@@ -1,7 +1,5 @@
 """The tags of kinematics, and the tables of the components that tensors have there."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import define, point_function

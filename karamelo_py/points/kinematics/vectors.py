@@ -1,7 +1,5 @@
 """Vectors, and what makes them from tensors: velocities and nodal forces."""
 
-from __future__ import annotations
-
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.symbols import add_product, call
 from karamelo_py.compiler.tuples import row

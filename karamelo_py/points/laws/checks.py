@@ -1,7 +1,5 @@
 """What parameters of several laws have to fulfil."""
 
-from __future__ import annotations
-
 from karamelo_py.script.errors import ScriptError
 
 

@@ -4,8 +4,6 @@
 and damage need more than one of them.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Any, NamedTuple
 

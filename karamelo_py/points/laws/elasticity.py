@@ -1,7 +1,5 @@
 """Moduli of isotropic elasticity."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.script.errors import ScriptError

@@ -8,8 +8,6 @@ remembers (`Memory`), and the dissipated energy where there is any. Parts of oth
 a plug-in's, are chained (`karamelo_py.points.laws.further`).
 """
 
-from __future__ import annotations
-
 from math import log
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ A part is a NamedTuple of parameters (its class is the tag). It may remember num
 add a pressure. What is not defined for a class is that of a part that remembers and adds nothing.
 """
 
-from __future__ import annotations
-
 from functools import reduce
 from typing import Any, NamedTuple
 

@@ -3,8 +3,6 @@
 The state of a point is (det F, Cauchy stress).
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real

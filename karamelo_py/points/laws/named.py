@@ -1,7 +1,5 @@
 """Parts of a law as a script names them: arguments of material eos-strength."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 from karamelo_py.language.arguments import Argument, look_up

@@ -3,8 +3,6 @@
 The state of a point is the deformation gradient F.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real

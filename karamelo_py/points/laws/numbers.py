@@ -1,7 +1,5 @@
 """A parameter of a law that is several numbers: a curve, a formula."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 

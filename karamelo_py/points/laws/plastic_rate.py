@@ -1,7 +1,5 @@
 """The rate of plastic strain, for output: a further part of laws that lowering adds when asked."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """material rigid: a body that moves as it is told. Its state is empty."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real

@@ -1,7 +1,5 @@
 """Elastic laws with a temperature: they expand, and know what conduction has to know."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import real, shared

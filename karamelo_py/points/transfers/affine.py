@@ -7,8 +7,6 @@ momentum to round-off for functions whose D changes with the place in the cell, 
 eqs. 15 to 18).
 """
 
-from __future__ import annotations
-
 from karamelo_py.compiler.tuples import add_scaled, scale
 from karamelo_py.points.basis import affine_weight, reach
 from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor

@@ -1,7 +1,5 @@
 """AFLIP: FLIP with the moment of velocity (Fei et al. 2021)."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.points.transfers import Moment, affine

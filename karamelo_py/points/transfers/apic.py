@@ -1,7 +1,5 @@
 """APIC: the point keeps the moment of the nodal velocity beside its mean (Jiang et al. 2015)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.points.transfers import Moment, affine, take_nodal_velocity

@@ -1,7 +1,5 @@
 """ASFLIP: AFLIP whose points come apart where they are not pressed together (Fei et al. 2021)."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import choose, real

@@ -1,7 +1,5 @@
 """FLIP: the point takes the change of the nodal velocity (Brackbill & Ruppel 1986)."""
 
-from __future__ import annotations
-
 from types import MappingProxyType
 from typing import Annotated, NamedTuple
 

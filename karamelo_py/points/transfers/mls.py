@@ -1,7 +1,5 @@
 """MLS: APIC with strains and forces from the same moments (Hu et al. 2018)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.points.basis import affine_weight

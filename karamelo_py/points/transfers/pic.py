@@ -1,7 +1,5 @@
 """PIC: the point takes the nodal velocity (Harlow 1964)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.points.transfers import take_nodal_velocity

@@ -6,8 +6,6 @@ Bernstein-quadratic) this is APIC in another form, and angular momentum is conse
 stays the same; for splines as far as velocity is linear over their support.
 """
 
-from __future__ import annotations
-
 from karamelo_py.compiler.tuples import add, add_scaled
 from karamelo_py.points.basis import reach
 from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor

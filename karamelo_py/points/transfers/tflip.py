@@ -1,7 +1,5 @@
 """FLIP with the gradient-enhanced projection of Karamelo."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.points.transfers import Moment, taylor

@@ -1,7 +1,5 @@
 """TPIC: the point keeps the gradient of the nodal velocity (Nakamura et al. 2023)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.points.transfers import Moment, take_nodal_velocity, taylor

@@ -15,6 +15,7 @@ from karamelo_py.output.fields import AXES, COMPONENTS
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.script.errors import ScriptError, unknown
+from karamelo_py.script.terms import number_of
 
 VECTORS = {"displacement": "u", "velocity": "v"}
 TENSORS = {"stress": "s", "strain": "e"}
@@ -169,14 +170,14 @@ def table(path: Path) -> dict[str, np.ndarray]:
     if not rows:
         raise ScriptError(f"{path} has no rows", expected="columns of numbers", argument="file")
     names = rows[0][1]
-    if any(_number(cell) is not None for cell in names):
+    if any(number_of(cell) is not None for cell in names):
         names = [str(k + 1) for k in range(len(names))]
     else:
         rows = rows[1:]
     columns: list[list[float]] = [[] for _ in names]
     for number, cells in rows:
-        values = [_number(cell) for cell in cells]
-        if len(values) != len(names) or None in values:
+        values = [number_of(cell) for cell in cells]
+        if len(values) != len(names) or None in values or any(map(isnan, values)):
             raise ScriptError(
                 f"line {number} of {path}: {' '.join(cells)}",
                 expected=f"{len(names)} numbers: {', '.join(names)}",
@@ -185,14 +186,6 @@ def table(path: Path) -> dict[str, np.ndarray]:
         for column, value in zip(columns, values, strict=True):
             column.append(value)
     return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
-
-
-def _number(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return None if isnan(value) else value
 
 
 def refuse_absent(hub: Any, columns: tuple[str, ...]) -> None:

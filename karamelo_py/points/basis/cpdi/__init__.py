@@ -12,8 +12,6 @@ A family of domains is one file; it gives only :func:`domain`, its place, and ca
 :func:`karamelo_py.points.basis.cpdi.corners.register`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function

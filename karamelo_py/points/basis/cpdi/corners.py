@@ -1,7 +1,5 @@
 """What all domains share: from corners, their weights and gradients to nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import inf, prod
 from typing import NamedTuple

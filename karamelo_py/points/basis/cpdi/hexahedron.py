@@ -1,7 +1,5 @@
 """CPDI2 in space: hexahedra (H8) whose corners go with the velocity of the grid."""
 
-from __future__ import annotations
-
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.symbols import call
 from karamelo_py.compiler.tuples import add, scale

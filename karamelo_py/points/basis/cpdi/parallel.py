@@ -1,7 +1,5 @@
 """CPDI proper: parallelograms (R4) and parallelepipeds (R8) that deform with the point."""
 
-from __future__ import annotations
-
 from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant
 from karamelo_py.points.basis import deformed, extent
 from karamelo_py.points.basis.cpdi import CUBE, SQUARE, Domain, domain

@@ -1,7 +1,5 @@
 """CPDI2: quadrilaterals (Q4) whose corners go with the velocity of the grid."""
 
-from __future__ import annotations
-
 from karamelo_py.compiler.compile import real
 from karamelo_py.points.basis.cpdi import SQUARE, Domain, Element, domain, upright
 from karamelo_py.points.basis.cpdi.corners import register_carried

@@ -1,7 +1,5 @@
 """CPDI on triangles (T3) and tetrahedra (Tet4) whose corners go with the velocity of the grid."""
 
-from __future__ import annotations
-
 from functools import reduce
 from operator import sub
 

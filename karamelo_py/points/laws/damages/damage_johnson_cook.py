@@ -1,7 +1,5 @@
 """damage damage_johnson_cook: ductile failure by plastic strain."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import choose, in_any, point_function, real

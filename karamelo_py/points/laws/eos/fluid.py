@@ -1,7 +1,5 @@
 """eos fluid: Tait's equation of state."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Annotated, NamedTuple
 

@@ -1,7 +1,5 @@
 """eos ideal-gas: a gas whose energy follows from the work done on it."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real

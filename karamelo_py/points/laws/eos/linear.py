@@ -1,7 +1,5 @@
 """eos linear: pressure in proportion to the change of volume."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real

@@ -1,7 +1,5 @@
 """eos shock: Mie-Grueneisen equation of state."""
 
-from __future__ import annotations
-
 from math import log1p, sqrt
 from typing import Annotated, NamedTuple
 

@@ -1,7 +1,5 @@
 """strength drucker-prager: cohesion and friction by a cone."""
 
-from __future__ import annotations
-
 from math import cos, inf, sin, sqrt, tan
 from typing import Annotated, Literal, NamedTuple
 

@@ -1,7 +1,5 @@
 """strength fluid: viscous shear of a Newtonian fluid."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real

@@ -9,8 +9,6 @@ modelling and simulation of granular flows through their many phases", J. Fluid 
 Trans. Graph. 36(4), section 4.3.4). What plastic flow by shear gains (dilatancy) stays.
 """
 
-from __future__ import annotations
-
 from math import inf, log, sqrt
 
 from karamelo_py.compiler.compile import point_function, real, shared

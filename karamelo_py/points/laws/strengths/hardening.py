@@ -1,7 +1,5 @@
 """What strengths of von Mises share: the radial return to a flow stress that hardens as it will."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 from karamelo_py.compiler.compile import (

@@ -1,7 +1,5 @@
 """strength johnson_cook: flow stress by strain, rate and temperature (Johnson & Cook 1983)."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, NamedTuple
 
 from karamelo_py.compiler.compile import choose, point_function, real, shared

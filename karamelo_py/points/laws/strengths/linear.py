@@ -1,7 +1,5 @@
 """strength linear: elastic shear without limit."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real, shared

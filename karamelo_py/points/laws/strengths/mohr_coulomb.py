@@ -1,7 +1,5 @@
 """strength mohr-coulomb: cohesion and friction."""
 
-from __future__ import annotations
-
 from math import cos, sin, sqrt
 from typing import Annotated, NamedTuple
 

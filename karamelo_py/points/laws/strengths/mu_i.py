@@ -1,7 +1,5 @@
 """strength mu-i: dense granular flow, whose friction grows with the rate of shear."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Annotated, NamedTuple
 

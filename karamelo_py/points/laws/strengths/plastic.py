@@ -1,7 +1,5 @@
 """strength plastic: plasticity of von Mises."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real

@@ -1,7 +1,5 @@
 """What the strengths of soils share: their angles, and softening to a residual strength."""
 
-from __future__ import annotations
-
 from math import radians
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """strength swift: hardening by a power of plastic strain, after a plateau."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import NonNegative, Positive

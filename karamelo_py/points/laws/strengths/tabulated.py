@@ -1,7 +1,5 @@
 """strength tabulated: hardening by a curve of measured points."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, NamedTuple
 

@@ -1,7 +1,5 @@
 """strength zerilli-armstrong: flow stress of bcc and fcc metals (Zerilli & Armstrong 1987)."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import choose, real

@@ -1,7 +1,5 @@
 """temperature plastic_work: heating by plastic work."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import choose

@@ -1,7 +1,5 @@
 """Artificial viscosity: quadratic (von Neumann & Richtmyer) and linear (Landshoff)."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import NamedTuple
 
