@@ -62,8 +62,8 @@ from karamelo_py.run.lowering import (
 )
 from karamelo_py.run.motion import Motion, motions
 from karamelo_py.run.stable import moves_already, ruling_limit, share_of_heat, steps_of_waves
-from karamelo_py.run.state import changing, take_tiling
-from karamelo_py.run.tiles import Tiles, in_tiles, used
+from karamelo_py.run.state import changing, go_back
+from karamelo_py.run.tiles import Tiles, in_tiles
 from karamelo_py.run.trial import try_parts
 from karamelo_py.run.watch import unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
@@ -646,18 +646,7 @@ class Simulation(ById):
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot."""
-        s = self.setup
-        # Nodes that were not in use then have to be empty, as they were.
-        spans = used(s.spans)[1:].copy()
-        self.tiles.empty_nodes(s)
-        for k, block in enumerate(s.blocks):
-            take_tiling(block.tiling, snapshot, f"tiling/{k}/")
-        self.tiles.lay_out(s)
-        for name, array in changing(self):
-            array[...] = snapshot[name]
-        s.control.values[:] = snapshot["values"]
-        for marks in self.hub.update.method.remembered(s.contact, spans):
-            marks[np.abs(marks) > self.step] = 0
+        go_back(self, snapshot)
         self.version += 1
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.fields import name_of
-from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
+from karamelo_py.kernels.arrays import TIMESTEP, Block, Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.run.tiles import in_use, numbers, used
 from karamelo_py.script.errors import ScriptError
@@ -81,6 +81,29 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
     simulation.present[:] = _checked(found, "present", simulation.present)
     for name, known in zip(SHOWN, _checked(found, "shown", np.ones(len(SHOWN), bool)), strict=True):
         setattr(simulation, name, bool(known))
+
+
+def go_back(simulation: Any, kept: Mapping[str, np.ndarray]) -> None:
+    """Put a simulation into the state of which `changing` has given all arrays, and its values."""
+    s = simulation.setup
+    # Nodes that were not in use then have to be empty, as they were.
+    spans = used(s.spans)[1:].copy()
+    simulation.tiles.empty_nodes(s)
+    blocks = []
+    for k, block in enumerate(s.blocks):
+        stem = f"points/{k}/"
+        points, tiling = block.points, take_tiling(block.tiling, kept, f"tiling/{k}/")
+        if points.mass.size != kept[stem + "mass"].size:
+            points = take_points(points, {n: array.copy() for n, array in kept.items()}, stem)
+        blocks.append(block._replace(points=points, tiling=tiling))
+    s = simulation.setup = s._replace(blocks=tuple(blocks))
+    simulation.tiles.lay_out(s)
+    for name, array in changing(simulation):
+        array[...] = kept[name]
+    values = s.control.values
+    values[:] = kept["values"]
+    for marks in remembered_at(simulation, spans):
+        marks[np.abs(marks) > values[TIMESTEP]] = 0
 
 
 def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:

@@ -1,0 +1,131 @@
+"""Processes of which the first says what all do, while a run goes on."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import wraps
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+
+from karamelo_py.run.crew import ENDING, FAILED, Crew
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import Quit, ScriptError
+
+OVER = "over"
+
+
+class Abandoned(Exception):
+    """The first process has found a fault in the midst of a step, and tells of it."""
+
+
+def by_all(method: Callable) -> Callable:
+    """A method of each process for its part, where the whole is not there: of all together."""
+
+    @wraps(method)
+    def act(self: Leading, *arguments: Any) -> Any:
+        if self._stepping or self._shown or not self._leading:
+            return method(self, *arguments)
+        return self._all_do(method.__name__, *arguments)
+
+    return act
+
+
+class HandedOutAnew(Exception):
+    """A fix in Python has moved points at the start of a step: others have them now."""
+
+
+class Leading(Simulation):
+    """A simulation of which each process has something."""
+
+    def __init__(self, hub: Hub, previous: Leading | None = None):
+        self.crew: Crew = hub.settings.crew
+        self._leading = False
+        self._joint = False  # all processes do the same, and wait for each other
+        self._prepared = False
+        super().__init__(hub, previous)
+
+    def _settle(self) -> None:
+        """See that all processes have the state that the run has ended with."""
+
+    @property
+    def follows(self) -> bool:
+        """Another process says what this one does in a run."""
+        return not self.crew.leads
+
+    @contextmanager
+    def leading(self) -> Iterator[None]:
+        """While a run goes on: the others follow."""
+        self._meet()
+        self._leading, self._prepared = True, False
+        well = False
+        try:
+            yield
+            well = True
+        finally:
+            self._leading = False
+            if self._joint:
+                # In the midst of what all do together: the others would wait for ever.
+                self.crew.amid = True
+            else:
+                if well and self.hub.interpreter.has_more:
+                    self._settle()
+                deleted = np.flatnonzero(~self.present)
+                self.crew.told((OVER, well, deleted, self.hub.values.array))
+
+    def _meet(self) -> None:
+        """See that all processes are about to do the same run."""
+        hub, crew = self.hub, self.crew
+        present = [hub.place and (hub.place.file, hub.place.line), len(hub.runs), self.count]
+        words = crew.meet(1 + crc32(repr((present, hub.interpreter.presets)).encode()))
+        if (words == words[0]).all():
+            return
+        crew.parted = True
+        # One that has failed tells of it.
+        if (words == FAILED).any() or crew.rank != int((words > 0).argmax()):
+            raise Quit
+        raise ScriptError(
+            "the processes do not come to the same run",
+            place=hub.place,
+            expected="the same script, files and variables for all of them",
+        )
+
+    def follow(self) -> None:
+        """Do what the first process says, until its run is over."""
+        if threading.current_thread() is threading.main_thread():
+            for number in ENDING:  # the first hears of them
+                signal.signal(number, signal.SIG_IGN)
+        self._meet()
+        hub = self.hub
+        hub.restart = hub.interpreter.replay = None
+        while True:
+            what, *arguments = self.crew.told()
+            if what == OVER:
+                well, deleted, values = arguments
+                hub.values.array[:] = values
+                self.present[deleted] = False
+                if not well:
+                    raise Quit
+                return
+            try:
+                with suppress(Abandoned):
+                    getattr(self, what)(*arguments)
+            except BaseException:
+                self.crew.amid = True
+                raise
+
+    def _tell(self, what: str, *arguments: Any) -> None:
+        self.crew.told((what, *arguments))
+
+    def _together(self, what: str, *arguments: Any, **own: Any) -> Any:
+        """Have all call a method with these arguments, this process with its `own` ones, too."""
+        before, self._joint = self._joint, True
+        self._tell(what, *arguments)
+        found = getattr(self, what)(*arguments, **own)
+        self._joint = before  # not where it failed: then the others wait
+        return found
