@@ -435,6 +435,8 @@ def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
     hub = Hub(Console(out))
     hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
     wait = Runner(hub)._telling_of_compilation
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
+    monkeypatch.setattr(os, "getloadavg", lambda: (2.0, 0, 0), raising=False)
     with wait():
         assert out.getvalue() == ""
         one, other = fresh(), fresh()
@@ -448,6 +450,11 @@ def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
         assert out.getvalue() == line
         kernel(lambda tag: answer(tag))(Tag())
     assert "once: about 12 s (the next run starts at once) ..." in out.getvalue()
+    # Eight others and this on four processors.
+    monkeypatch.setattr(os, "getloadavg", lambda: (8.0, 0, 0), raising=False)
+    with wait():
+        kernel(lambda tag: answer(tag) + 1)(Tag())
+    assert "once: 12 s to 28 s, as others use the processors (the next" in out.getvalue()
     # So short a wait was not for all of it.
     assert list(cache._times().values()) == [12.3]
 

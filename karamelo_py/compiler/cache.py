@@ -279,7 +279,7 @@ def _times() -> dict[str, float]:
 
 
 def time_for(scene: str) -> float | None:
-    """Seconds that compilation took the last time for a scene, or for the last one compiled."""
+    """Seconds of a processor that a scene, or else the last one, took to be compiled."""
     times = _times()
     return times.get(scene, next(reversed(times.values()), None))
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 import dis
 import functools
 import inspect
+import itertools
 import os
 import types as python
 from collections import namedtuple
@@ -36,7 +37,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 
 from karamelo_py.compiler.fingerprint import note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
-from karamelo_py.compiler.lowering import Lowering, numbers_of
+from karamelo_py.compiler.lowering import Lowering, numbers_of, resolutions
 from karamelo_py.compiler.values import (
     OF_WHOLE,
     Asks,
@@ -46,6 +47,7 @@ from karamelo_py.compiler.values import (
     Untraceable,
     Value,
     asking,
+    at_work,
     counting,
     emit,
     now,
@@ -249,6 +251,8 @@ class _Formula(NamedTuple):
 
 
 _formulas: dict[tuple, _Formula | None] = {}
+MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with contact
+_numbers = itertools.count()
 _asking: dict[python.CodeType, int] = {}  # of functions left to Numba: the line that is why
 _own: set[Callable] = set()  # functions that are not written into what calls them
 _rolled: set[python.CodeType] = set()  # of functions with loops that are left to the compiler
@@ -280,7 +284,7 @@ def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
         _refuse_methods(codes, lowering.classes)
         if hasattr(dispatch, "tags"):
             parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
-        name = f"{dispatch.__qualname__}.{len(_formulas)}"
+        name = f"{dispatch.__qualname__}.{next(_numbers)}"
         return _Formula(run, result, frozenset(parts), _is_plain(found), name)
     except Asks:
         raise
@@ -302,6 +306,8 @@ def _note_why(chosen: Callable | None, why: BaseException) -> None:
 def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
     """What to run for arguments of these types; None if it is Numba's to compile."""
     key = typing, dispatch, numbers_of(kinds)
+    if len(_formulas) > MOST_FORMULAS and not at_work():
+        forget()
     while key not in _formulas:
         _formulas[key] = None  # of one that calls itself
         try:
@@ -327,8 +333,9 @@ def line_that_asks(file: str, line: int) -> int | None:
 
 
 def forget() -> None:
-    """A point function has another implementation than was known."""
+    """Find anew what is run: a point function has another implementation than was known."""
     _formulas.clear()
+    resolutions.clear()
 
 
 def _chosen(dispatch: Callable, kinds: tuple) -> Callable:

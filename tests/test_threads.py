@@ -1,0 +1,38 @@
+"""What threads share out, and what becomes of a task that fails."""
+
+import numpy as np
+import pytest
+from numba import config
+
+from karamelo_py.compiler.compile import entered, shared
+from karamelo_py.compiler.threads import Serial, Threaded, shared_out
+
+pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+
+
+@shared
+def put(out, limit, k):
+    """The square of k; none from `limit` on."""
+    if k >= limit:
+        raise ValueError("beyond the limit")
+    out[k] = k * k
+
+
+_put_all = shared_out(put, "out, limit")
+
+
+@entered
+def squares(mode, out, limit):
+    """The squares of numbers."""
+    _put_all(mode, out.size, out, limit)
+    return out.size
+
+
+@pytest.mark.parametrize("mode", [Serial(), Threaded()], ids=["one", "all"])
+def test_what_fails_in_a_thread_is_raised(mode):
+    out = np.zeros(100, np.int64)
+    assert squares(mode, out, 100) == 100
+    assert out.tolist() == [k * k for k in range(100)]
+    with pytest.raises(ValueError, match="beyond the limit"):
+        squares(mode, out, 60)
+    assert squares(mode, out, 100) == 100
