@@ -483,3 +483,8 @@ def test_constants_in_modules_of_modules_are_followed():
     for constants.K in (2, 5, 2):
         prints.append(fingerprint.fingerprint([names["doubled"]], (), frozenset()))
     assert prints[0] == prints[2] != prints[1]
+
+
+def test_a_step_and_what_it_remembers_are_followed():
+    """The rows of a scheme are kept between interpreted steps; steps have a key all the same."""
+    assert fingerprint.fingerprint([step], (), frozenset())

@@ -337,6 +337,8 @@ def _look(thing: Any) -> tuple[str, list]:
         return kind, [thing.fget]
     if isinstance(thing, (staticmethod, classmethod)):
         return kind, [thing.__func__]
+    if isinstance(thing, functools._lru_cache_wrapper):
+        return kind, [thing.__wrapped__]
     if isinstance(thing, functools.partial):
         return kind, [thing.func, thing.args, thing.keywords]
     if hasattr(thing, "_defn"):  # of Numba's intrinsics

@@ -119,7 +119,23 @@ def _attribute(thing: Any, *name: Any) -> Any:
 
 _OF_NUMBERS = {*OF_WHOLE, float}
 _INSTEAD = {type: _class_of, isinstance: _is_instance, range: counting, getattr: _attribute}
-_SAFE = {len, zip, enumerate, tuple, list, dict, set, sum, reversed, any, all, map, slice, hasattr}
+_SAFE = {
+    callable,
+    len,
+    zip,
+    enumerate,
+    tuple,
+    list,
+    dict,
+    set,
+    sum,
+    reversed,
+    any,
+    all,
+    map,
+    slice,
+    hasattr,
+}
 _CONSTANT = (type(None), bool, int, float, str, np.number, np.bool_)
 
 

@@ -30,7 +30,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
 from karamelo_py.kernels.loss import Rubbed, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
-from karamelo_py.kernels.step import touch, touch_velocity
+from karamelo_py.kernels.rows import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position

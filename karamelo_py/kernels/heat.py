@@ -53,6 +53,7 @@ from karamelo_py.kernels.arrays import (
     of_force,
     with_nodes,
 )
+from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.g2p import NodalMean, empty, gathered, settled
 from karamelo_py.kernels.hooks import (
     Warmth,
@@ -63,7 +64,8 @@ from karamelo_py.kernels.hooks import (
 )
 from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
 from karamelo_py.kernels.p2g import load_of, scattered
-from karamelo_py.kernels.step import conduct, read_reports, step_size, visit_here
+from karamelo_py.kernels.passes import read_reports, visit_here
+from karamelo_py.kernels.rows import conduct
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
