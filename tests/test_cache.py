@@ -16,6 +16,7 @@ from numba import config, prange
 
 from karamelo_py.compiler import cache, fingerprint
 from karamelo_py.compiler.compile import kernel, point_function
+from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
 from karamelo_py.run.runner import Runner
 from karamelo_py.scene.hub import Hub

@@ -12,7 +12,8 @@ from karamelo_py.kernels.arrays import (
     NoHooks,
 )
 from karamelo_py.kernels.clock import kick, step_size
-from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks, publish_totals
+from karamelo_py.kernels.node_hooks import node_hooks
+from karamelo_py.kernels.point_hooks import Motion, clear_totals, point_hooks, publish_totals
 from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows
 
