@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from numba import config, prange
 
-from karamelo_py.compiler import cache, fingerprint
-from karamelo_py.compiler.compile import kernel, point_function
+from karamelo_py.compiler import cache, choices, fingerprint
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
 from karamelo_py.run.runner import Runner
@@ -50,7 +51,8 @@ FILES = {
         """,
     "loops.py": """
         from typing import NamedTuple
-        from karamelo_py.compiler.compile import by_type, kernel, point_function
+        from karamelo_py.compiler.compile import by_type, point_function
+        from karamelo_py.compiler.loops import kernel
 
         class Pair(NamedTuple):
             first: float
@@ -401,16 +403,16 @@ def test_what_threads_do_is_followed(tmp_path, monkeypatch):
     threaded(Tag(), out)
     assert out.tolist() == [42, 42, 42]
     (compiled,) = threaded.overloads.values()
-    choices, codes = fingerprint.contents(compiled.library)
+    chosen, codes = choices.contents(compiled.library)
     name = f"{__name__}:answer"
-    assert fingerprint.Choice(name, (f"{__name__}:Tag",)) in choices
+    assert choices.Choice(name, (f"{__name__}:Tag",)) in chosen
     assert forty_two.__code__ in codes
 
 
 def test_code_that_nothing_leads_to_is_not_kept():
     """Code that got into a kernel by a way that is not followed could change unseen."""
     stranger = (lambda: 0).__code__
-    with pytest.raises(fingerprint.Unknown, match=r"the way to .*lambda"):
+    with pytest.raises(choices.Unknown, match=r"the way to .*lambda"):
         fingerprint.fingerprint([refuse], (), frozenset(), frozenset([stranger]))
 
 

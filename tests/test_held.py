@@ -9,9 +9,9 @@ from numba import config, typeof
 from numba.core.registry import cpu_target
 
 from karamelo_py.compiler import packed
-from karamelo_py.compiler.compile import entered, kernel, loop, subkernel
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.held import at_hand, held_type, hold, is_held
+from karamelo_py.compiler.loops import entered, kernel, loop, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, by_team, new_team, shared_out
 
 

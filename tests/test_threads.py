@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numba import config
 
-from karamelo_py.compiler.compile import entered, shared
+from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

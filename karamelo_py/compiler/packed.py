@@ -19,7 +19,8 @@ from llvmlite import ir
 from numba import typeof, types
 from numba.core.registry import cpu_target
 
-from karamelo_py.compiler.fingerprint import Unknown, describe
+from karamelo_py.compiler.choices import Unknown
+from karamelo_py.compiler.fingerprint import describe
 from karamelo_py.compiler.held import HeldTuple, held_type, is_held
 
 

@@ -25,8 +25,9 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from karamelo_py.compiler import inlining
-from karamelo_py.compiler.compile import by_type, define, kernel, left, subkernel
+from karamelo_py.compiler.compile import by_type, define
 from karamelo_py.compiler.held import HeldTuple, address, at_address, held_type, hold
+from karamelo_py.compiler.loops import kernel, left, subkernel
 
 
 class Serial(NamedTuple):

@@ -23,7 +23,6 @@ import inspect
 import itertools
 import os
 import types as python
-from collections import namedtuple
 from collections.abc import Callable, Hashable, Iterable
 from traceback import walk_tb
 from typing import Any, NamedTuple
@@ -35,9 +34,10 @@ from numba.core.imputils import impl_ret_borrowed, lower_builtin
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from karamelo_py.compiler.fingerprint import note, parts_noted, tag_class
+from karamelo_py.compiler.choices import note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
 from karamelo_py.compiler.lowering import Lowering, numbers_of, resolutions
+from karamelo_py.compiler.methods import refuse_methods
 from karamelo_py.compiler.values import (
     OF_WHOLE,
     Asks,
@@ -217,37 +217,6 @@ def _copied(function: Callable) -> Callable:
     return Walked(made, lambda: Flow(now()), rolled)
 
 
-_GENERATED = {*vars(namedtuple("_", ())), "__orig_bases__", "__annotations__", "__annotate_func__"}
-
-
-@functools.cache
-def _functions_of(one: type) -> frozenset[str]:
-    """The names of what a class of tuples does with its numbers by functions of its own."""
-    if not getattr(one, "_fields", ()):
-        return frozenset()
-    own = {name: value for base in one.__mro__[:-2] for name, value in vars(base).items()}
-    return frozenset(
-        name
-        for name, value in own.items()
-        if name not in _GENERATED
-        and isinstance(value, python.FunctionType | property | classmethod | staticmethod)
-    )
-
-
-def _names_in(code: python.CodeType) -> set[str]:
-    inner = (c for c in code.co_consts if isinstance(c, python.CodeType))
-    return set(code.co_names).union(*map(_names_in, inner))
-
-
-def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> None:
-    """Methods of tuples would run as they are, and nothing would follow them."""
-    functions = frozenset().union(*map(_functions_of, classes))
-    if any(name.startswith("__") for name in functions):
-        raise Untraceable
-    if functions and not functions.isdisjoint(set().union(*map(_names_in, codes))):
-        raise Untraceable
-
-
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
     """What a point function gives where one that nothing sees through calls it, as methods do."""
     return _seen(dispatch)(*arguments)
@@ -297,7 +266,7 @@ def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
             result = types.unliteral(lowering.kind_of(found))
         codes = {part for part in parts if isinstance(part, python.CodeType)}
-        _refuse_methods(codes, lowering.classes)
+        refuse_methods(codes, lowering.classes)
         if hasattr(dispatch, "tags"):
             parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
         name = f"{dispatch.__qualname__}.{next(_numbers)}"

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
-from karamelo_py.compiler.compile import (
-    entered,
-    real,
-    shared,
-)
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.loops import entered
 from karamelo_py.kernels.arrays import (
     DT,
     MASS,

@@ -23,8 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import entered, point_function, subkernel
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
 from karamelo_py.kernels.contact_pairs import (

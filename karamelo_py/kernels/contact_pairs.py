@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import subkernel
 from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import subkernel
 from karamelo_py.kernels.arrays import MASS
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.points.basis.surface import ENTRIES

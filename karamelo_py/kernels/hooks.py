@@ -30,8 +30,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.compile import shared, subkernel
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.formula import call_evaluate
+from karamelo_py.compiler.loops import subkernel
 from karamelo_py.kernels.arrays import (
     FINAL_INTEGRATE,
     INITIAL_INTEGRATE,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from karamelo_py.compiler.compile import caller_of, entered, subkernel
+from karamelo_py.compiler.addresses import caller_of
 from karamelo_py.compiler.formula import BLOCK
+from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
     BEFORE,

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from karamelo_py.compiler.compile import (
-    entered,
-    over_blocks,
-    point_function,
-    shared,
-)
+from karamelo_py.compiler.compile import over_blocks, point_function, shared
 from karamelo_py.compiler.fields import load_vector
+from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels.sums import adds
 from karamelo_py.kernels.sweep import (

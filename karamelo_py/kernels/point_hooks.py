@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import caller_of, entered, point_function, subkernel
+from karamelo_py.compiler.addresses import caller_of
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK
+from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.kernels.arrays import (
     BEFORE,
     TIME,

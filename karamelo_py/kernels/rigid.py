@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import entered, over_blocks, point_function
+from karamelo_py.compiler.compile import over_blocks, point_function
 from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick

@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import (
-    entered,
-    point_function,
-    real,
-    shared,
-)
+from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import (

@@ -10,15 +10,10 @@ import functools
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import (
-    by_type,
-    loop,
-    over_blocks,
-    real,
-    shared,
-)
+from karamelo_py.compiler.compile import by_type, over_blocks, real, shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.loops import loop
 from karamelo_py.compiler.threads import by_team
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import table

@@ -19,7 +19,7 @@ from zlib import crc32
 
 import numpy as np
 
-from karamelo_py.compiler.compile import address_of_python
+from karamelo_py.compiler.addresses import address_of_python
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
 from karamelo_py.kernels.arrays import DT, Block, Nodes, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
