@@ -5,8 +5,8 @@ import pytest
 from numba import config
 
 from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.loops import entered
-from karamelo_py.compiler.threads import Serial, Threaded, shared_out
+from karamelo_py.compiler.loops import entered, loop
+from karamelo_py.compiler.threads import Serial, Threaded, by_team, new_team, shared_out
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -37,3 +37,31 @@ def test_what_fails_in_a_thread_is_raised(mode):
     with pytest.raises(ValueError, match="beyond the limit"):
         squares(mode, out, 60)
     assert squares(mode, out, 100) == 100
+
+
+def several(mode, out, limit, times):
+    """The squares of numbers, several times."""
+    for _ in range(times):
+        _put_all(mode, out.size, out, limit)
+    return times
+
+
+_by_team = by_team(several, "out, limit, times")
+
+
+@loop
+def by_several(mode, out, limit, times):
+    """By a team of threads."""
+    return _by_team(mode, out, limit, times)
+
+
+@pytest.mark.parametrize("size", [1, 100])
+def test_what_fails_in_a_team_is_raised(size):
+    """Also in the loops of one number, which its leader does alone; and nobody waits for ever."""
+    team = new_team(2)
+    mode, out = Threaded(team.ctypes.data), np.zeros(size, np.int64)
+    for _ in range(3):
+        assert by_several(mode, out, size, 5) == 5
+        assert out.tolist() == [k * k for k in range(size)]
+        with pytest.raises(ValueError, match="beyond the limit"):
+            by_several(mode, out, size // 2, 5)
