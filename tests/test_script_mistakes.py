@@ -127,3 +127,21 @@ def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):
 def test_slips_in_a_plot(run_interpreted, line, hint):
     lines = [line, "compute(Ek, kinetic_energy, all)", "run(1)"]
     assert f"hint: {hint}" in run_interpreted(block(2, "# a plot", *lines), status=1).err
+
+
+@pytest.mark.parametrize(
+    ("lines", "wrong"),
+    [
+        (
+            "method(ulmpm, FLIP, lin, 1)\ndimension(2, 0, 1, 0, 1, 0.1)\nregion(b, blok, 0, 1)\n"
+            "fix(v, bodyforce, all, 0)\nfix(w, body_force, nobody, 0)\nset_outptu(20)",
+            [1, 3, 4, 6],
+        ),
+        ("dimension(2, 0, 1, 0)\nregion(b, cilinder, 0, 0, 1)\nrun_tim(0.4)", [1, 2, 3]),
+        ("R = 0.2 +\nmethod(ulmpm, FLIP, linear, 1)\nfoo(3)\nb = 2*\nc = R", [1, 3, 4]),
+        ("method(ulmpm, FLIP)\nfoo(3)\nquit\nrun_tim(0.4)", [1, 2]),
+        ("method(ulmpm, FLIP)\nstyle = 3\ncompute(e, style, all)\nstyle(3)", [1]),
+    ],
+)
+def test_names_of_commands_and_styles_depend_on_nothing(run_interpreted, lines, wrong):
+    assert [line for line, _ in places(run_interpreted(lines, status=1).err)] == wrong

@@ -1,14 +1,19 @@
 """Further mistakes of a script, behind the first: those that do not follow from it.
 
 The rest of the script is tried, and what a wrong statement would have defined is noted. Statements
-that name it are passed over, and what they would define is noted in turn.
+that name it are passed over, and what they would define is noted in turn; the names of commands and
+styles in them are looked up, since these depend on nothing.
 """
 
 import re
+from collections.abc import Iterable
+from itertools import takewhile
 from typing import Any
 
 from karamelo_py.language import registry
+from karamelo_py.language.unknown import unknown_call
 from karamelo_py.script.errors import Quit, ScriptError, nearest
+from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.other_programs import instead
 from karamelo_py.script.syntax import Assignment, Call, Statement
 
@@ -20,6 +25,8 @@ _SCENE = frozenset(
     {"region", "solid", "group", "eos", "strength", "damage", "temperature", "material"}
 )
 _NAMED = frozenset({"fix", "compute", "dump", "plot"})
+# Where the style stands among the arguments.
+_STYLED = {name: 2 if name == "dump" else 1 for name in (_SCENE | _NAMED) - {"group", "plot"}}
 _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
 
 
@@ -64,24 +71,87 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     """
     found: list[ScriptError] = []
     seen = {first.message}
+    passed_over: list[Statement] = []
     dependents = Dependents()
-    statement = interpreter.statement
-    while dependents.note(statement) and len(found) < MOST:
-        statement = interpreter.next_statement()
-        while statement is not None and not dependents.includes(statement):
+
+    def tell(error: ScriptError) -> None:
+        # One name that is not known may stand in many lines.
+        if error.message not in seen:
+            found.append(error)
+        seen.add(error.message)
+
+    wrong = interpreter.statement
+    while wrong is not None and len(found) < MOST:
+        if not dependents.note(wrong):
+            passed_over += _rest_of(interpreter)
+            break
+        wrong = None
+        while wrong is None and (statement := interpreter.next_statement()) is not None:
+            if dependents.includes(statement):
+                passed_over.append(statement)
+                wrong = statement
+                continue
             try:
                 interpreter.execute(statement)
             except ScriptError as error:
-                # One name that is not known may stand in many lines.
-                if error.message not in seen:
-                    found.append(error)
-                seen.add(error.message)
-                break
+                tell(error)
+                wrong = statement
             except Quit:
-                return found
+                break
             except Exception:  # What is left of the scene is not whole.
-                return found
-            statement = interpreter.next_statement()
-        if statement is None:
-            break
+                passed_over += _rest_of(interpreter)
+    for error in misnamed(interpreter, passed_over):
+        tell(error)
+    return sorted(found, key=_order)[:MOST]
+
+
+def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
+    """Mistakes in a script whose text is wrong somewhere, behind the first of them.
+
+    What is wrong in its text, and names of commands and styles that are not known.
+    """
+    found = [*first.others, *misnamed(interpreter, first.statements)]
+    return sorted(found, key=_order)[:MOST]
+
+
+def misnamed(interpreter: Any, statements: Iterable[Statement]) -> list[ScriptError]:
+    """What is wrong with the names of commands and styles in statements."""
+    statements = list(statements)
+    variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}
+    found = []
+    for statement in statements:
+        if not isinstance(statement, Call) or statement.name in variables:
+            continue
+        try:
+            _look_up(interpreter, statement, variables)
+        except ScriptError as error:
+            error.place = error.place or statement.place
+            found.append(error)
     return found
+
+
+def _look_up(interpreter: Any, statement: Call, variables: set[str]) -> None:
+    name, arguments = statement.name, statement.arguments
+    if name not in FUNCTIONS and not registry.knows("command", name):
+        raise unknown_call(interpreter, name, statement.place, statement=True)
+    where = _STYLED.get(name, len(arguments))
+    if where >= len(arguments):
+        return
+    style = arguments[where].code.strip()
+    if style not in variables and re.fullmatch(r"[a-zA-Z][\w/-]*", style):
+        try:
+            registry.find(name, style)
+        except ScriptError as error:
+            error.command, error.place = name, arguments[where].place
+            raise
+
+
+def _rest_of(interpreter: Any) -> list[Statement]:
+    """The statements that are left, up to where the script ends."""
+    rest = iter(interpreter.next_statement, None)
+    return list(takewhile(lambda statement: statement.raw.code.strip() != "quit", rest))
+
+
+def _order(error: ScriptError) -> tuple:
+    place = error.place
+    return (error.included != [], place.file, place.line) if place else (True, "", 0)

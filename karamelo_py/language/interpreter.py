@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from karamelo_py.language import registry, signature
-from karamelo_py.language.further_mistakes import further_errors
+from karamelo_py.language.further_mistakes import errors_of_text, further_errors
 from karamelo_py.language.meanings import Meanings
 from karamelo_py.language.presets import Presets
 from karamelo_py.language.replay import Record, Replay, spelled
@@ -101,11 +101,18 @@ class Interpreter(Meanings):
         """
         path = Path(path)
         self.files.append(path)
-        self._run(parse(read_script(path), str(path)), path)
+        self._run(self._parsed(read_script(path), str(path)), path)
 
     def run_text(self, text: str, name: str = "<text>") -> None:
         """Run a script that is in memory."""
-        self._run(parse(text, name), None)
+        self._run(self._parsed(text, name), None)
+
+    def _parsed(self, text: str, name: str) -> list[Statement]:
+        try:
+            return parse(text, name)
+        except ScriptError as error:
+            error.others = errors_of_text(self, error)
+            raise
 
     @property
     def waits(self) -> bool:

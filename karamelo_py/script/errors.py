@@ -73,6 +73,8 @@ class ScriptError(Exception):
         self.included: list[Place] = []
         # Further mistakes of the script, which do not follow from this one.
         self.others: list[ScriptError] = []
+        # Where the text of a script is wrong: the statements in which it is not.
+        self.statements: list = []
         # Whether the statement it belongs to is known: nothing outside of it may add to it.
         self.complete = False
 

@@ -39,7 +39,8 @@ def parse(text: str, file: str = "<text>") -> list[Statement]:
     Raises
     ------
     ScriptError
-        At the first syntax error, with its place.
+        At the first syntax error, with its place; those of other statements are its `others`, and
+        statements without any its `statements`.
     """
     # A byte order mark and the line ends of other systems mean nothing.
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
@@ -51,7 +52,18 @@ def parse(text: str, file: str = "<text>") -> list[Statement]:
         raise mistakes.in_script(text).error(source) from None
     except Mistake as mistake:
         raise mistake.error(source) from None
-    return [_statement(source, *span) for span in spans]
+    statements: list[Statement] = []
+    errors: list[ScriptError] = []
+    for span in spans:
+        try:
+            statements.append(_statement(source, *span))
+        except ScriptError as error:
+            errors.append(error)
+    if errors:
+        first, *first.others = errors
+        first.statements = statements
+        raise first
+    return statements
 
 
 def parse_expression(raw: Raw) -> Node:
