@@ -19,14 +19,8 @@ from karamelo_py.compiler.compile import define, index
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
-from karamelo_py.kernels.g2p import (
-    AverageStress,
-    FBar,
-    SeriesTerm,
-    TrialStrain,
-    empty_all,
-    settled_all,
-)
+from karamelo_py.kernels.averaging import FBar
+from karamelo_py.kernels.g2p import AverageStress, SeriesTerm, TrialStrain, empty_all, settled_all
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all

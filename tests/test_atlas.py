@@ -53,6 +53,14 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+def test_the_list_has_the_first_sentence_of_each(folder, capsys):
+    text = ATLAS.replace('"A law of time."', '"""A law\nof time: two of them.\nNo more."""')
+    (folder / "a.toml").write_text(text, encoding="utf-8")
+    assert main(["atlas", "a.toml", "-list"]) == 0
+    listed = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+    assert listed == [["laws/power", "A law of time:"], ["broken"]]
+
+
 def test_an_atlas_runs_its_commands_once_and_writes_a_page(folder, capsys):
     words = ["atlas", "a.toml", "-only", "laws", "-page", "page.md"]
     assert main([*words, "-small"]) == 0

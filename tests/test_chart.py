@@ -138,6 +138,16 @@ def test_pictures_are_written(table, suffix):
     assert (table / name).read_bytes().startswith(magic)
 
 
+def test_words_along_the_axes(table, capsys):
+    draw = ["chart", "sweep.csv", "-accuracy", "err", "-o", "chart.svg", "-axes"]
+    assert main([*draw, ",relative error (1)"]) == 0
+    text = (table / "chart.svg").read_text(encoding="utf-8")
+    assert "relative error (1)" in text and "time of the stepping loop (s)" in text
+    assert main([*draw, "N,err", "-heat", "N,basis"]) == 1
+    assert main([*draw, "N"]) == 1
+    assert "two, such as -axes" in capsys.readouterr().err
+
+
 def test_a_method_has_its_colour_in_every_chart():
     (alone,) = look.styles([{"basis": "cubic-spline"}])
     among = look.styles([{"basis": basis, "N": N} for basis in ORDERS for N in "34"])

@@ -22,7 +22,8 @@ from karamelo_py.compiler.lanes import Eights, Fours, group
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.compiler.tuples import add_scaled, row, scale
 from karamelo_py.kernels.arrays import arrays_of, with_nodes
-from karamelo_py.kernels.g2p import NodalMean, empty, gathered, settled
+from karamelo_py.kernels.averaging import NodalMean
+from karamelo_py.kernels.g2p import empty, gathered, settled
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.sweep import OldWeights, Serial, Visit, sweep_points
 from karamelo_py.kernels.visit import place_at

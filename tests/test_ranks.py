@@ -93,11 +93,17 @@ def test_dumps_in_pieces(state_interpreted, tmp_path, monkeypatch):
 @pytest.mark.parametrize("shape", [(7,), (8, 8), (4, 4, 4), (5, 3), (3, 7, 2)])
 def test_a_curve_through_all_places(shape):
     """Each number once; in a full cube from each place to the next beside it, as Hilbert's does."""
-    number = along_curve(shape)
+    number = along_curve(shape, [1] * len(shape))
     assert sorted(number) == list(range(np.prod(shape)))
     places = np.stack(np.unravel_index(np.argsort(number), shape), axis=1)
     if shape in {(7,), (8, 8), (4, 4, 4)}:
         assert (np.abs(np.diff(places, axis=0)).sum(axis=1) == 1).all()
+
+
+def test_a_curve_through_long_places():
+    """First through the half of a bar: a cut there has 9 places of 8 x 8 cells, not of 8 x 256."""
+    number = along_curve((3, 3, 2), (8, 8, 128)).reshape(3, 3, 2)
+    assert sorted(number[:, :, 0].ravel()) == list(range(9))
 
 
 def hub_in_tiles(monkeypatch, *lines: str) -> Hub:

@@ -53,7 +53,8 @@ from karamelo_py.kernels.arrays import (
     of_force,
     with_nodes,
 )
-from karamelo_py.kernels.g2p import NodalMean, empty, gathered, settled
+from karamelo_py.kernels.averaging import NodalMean
+from karamelo_py.kernels.g2p import empty, gathered, settled
 from karamelo_py.kernels.hooks import (
     Warmth,
     clear_totals,

@@ -8,7 +8,7 @@ from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
-from karamelo_py.kernels.g2p import NodalMean, NodalStress
+from karamelo_py.kernels.averaging import NodalMean, NodalStress
 from karamelo_py.kernels.loss import Lost, Rubbed, keep_loss
 from karamelo_py.kernels.p2g import SeenMass
 from karamelo_py.points.kinematics import dimension

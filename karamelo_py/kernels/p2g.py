@@ -13,15 +13,15 @@ from karamelo_py.compiler.tuples import (
     subtract,
 )
 from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, VELOCITY_WIDTH, of_force
-from karamelo_py.kernels.g2p import (
+from karamelo_py.kernels.averaging import (
     AveragedStress,
     FBar,
     NodalMean,
     NodalStress,
     PointByPoint,
     VolumeRatio,
-    zero_vector,
 )
+from karamelo_py.kernels.g2p import zero_vector
 from karamelo_py.kernels.loss import Lost, bring_energy
 from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, state_of
 from karamelo_py.points.basis import entry, mapped_again

@@ -42,7 +42,8 @@ from karamelo_py.kernels.arrays import (
     of_force,
     of_momentum,
 )
-from karamelo_py.kernels.g2p import STRAINS, AverageStress, FBar, Move, SeriesTerm, TrialStrain
+from karamelo_py.kernels.averaging import FBar
+from karamelo_py.kernels.g2p import STRAINS, AverageStress, Move, SeriesTerm, TrialStrain
 from karamelo_py.kernels.hooks import Motion, clear_totals, node_hooks, point_hooks, publish_totals
 from karamelo_py.kernels.loss import Lost, Rubbed
 from karamelo_py.kernels.nodes import (

@@ -8,6 +8,7 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import MASS, of_force
+from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.export import (
     ENERGY,
     EXPORTED,
@@ -17,7 +18,6 @@ from karamelo_py.kernels.export import (
     export_state,
     export_velocity_moment,
 )
-from karamelo_py.kernels.g2p import FBar
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.scene import Scene

@@ -7,16 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 
-def along_curve(shape: Sequence[int]) -> np.ndarray:
+def along_curve(shape: Sequence[int], size: Sequence[int]) -> np.ndarray:
     """The number of each place, in the order of rows, along Hilbert's curve.
 
-    The curve goes through the cube around the grid, whose other places get no number. After
+    Places have a `size` in each direction. The curve goes through the cube around the grid, first
+    through a half across its longest direction, and not all that it passes is a place. After
     Skilling, J. (2004), "Programming the Hilbert curve", AIP Conference Proceedings 707, 381-387.
     """
-    x = np.indices(shape).reshape(len(shape), -1)
+    steps = np.array(size) // min(size)
+    x = np.indices(shape).reshape(len(shape), -1) * steps[:, None]
     if len(shape) == 1:
         return x[0]
-    bits = range(int(max(shape) - 1).bit_length())
+    x = x[np.argsort(-steps * shape, kind="stable")]
+    bits = range(int(x.max()).bit_length())
     for bit in reversed(bits[1:]):
         below = (1 << bit) - 1
         for k in range(len(x)):

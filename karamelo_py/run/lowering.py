@@ -25,7 +25,7 @@ from karamelo_py.kernels.arrays import (
     new_control,
     own_arrays_of,
 )
-from karamelo_py.kernels.g2p import NodalMean
+from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
 from karamelo_py.kernels.loss import Lost, Rubbed

@@ -76,7 +76,7 @@ class SharedTiles(Tiles):
         self.one_place = one_place
         self._along = np.concatenate(
             [
-                first + along_curve(shape)
+                first + along_curve(shape, self.size)
                 for first, shape in zip(self.first, self.shapes, strict=False)
             ]
         )

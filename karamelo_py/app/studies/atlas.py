@@ -165,7 +165,8 @@ def run(options: Any) -> int:
     ]  # fmt: skip
     if options.list:
         for entry in chosen:
-            print(f"{entry.name:<32} {entry.text.splitlines()[0] if entry.text else ''}")
+            first, *_ = re.split(r"(?<=[.:])\s", " ".join(entry.text.split()))
+            print(f"{entry.name:<32} {first}".rstrip())
         return 0
     folder = options.o / "small" if options.small else options.o
     failed: dict[str, str] = {}

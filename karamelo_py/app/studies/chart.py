@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies import histories, keeping, pictures, records, versus
+from karamelo_py.app.studies import histories, keeping, look, pictures, records, versus
 from karamelo_py.app.studies.curves import Family, missing, order
 from karamelo_py.app.studies.options import new_parser, out_file
 from karamelo_py.app.studies.study import shown, terminal
@@ -57,7 +57,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("-exact", metavar="COLUMN", help="of -curve: the exact log column")
     parser.add_argument("-names", default="", help="of -curve: what to call the runs, with commas")
     parser.add_argument(
-        "-axes", metavar="X,Y", help="of -curve: what to write along them, such as 'time (s),F (N)'"
+        "-axes",
+        metavar="X,Y",
+        help="what to write along them, such as 'time (s),F (N)'; an empty one stays as it is",
     )
     parser.add_argument("-log", default="log.mpm", metavar="FILE", help="of -curve: another log")
     parser.add_argument("-where", action="append", default=[], help="rows that fulfil a condition")
@@ -70,6 +72,8 @@ def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     costs = bool(options.cost) or not options.x
     options.cost = options.cost or "seconds"
+    if options.axes and (options.heat or options.versus or options.keeps):
+        raise ScriptError("-axes", expected="a chart of lines: -accuracy, or -curve")
     if options.versus:
         return side_by_side(options)
     if len(options.tables) > 1:
@@ -95,6 +99,8 @@ def run(options: Any) -> int:
         raise ScriptError(f"-heat {options.heat}", expected="two variables: -heat N,ppc")
     if not options.x and not axes and not any(line.shown(line.cost).any() for line in family.lines):
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
+    first = family.along if options.x else look.label(family.cost)
+    words = along(options, first, family.error_label)
     tell(family, made, costs=costs)
     if out is None:
         return 0
@@ -103,13 +109,24 @@ def run(options: Any) -> int:
             raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
         from karamelo_py.app.studies import page
 
-        page.write(family, rows, out, convergence=bool(options.x), title=title or "runs", made=made)
+        page.write(
+            family, rows, out, convergence=bool(options.x), title=title or "runs", made=made,
+            words=words,
+        )  # fmt: skip
     elif axes:
         pictures.heat(family, rows, *axes, out, title)
     else:
-        pictures.lines(family, out, convergence=bool(options.x), title=title)
+        pictures.lines(family, out, convergence=bool(options.x), title=title, words=words)
     print(f"drawn: {out}")
     return 0
+
+
+def along(options: Any, x: str, y: str) -> tuple[str, str]:
+    """What to write along the axes: as the options say, else `x` and `y`."""
+    words = (options.axes or ",").split(",")
+    if len(words) != 2:
+        raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
+    return words[0].strip() or x, words[1].strip() or y
 
 
 def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
@@ -165,9 +182,6 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     differing = [name for name in by if len({row[name] for row in rows}) > 1]
     over = options.x or "Time"
     names = [name.strip() for name in options.names.split(",") if name.strip()]
-    axes = [words.strip() for words in (options.axes or f"{over},{options.curve}").split(",")]
-    if len(axes) != 2:
-        raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
 
     def read(column: str) -> list[histories.History]:
         return histories.histories(
@@ -180,7 +194,8 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
         exact = whole._replace(label=options.exact)
     title = options.title if options.title is not None else Path(made.get("script", "")).name
     found = read(options.curve)
-    histories.draw(found, out, x=axes[0], y=axes[1], title=title, exact=exact)
+    x, y = along(options, over, options.curve)
+    histories.draw(found, out, x=x, y=y, title=title, exact=exact)
     for each in found:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")

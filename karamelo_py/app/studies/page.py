@@ -71,9 +71,10 @@ Plotly.Plots.resize(document.getElementById("chart"));
 
 
 def write(
-    family: Family, rows: list, path: Path, *, convergence: bool, title: str, made: Mapping
-) -> None:
-    """Write the page.
+    family: Family, rows: list, path: Path, *, convergence: bool, title: str, made: Mapping,
+    words: tuple[str, str],
+) -> None:  # fmt: skip
+    """Write the page; `words` stand along the axes.
 
     Raises
     ------
@@ -115,8 +116,8 @@ def write(
     }  # fmt: skip
     figure.update_layout(
         template="plotly_white", margin={"l": 70, "r": 20, "t": 20, "b": 60}, hovermode="closest",
-        xaxis={**axis, "title": family.along if convergence else look.label(family.cost)},
-        yaxis={**axis, "title": family.error_label},
+        xaxis={**axis, "title": words[0]},
+        yaxis={**axis, "title": words[1]},
         legend={"orientation": "h", "y": -0.15},
     )  # fmt: skip
     for k, along in (("xaxis", 0), ("yaxis", 1)):

@@ -13,8 +13,13 @@ from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
 from karamelo_py.script.terms import number_of
 
 
-def lines(family: Family, path: Path, *, convergence: bool, title: str = "") -> None:
-    """Errors over costs with the Pareto front, or over the variable along lines."""
+def lines(
+    family: Family, path: Path, *, convergence: bool, words: tuple[str, str], title: str = ""
+) -> None:
+    """Errors over costs with the Pareto front, or over the variable along lines.
+
+    `words` stand along the axes.
+    """
     figure = blank_figure(8.4, 5.2)
     axes = figure.subplots()
     styles = look.styles([line.choice for line in family.lines])
@@ -43,8 +48,7 @@ def lines(family: Family, path: Path, *, convergence: bool, title: str = "") -> 
             ends.append((px[last], py[last], line.label, colour))
     _gone(axes, [(x, style[0]) for style, gone in zip(styles, failed, strict=False) for x in gone])
     look.direct_labels(axes, ends)
-    axes.set_xlabel(family.along if convergence else look.label(family.cost))
-    axes.set_ylabel(family.error_label)
+    axes.set(xlabel=words[0], ylabel=words[1])
     axes.set_title(title, loc="left", fontsize=10)
     tidy(axes)
     _footnote(figure, family, convergence, not convergence and family.front())

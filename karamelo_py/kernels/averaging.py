@@ -1,0 +1,157 @@
+"""F-bar: changes of volume and mean stresses averaged over the surroundings, where a scene asks."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.compile import fma, point_function, real
+from karamelo_py.compiler.fields import field, pair, scalar
+from karamelo_py.kernels.visit import deformation_of, law_of, state_of
+from karamelo_py.points.basis import entry
+from karamelo_py.points.frames import scaled_increment
+from karamelo_py.points.transfers import kept_gradient, straining
+
+
+class VolumeRatio(NamedTuple):
+    """Ratio of volumes of the trial increment of a point."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+    start = 1.0
+
+
+class NodalMean(NamedTuple):
+    """Sum of weight times value, and of weights, at a node; then the mean in place of the first.
+
+    Of ratios of volumes, weighted with volumes (F-bar); of temperatures, weighted with conductance.
+    """
+
+    array: Any
+
+    shape = pair
+    kept = False
+    summed = True
+
+
+class AveragedStress(NamedTuple):
+    """Mean stress of a point and its surroundings."""
+
+    array: Any
+
+    shape = scalar
+    kept = False
+
+
+class NodalStress(NamedTuple):
+    """Sum of weight, volume and mean stress, and of weight and volume; then the mean."""
+
+    array: Any
+
+    kept = False
+    summed = True
+    shape = NodalMean.shape
+
+
+class PointByPoint(NamedTuple):
+    """Every point has its own change of volume."""
+
+    in_lanes = True
+
+
+class FBar(NamedTuple):
+    """Changes of volume are averaged over the surroundings, against volumetric locking.
+
+    With d_p the rate of volume of a point and V_p its volume, the average is
+    sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted with volumes it is its own adjoint: the
+    mean stress averaged alike makes the forces whose power is that of the averaged strain.
+    """
+
+    in_lanes = True
+    point_fields = (VolumeRatio, AveragedStress)
+    node_fields = (NodalMean, NodalStress)
+
+
+@point_function()
+def no_ratio(averaging, like):
+    """What the gather of the averaged ratio of volumes starts from; empty where there is none."""
+
+
+@no_ratio.on(PointByPoint)
+def _(averaging, like):
+    return ()
+
+
+@no_ratio.on(FBar)
+def _(averaging, like):
+    return (real(0, like),)
+
+
+@point_function()
+def gathered_ratio(averaging, w, stencil, k, total):
+    """`total` with the ratio of volumes at the k-th node."""
+
+
+@gathered_ratio.on(PointByPoint)
+def _(averaging, w, stencil, k, total):
+    return total
+
+
+@gathered_ratio.on(FBar)
+def _(averaging, w, stencil, k, total):
+    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    return (fma(weight, field(w.nodes.fields, NodalMean)[i, 0], total[0]),)
+
+
+@point_function()
+def averaged(averaging, w, p, dl, ratio):
+    """`dl` with the change of volume that the surroundings have on average."""
+
+
+@averaged.on(PointByPoint)
+def _(averaging, w, p, dl, ratio):
+    return dl
+
+
+@averaged.on(FBar)
+def _(averaging, w, p, dl, ratio):
+    # The ratio of volumes of the increment is replaced by its average over the points nearby,
+    # weighted with their volumes (after Coombs et al. 2018, "Overcoming volumetric locking in
+    # material point methods", eq. 23; there over the points of a cell). In the total frame, `dl`
+    # is dt Fdot, and F + dl is scaled.
+    law = law_of(w, p)
+    state = state_of(w, law, p, ratio[0])
+    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    own = field(w.points.fields, VolumeRatio)[0, p]
+    return scaled_increment(w.frame, w.kin, dl, f, ratio[0] / own)
+
+
+@point_function()
+def kept_out(averaging, w, gradient):
+    """The gradient to gather, or nothing where the transfer has it from v* already."""
+
+
+@kept_out.on(PointByPoint)
+def _(averaging, w, gradient):
+    return straining(w.transfer, w.kin, gradient)
+
+
+@kept_out.on(FBar)
+def _(averaging, w, gradient):
+    return gradient
+
+
+@point_function()
+def known_gradient(averaging, w, moment, gradient):
+    """The velocity gradient, gathered or kept by the transfer."""
+
+
+@known_gradient.on(PointByPoint)
+def _(averaging, w, moment, gradient):
+    return kept_gradient(w.transfer, w.kin, moment, gradient)
+
+
+@known_gradient.on(FBar)
+def _(averaging, w, moment, gradient):
+    return gradient
