@@ -191,6 +191,35 @@ def test_a_process_is_killed(tmp_path, rank):
     assert all(len(line.split()) == 3 for line in lines)
 
 
+ENDS = """
+import os
+import signal
+import time
+if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
+    from karamelo_py.run import crew
+    def meet(self, word, patience=crew.inf, *, before=crew.Crew.meet):
+        if word == crew.WELL:
+            time.sleep(2)  # the first has done all
+            os.kill(os.getpid(), signal.SIGKILL)
+        return before(self, word, patience)
+    crew.Crew.meet = meet
+"""
+
+
+@needs_mpi
+def test_a_process_is_killed_at_the_end(tmp_path):
+    """When all is written and it only has to say so."""
+    (tmp_path / "sitecustomize.py").write_text(ENDS, encoding="utf-8")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    status, out, err = by_ranks(
+        tmp_path / "run", moving(tmp_path, "run(20)"), 2, PYTHONPATH=folders
+    )
+    assert status == 128 + signal.SIGKILL, err + out
+    assert "Run finished" in out
+    assert err.count("error: ") == 1 and "process 2 of 2 (pid " in err
+    assert "when the runs were over: all files are complete" in err
+
+
 def _pids(launcher: int) -> list[int]:
     """The processes of a run, in the order of their ranks."""
     found = subprocess.run(

@@ -93,6 +93,7 @@ class Launcher:
         self.links: dict[socket.socket, dict[str, Any]] = {}
         self.reports: dict[int, dict[str, Any]] = {}
         self.lost: list[dict[str, Any]] = []  # ended without a report, in this order
+        self.over = False  # the first has done all
         self.signals: list[int] = []
         self.heeded: list[int] = []
         self.process: Any = None
@@ -163,6 +164,9 @@ class Launcher:
                     self.lost.append(one)
 
     def _heard(self, link: socket.socket, message: dict[str, Any]) -> None:
+        if "over" in message:
+            self.over = True
+            return
         if link in self.links:
             self.reports[self.links[link]["rank"]] = message
             return
@@ -195,10 +199,12 @@ class Launcher:
 
     def _loss(self) -> str:
         one = self.lost[0]
+        who = f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended"
+        if self.over:
+            return render_message("error", f"{who} when the runs were over: all files are complete")
         return render_message(
             "error",
-            f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended, and the "
-            "run with it: files are complete up to there",
+            f"{who}, and the run with it: files are complete up to there",
             hint="the system ends processes that take too much memory",
         )
 

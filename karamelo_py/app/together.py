@@ -55,6 +55,12 @@ class Link:
         if rank == 0:
             threading.Thread(target=_heed, args=(link,), daemon=True).start()
 
+    def tell_of_end(self) -> None:
+        """Tell the launcher that all is done, and that the others are waited for."""
+        if self.socket is not None:
+            with suppress(OSError):
+                self.socket.sendall(_line({"over": True}))
+
     def report(self, status: int, text: str = "") -> None:
         """Tell the launcher how this process ends."""
         with suppress(OSError):
@@ -141,6 +147,8 @@ def together(
     if crew.parted:
         return end(status, text, tells=True, stays=True)
     patience = inf
+    if not status and rank == 0:
+        link.tell_of_end()
     if status:
         patience = LONGER if rank else PATIENCE
         if status == INTERRUPTED or crew.amid:
