@@ -152,6 +152,17 @@ def test_temperatures_that_swing_stop_the_run(run_interpreted, kind, d, ppc, end
     assert "with 1/32 of the step" in halved.err
 
 
+def test_temperatures_that_stay_where_they_may_stop_nothing(run_interpreted):
+    """Where all points are led to 400 nothing swings, in steps of ten times that of conduction."""
+    led = "fix(hot, temperature_particles, all, 400)"
+    scene = CONDUCTION.format(
+        "ulmpm", d=1, ppc=2, box="0, 0.6", whole="", end=led, dt=0.025, words=", on_trouble=halve"
+    )
+    result = run_interpreted(scene)
+    assert "Back to step" not in result.err
+    assert "beyond 4 times that temperatures swing" in result.err
+
+
 def test_the_limit_has_a_name(run_interpreted):
     """The log shows what rules the step."""
     lines = ["set_output(1)", "log_modify(custom, step, limit)", "run(1)", "set_dt(1e-3)", "run(1)"]

@@ -129,9 +129,9 @@ def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     if share > 1:
         message += f"the step is {share:.3g} times the stable one of conduction, and "
     message += (
-        f"temperatures have come to be between {clock.T_low:.4g} and {clock.T_high:.4g}, where "
-        f"initial state, fixes and sources allow {clock.coldest:.4g} to "
-        f"{clock.hottest + clock.own_heat:.4g}"
+        f"temperatures have come to be between {clock.T_low:.6g} and {clock.T_high:.6g}, where "
+        f"initial state, fixes and sources allow {clock.coldest:.6g} to "
+        f"{clock.hottest + clock.own_heat:.6g}"
     )
     return message, own_step_instead(hub) if share > 1 else _smaller_step(hub, simulation)
 
