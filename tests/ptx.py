@@ -24,7 +24,7 @@ from karamelo_py.kernels.g2p import AverageStress, SeriesTerm, TrialStrain, empt
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all
-from karamelo_py.kernels.step import Insulated
+from karamelo_py.kernels.rows import Insulated
 from karamelo_py.kernels.sums import sum_tile
 from karamelo_py.kernels.sweep import (
     Context,

@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 from numba import config, prange
 
-from karamelo_py.compiler import cache, fingerprint
-from karamelo_py.compiler.compile import kernel, point_function
+from karamelo_py.compiler import cache, choices, fingerprint
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.loops import kernel
+from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
 from karamelo_py.run.runner import Runner
 from karamelo_py.scene.hub import Hub
@@ -49,7 +51,8 @@ FILES = {
         """,
     "loops.py": """
         from typing import NamedTuple
-        from karamelo_py.compiler.compile import by_type, kernel, point_function
+        from karamelo_py.compiler.compile import by_type, point_function
+        from karamelo_py.compiler.loops import kernel
 
         class Pair(NamedTuple):
             first: float
@@ -400,16 +403,16 @@ def test_what_threads_do_is_followed(tmp_path, monkeypatch):
     threaded(Tag(), out)
     assert out.tolist() == [42, 42, 42]
     (compiled,) = threaded.overloads.values()
-    choices, codes = fingerprint.contents(compiled.library)
+    chosen, codes = choices.contents(compiled.library)
     name = f"{__name__}:answer"
-    assert fingerprint.Choice(name, (f"{__name__}:Tag",)) in choices
+    assert choices.Choice(name, (f"{__name__}:Tag",)) in chosen
     assert forty_two.__code__ in codes
 
 
 def test_code_that_nothing_leads_to_is_not_kept():
     """Code that got into a kernel by a way that is not followed could change unseen."""
     stranger = (lambda: 0).__code__
-    with pytest.raises(fingerprint.Unknown, match=r"the way to .*lambda"):
+    with pytest.raises(choices.Unknown, match=r"the way to .*lambda"):
         fingerprint.fingerprint([refuse], (), frozenset(), frozenset([stranger]))
 
 
@@ -435,6 +438,8 @@ def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
     hub = Hub(Console(out))
     hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
     wait = Runner(hub)._telling_of_compilation
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
+    monkeypatch.setattr(os, "getloadavg", lambda: (2.0, 0, 0), raising=False)
     with wait():
         assert out.getvalue() == ""
         one, other = fresh(), fresh()
@@ -448,6 +453,11 @@ def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
         assert out.getvalue() == line
         kernel(lambda tag: answer(tag))(Tag())
     assert "once: about 12 s (the next run starts at once) ..." in out.getvalue()
+    # Eight others and this on four processors.
+    monkeypatch.setattr(os, "getloadavg", lambda: (8.0, 0, 0), raising=False)
+    with wait():
+        kernel(lambda tag: answer(tag) + 1)(Tag())
+    assert "once: 12 s to 28 s, as others use the processors (the next" in out.getvalue()
     # So short a wait was not for all of it.
     assert list(cache._times().values()) == [12.3]
 
@@ -476,3 +486,8 @@ def test_constants_in_modules_of_modules_are_followed():
     for constants.K in (2, 5, 2):
         prints.append(fingerprint.fingerprint([names["doubled"]], (), frozenset()))
     assert prints[0] == prints[2] != prints[1]
+
+
+def test_a_step_and_what_it_remembers_are_followed():
+    """The rows of a scheme are kept between interpreted steps; steps have a key all the same."""
+    assert fingerprint.fingerprint([step], (), frozenset())

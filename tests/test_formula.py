@@ -12,7 +12,6 @@ from karamelo_py.compiler.formula import (
     CONSTANT,
     KEEP,
     KEPT,
-    OPERATIONS,
     POINT,
     ROWS,
     SPREAD,
@@ -20,6 +19,7 @@ from karamelo_py.compiler.formula import (
     Program,
     evaluate,
 )
+from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.script.parser import parse_text
 from karamelo_py.script.values import Values

@@ -9,9 +9,9 @@ from numba import config, typeof
 from numba.core.registry import cpu_target
 
 from karamelo_py.compiler import packed
-from karamelo_py.compiler.compile import entered, kernel, loop, subkernel
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.held import at_hand, held_type, hold, is_held
+from karamelo_py.compiler.loops import entered, kernel, loop, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, by_team, new_team, shared_out
 
 
@@ -134,6 +134,32 @@ def test_memory_that_moves_is_noticed():
     out[:] = 0.0
     assert _of_python(mixed, 1, out)[1] == 100_000
     assert out[0] == 1.0
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_an_array_in_the_place_of_another():
+    """What is known of an array is never used for one that comes after it."""
+    mixed = Mixed(True, np.float32(1), (3, (1, 2.0)), np.eye(2), None, np.int32(0), ())
+    mixed = mixed._replace(inner=(Pair(np.zeros(1), np.zeros(0)),))
+    numbers = set()
+    for k in range(50):
+        out = np.zeros(8 + 1000 * (k % 3))
+        numbers.add(id(out))
+        assert _of_python(mixed, k, out)[1] == out.size
+        assert out[6] == k
+        del out
+    assert len(numbers) < 50  # Python has used numbers again
+    assert not numbers & packed._arrays.keys()
+    one, other = np.zeros(8), np.zeros(8)
+    _of_python(mixed, 1, one)
+    packed._arrays[id(other)] = packed._arrays[id(one)]  # as if nobody had told
+    _of_python(mixed, 2, other)
+    assert (one[6], other[6]) == (1, 2)
+    known = len(_of_python.entries)
+    other.shape = (8, 1)
+    _of_python(mixed, 3, other)
+    assert other[6] == 3
+    assert len(_of_python.entries) == known + 1  # a table is no row of numbers
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

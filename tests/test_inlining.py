@@ -20,7 +20,8 @@ from numba.core import (
 from numba.core.typing import context, templates
 
 from karamelo_py.compiler import inlining, lean
-from karamelo_py.compiler.compile import entered, kernel, shared
+from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.loops import entered, kernel
 from karamelo_py.kernels import contact, heat  # noqa: F401  (with all that they stand on)
 
 

@@ -12,13 +12,13 @@ from karamelo_py.compiler.compile import (
     choose,
     fma,
     in_all,
-    kernel,
     of_present,
     real,
     shared,
 )
 from karamelo_py.compiler.fields import field, load, store
 from karamelo_py.compiler.lanes import Eights, Fours, group
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.compiler.tuples import add_scaled, row, scale
 from karamelo_py.kernels.arrays import arrays_of, with_nodes

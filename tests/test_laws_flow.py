@@ -9,7 +9,8 @@ from numba import njit
 from tensors import every_kinematics, flat
 
 from comparisons.results import read_log
-from karamelo_py.compiler.formula import CONSTANT, OPERATIONS, POINT
+from karamelo_py.compiler.formula import CONSTANT, POINT
+from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_on, law_table
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space

@@ -13,8 +13,9 @@ import pytest
 from conftest import INPUTS, ROOT
 
 from karamelo_py.app.cli import main
+from karamelo_py.compiler.choices import contents
 from karamelo_py.compiler.fields import name_of
-from karamelo_py.compiler.fingerprint import classes_in, contents
+from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import advance

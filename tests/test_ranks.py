@@ -21,6 +21,7 @@ from karamelo_py.run import tiles
 from karamelo_py.run.curve import along_curve
 from karamelo_py.run.plan import bytes_of_node, plan
 from karamelo_py.run.shares import SharedTiles, work_of
+from karamelo_py.run.work import Work
 from karamelo_py.scene.hub import Hub
 
 MOVING = (
@@ -200,3 +201,25 @@ def test_a_load_by_a_reaction(state_interpreted, tmp_path):
     assert shared(state_interpreted, tmp_path, with_files(script), ranks=3)
     log = (tmp_path / "parts" / "log.mpm").read_text(encoding="utf-8")
     assert float(log.split()[-2]) != 0
+
+
+def test_costs_are_measured(monkeypatch):
+    """Ten steps of 3 points at 100 ns, 10 at 50 ns and 4 tiles at 10 ns, and a pause."""
+    now = 0
+    monkeypatch.setattr("time.perf_counter_ns", lambda: now)
+    work = Work(2)
+    for _ in range(10):
+        work.resume(0)
+        for taken in (300, 500):
+            now += taken
+            work.note()
+            work.next_block()
+        work.resume()
+        now += 40
+        work.note()
+    work.pause()
+    now += 10**9
+    work.note()
+    work.done([3, 10, 4], 10)
+    work.learn(SimpleNamespace(added=lambda numbers: numbers))
+    assert work.costs.tolist() == [100, 50, 10]

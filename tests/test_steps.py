@@ -7,7 +7,7 @@ import pytest
 from scenes import block
 
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, new_control
-from karamelo_py.kernels.step import choose_dt, finish
+from karamelo_py.kernels.clock import choose_dt, finish
 
 # E 100, nu 0.3, rho 2: lambda + 2 G = E (1 - nu) / ((1 + nu)(1 - 2 nu))
 SPEED = sqrt(100 * 0.7 / (1.3 * 0.4) / 2)

@@ -3,7 +3,7 @@
 from karamelo_py.kernels.g2p import Move, Strain, StrainInMove
 from karamelo_py.kernels.nodes import Update
 from karamelo_py.kernels.p2g import InternalForce, MassMomentum
-from karamelo_py.kernels.step import FORCE, MASS_AND_MOMENTUM, SUMS
+from karamelo_py.kernels.rows import FORCE, MASS_AND_MOMENTUM, SUMS
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights
 from karamelo_py.kernels.table import Gather, Nodes, Sweep, fused, staged
 from karamelo_py.schemes.musl import MUSL

@@ -11,16 +11,10 @@ from numba.core import event
 from numba.core.caching import NullCache
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
-from karamelo_py.compiler import fingerprint
-from karamelo_py.compiler.compile import (
-    choose,
-    fma,
-    kernel,
-    point_function,
-    real,
-    shared,
-)
+from karamelo_py.compiler import choices
+from karamelo_py.compiler.compile import choose, fma, point_function, real, shared
 from karamelo_py.compiler.held import hold
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.language.faults import cause_of
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -209,8 +203,8 @@ def test_what_was_run_is_followed(tmp_path, monkeypatch):
     made = kernel(caller)
     made(Square(1.0), 2.0)
     (compiled,) = made.overloads.values()
-    choices, codes = fingerprint.contents(compiled.library)
-    assert fingerprint.Choice(f"{__name__}:value_of", (f"{__name__}:Square",)) in choices
+    chosen, codes = choices.contents(compiled.library)
+    assert choices.Choice(f"{__name__}:value_of", (f"{__name__}:Square",)) in chosen
     assert {third_power.__code__, pairs.__code__} <= codes
 
 
@@ -398,8 +392,8 @@ def test_choices_of_tags_without_numbers_are_followed(tmp_path, monkeypatch):
     made = kernel(caller)
     assert made(2.0) == 6
     (compiled,) = made.overloads.values()
-    choices, _ = fingerprint.contents(compiled.library)
-    assert fingerprint.Choice(f"{__name__}:size_of", (f"{__name__}:Empty",)) in choices
+    chosen, _ = choices.contents(compiled.library)
+    assert choices.Choice(f"{__name__}:size_of", (f"{__name__}:Empty",)) in chosen
 
 
 class Empty(NamedTuple):

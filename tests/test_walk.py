@@ -8,8 +8,9 @@ from numba import config
 from numba.core import event
 from numba.core.caching import NullCache
 
-from karamelo_py.compiler.compile import kernel, looping, shared, subkernel
+from karamelo_py.compiler.compile import looping, shared
 from karamelo_py.compiler.held import hold
+from karamelo_py.compiler.loops import kernel, subkernel
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 

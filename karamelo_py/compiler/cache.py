@@ -31,16 +31,15 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
 from karamelo_py.compiler import held, inlining
-from karamelo_py.compiler.fingerprint import (
+from karamelo_py.compiler.choices import (
     WHOLE,
     Choice,
     Unknown,
     contents,
-    describe,
-    fingerprint,
     keep_choices,
     name_of,
 )
+from karamelo_py.compiler.fingerprint import describe, fingerprint
 
 VARIANTS = 4  # of a kernel for the same types: as many states of the sources are kept
 ROOM = 400e6  # bytes; of what takes more, the files that were used least recently are forgotten
@@ -215,8 +214,8 @@ class KernelCache(_Cache):
 
 
 # What chooses code by type, and what is in every kernel.
-_NAMES = ("compile", "trace", "walk", "flow", "lowering", "values", "fields")
-_BESIDE = [Path(__file__).with_name(f"{name}.py") for name in _NAMES]
+_MAKERS = "compile", "loops", "trace", "walk", "terms", "texts", "flow", "lowering", "values"
+_BESIDE = [Path(__file__).with_name(f"{name}.py") for name in (*_MAKERS, "fields")]
 WHOLE_FILES = [inlining.__file__, held.__file__, *WHOLE, *_BESIDE]
 
 
@@ -279,7 +278,7 @@ def _times() -> dict[str, float]:
 
 
 def time_for(scene: str) -> float | None:
-    """Seconds that compilation took the last time for a scene, or for the last one compiled."""
+    """Seconds of a processor that a scene, or else the last one, took to be compiled."""
     times = _times()
     return times.get(scene, next(reversed(times.values()), None))
 

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
 import functools
-import gc
-import inspect
-import os
 from collections.abc import Callable
 from typing import Any
 
 import numba
-from llvmlite import ir
-from numba import config, njit
-from numba.core import event
-from numba.core.ccallback import CFunc
+from numba import config
 from numba.extending import intrinsic, overload
 
 from karamelo_py.compiler import inlining, lean  # noqa: F401
-from karamelo_py.compiler.cache import KernelCache
-from karamelo_py.compiler.fingerprint import (
+from karamelo_py.compiler.choices import (
     SPELLED,
     asks,
     declare_point_function,
@@ -27,145 +19,11 @@ from karamelo_py.compiler.fingerprint import (
     serves,
     tag_class,
 )
-from karamelo_py.compiler.held import at_address, hold
-from karamelo_py.compiler.packed import Packed
-from karamelo_py.compiler.trace import alone, forget, roll, run_for_kernel, traced
+from karamelo_py.compiler.trace import forget, roll, run_for_kernel, traced
 from karamelo_py.compiler.values import at_work
-
-
-class _NoCollections(event.Listener):
-    """While Numba compiles, Python's collector of cycles would walk its many objects in vain."""
-
-    depth = 0
-    was_on = False
-
-    def on_start(self, event: Any) -> None:
-        if self.depth == 0:
-            self.was_on = gc.isenabled()
-        self.depth += 1
-        gc.disable()
-
-    def on_end(self, event: Any) -> None:
-        self.depth -= 1
-        if self.depth == 0 and self.was_on:
-            gc.enable()
-
-
-event.register("numba:compile", _NoCollections())
-
-# Threads that wait for each other spin a little, then sleep (GNU OpenMP). Where another program
-# takes a core, waiting at full speed makes two threads twenty times slower than one; sleeping at
-# once costs a fifth where none does.
-os.environ.setdefault("GOMP_SPINCOUNT", "500")
-
 
 # Point functions must melt into the loops that call them, however large they get.
 _INLINED = {"forceinline": True, "no_cfunc_wrapper": True}
-
-
-_HOW = {
-    "nogil": True,
-    "error_model": "numpy",
-    "_nrt": False,
-    "forceinline": False,
-    "no_cfunc_wrapper": True,
-}
-
-
-def _compiled(function: Callable, options: dict) -> Callable:
-    """Numba's dispatcher, which compiles nothing anew for the value of a number that is written."""
-    compiled = njit(**options)(function)
-    if not config.DISABLE_JIT:
-        template = compiled.get_call_template
-        compiled.get_call_template = lambda args, kws: template(
-            tuple(map(numba.types.unliteral, args)),
-            {name: numba.types.unliteral(kind) for name, kind in kws.items()},
-        )
-    return compiled
-
-
-def kernel(function: Callable | None = None, **options: Any) -> Callable:
-    """Compile a loop over points or nodes; cached on disk, free of the interpreter lock.
-
-    No fast mathematics: where products and sums contract would depend on what a loop is inlined
-    into, so that results would differ between one thread and two, or a run in pieces and a whole.
-    `fma` says where. Kernels allocate nothing, so Numba's reference counting is left out.
-    """
-    if function is None:
-        return lambda f: kernel(f, **options)
-    options = _HOW | options
-    compiled = _compiled(function, options)
-    if not config.DISABLE_JIT:
-        compiled._cache = KernelCache(function, options)
-    return compiled
-
-
-def subkernel(function: Callable) -> Callable:
-    """A function that kernels call, too large to be written into each place that calls it.
-
-    Python must not call it: there is nothing of it that Python could call.
-    """
-    if not config.DISABLE_JIT:
-        alone(function)
-        shared(function)
-    return function
-
-
-def left(function: Callable) -> Callable:
-    """A function whose machine code is made with that of the kernel that knows its address."""
-    inlining.claim(function.__qualname__, "left")
-    return _compiled(function, _HOW | {"no_cpython_wrapper": True})
-
-
-def entered(function: Callable) -> Callable:
-    """A kernel for Python and for other kernels, which takes its tuples held.
-
-    What other kernels call is kept on disk for all of them.
-    """
-    if config.DISABLE_JIT:
-        return function
-    inlining.claim(function.__qualname__, "kept")
-    names = inspect.signature(function).parameters
-    body = define(", ".join(names), f"return inner({', '.join(names)})", inner=shared(function))
-    body.__module__, body.__qualname__ = function.__module__, function.__qualname__
-    inner = kernel(body, no_cpython_wrapper=True)
-    call = define(
-        ", ".join(names),
-        f"return inner({', '.join(f'hold({name})' for name in names)})",
-        inner=inner,
-        hold=hold,
-    )
-    enter = _packed(function, inner)
-    by_type(enter)(lambda *arguments: call)
-    return enter
-
-
-def loop(function: Callable) -> Callable:
-    """A kernel for Python alone, which takes its tuples held."""
-    return function if config.DISABLE_JIT else _packed(function, shared(function))
-
-
-def _packed(function: Callable, inner: Callable) -> Callable:
-    """What Python calls `inner` by, the compiled `function`."""
-
-    def make(held: Any, name: str) -> Callable:
-        items = ", ".join(f"a[{k}]" for k in range(len(held)))
-        lines = "a = at(number)", f"return inner({items})"
-        call = define("number", *lines, at=at_address(held), inner=inner)
-        call.__module__, call.__qualname__ = (
-            function.__module__,
-            f"{function.__qualname__}.entry.{name}",
-        )
-        return kernel(call)
-
-    packed = Packed(inner, make)
-
-    @functools.wraps(function)
-    def enter(*arguments: Any) -> Any:
-        return packed(*arguments)
-
-    enter.compile, enter.entries = packed.compile, packed.entries
-    return enter
 
 
 def by_type(function: Callable) -> Callable:
@@ -500,68 +358,6 @@ def over_blocks(per_block: Callable) -> Callable:
             per_block(block, setup, *arguments)
 
     return loop
-
-
-_uncompiled: list[Callable] = []
-_addresses: dict[Callable, int] = {}
-_keep_alive: list = []
-
-
-def address_of(function: Callable, signature: numba.types.Type) -> int:
-    """Compile `function` (cached on disk) and return the address that kernels call it by.
-
-    Whoever calls by address does not contain the function: it need not be compiled anew for
-    another one, and the function is compiled once for all its callers.
-    """
-    if function not in _addresses:
-        if config.DISABLE_JIT:
-            _uncompiled.append(function)
-            _addresses[function] = len(_uncompiled) - 1
-        else:
-            options = {"error_model": "numpy"}
-            compiled = CFunc(function, (signature.args, signature.return_type), {}, options)
-            compiled._cache = KernelCache(function, options)
-            compiled.compile()
-            _keep_alive.append(compiled)
-            _addresses[function] = compiled.address
-    return _addresses[function]
-
-
-def address_of_python(function: Callable, signature: numba.types.Type) -> int:
-    """The address by which kernels call a function of Python, of whole numbers.
-
-    Nothing may be raised in it.
-    """
-    if config.DISABLE_JIT:
-        _uncompiled.append(function)
-        return len(_uncompiled) - 1
-    made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(signature.args))(function)
-    _keep_alive.append(made)
-    return ctypes.cast(made, ctypes.c_void_p).value
-
-
-def caller_of(signature: numba.types.Type) -> Callable:
-    """Make ``call(address, ...)``, which calls a function of this signature by its address."""
-    result, parameters = signature.return_type, signature.args
-
-    if config.DISABLE_JIT:
-        return lambda address, *arguments: _uncompiled[address](*arguments)
-
-    def codegen(context, builder, _, arguments):
-        kind = ir.FunctionType(
-            context.get_value_type(result), [context.get_value_type(p) for p in parameters]
-        )
-        pointer = builder.inttoptr(arguments[0], kind.as_pointer())
-        return builder.call(pointer, arguments[1:])
-
-    names = ", ".join(f"a{k}" for k in range(len(parameters)))
-    call = define(
-        f"typing_context, address, {names}",
-        "return typed, codegen",
-        typed=result(numba.types.int64, *parameters),
-        codegen=codegen,
-    )
-    return intrinsic(call)
 
 
 def define(parameters: str, *lines: str, **names: Any) -> Callable:

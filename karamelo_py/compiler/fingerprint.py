@@ -13,205 +13,26 @@ import functools
 import hashlib
 import inspect
 import pickle
-import sys
 import types as python
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 from numba import types
-from numba.core import event
 from numba.core.registry import cpu_target
 
-# Known by name: their versions are part of every key.
-_OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
-# What Numba's own functions do with lanes cannot be followed from them: all of it is in every key.
-WHOLE = [str(path) for path in sorted(Path(__file__).with_name("lanes").glob("*.py"))]
-SPELLED = "<spelled>"  # the file of functions that are written at compile time
+from karamelo_py.compiler.choices import (
+    _OPAQUE,
+    Choice,
+    Unknown,
+    class_name,
+    found_by_name,
+    is_opaque,
+    name_of,
+    point_functions,
+)
+
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), range, slice)
-
-
-class Unknown(Exception):
-    """Something that a kernel depends on cannot be put into a hash."""
-
-
-# --- implementations of point functions that are in a kernel -----------------------------------
-
-
-class Choice(NamedTuple):
-    """That a kernel asked a point function for these classes of tags, all by name."""
-
-    point_function: str
-    classes: tuple[str, ...]
-
-
-_point_functions: dict[str, list[Callable]] = {}
-_serves: WeakKeyDictionary[Callable, list[Callable]] = WeakKeyDictionary()
-
-
-def name_of(thing: Any) -> str:
-    """``module:qualified name`` of a function or class."""
-    return f"{thing.__module__}:{thing.__qualname__}"
-
-
-def declare_point_function(dispatch: Callable) -> None:
-    """Make a point function known by its name; it has ``find(classes)`` and ``tags``."""
-    _point_functions.setdefault(name_of(dispatch), []).append(dispatch)
-
-
-def serves(implementation: Callable, dispatch: Callable) -> None:
-    """Note that a point function may choose `implementation`."""
-    function = getattr(implementation, "py_func", implementation)
-    _serves.setdefault(function, []).append(dispatch)
-
-
-_asked: list[set[tuple[Callable, tuple]]] = []  # of the choosers at work, innermost last
-_answers: WeakKeyDictionary[Callable, set[tuple[Callable, tuple]]] = WeakKeyDictionary()
-
-
-def asks(dispatch: Callable, classes: tuple) -> None:
-    """Note that whether `dispatch` is defined for `classes` was asked, maybe by a chooser."""
-    if _asked:
-        _asked[-1].add((dispatch, classes))
-    note([(dispatch, classes)])
-
-
-# Of the functions that are made, innermost last: what was asked of point functions, and the code
-# of functions that were run for them.
-_noted: list[set[tuple[Callable, tuple] | python.CodeType]] = []
-
-
-def note(parts: Iterable[tuple[Callable, tuple] | python.CodeType]) -> None:
-    """Note what the function that is compiled now consists of."""
-    if _noted:
-        _noted[-1].update(parts)
-
-
-@contextmanager
-def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
-    """The set of what is noted meanwhile."""
-    _noted.append(set())
-    try:
-        yield _noted[-1]
-    finally:
-        _noted.pop()
-
-
-def noting(chooser: Callable) -> Callable:
-    """The same chooser of code by type; what it asks is noted with the function that it chooses."""
-
-    @functools.wraps(chooser)
-    def choose(*arguments: Any) -> Callable | None:
-        _asked.append(set())
-        try:
-            chosen = chooser(*arguments)
-        finally:
-            asked = _asked.pop()
-        if asked and chosen is not None:
-            _answers.setdefault(getattr(chosen, "py_func", chosen), set()).update(asked)
-        return chosen
-
-    return choose
-
-
-def tag_class(numba_type: Any) -> Any:
-    """The Python class that a Numba type stands for, as far as point functions select by it."""
-    return getattr(numba_type, "instance_class", None)
-
-
-def _found(name: str) -> Any:
-    """What `name_of` called so; Unknown if nothing is, or something else."""
-    module, _, path = name.partition(":")
-    try:
-        return functools.reduce(getattr, path.split("."), sys.modules[module])
-    except (KeyError, AttributeError) as error:
-        raise Unknown(name) from error
-
-
-def _class_name(tag: type | None) -> str:
-    if tag is None:
-        return ""
-    name = name_of(tag)
-    if _found(name) is not tag:
-        raise Unknown(name)
-    return name
-
-
-class Contents(NamedTuple):
-    """What is in compiled code: choices, and the Python functions that it was made of."""
-
-    choices: frozenset[Choice]
-    codes: frozenset[python.CodeType]
-
-
-_contents: WeakKeyDictionary[Any, Contents] = WeakKeyDictionary()
-_unfit: WeakKeyDictionary[Any, bool] = WeakKeyDictionary()
-
-
-class _Watch(event.Listener):
-    """Notes which implementation each piece of compiled code is."""
-
-    def on_start(self, event: Any) -> None:
-        """What is chosen while it is compiled is noted."""
-        _noted.append(set())
-
-    def on_end(self, event: Any) -> None:
-        """A function was compiled, or failed to."""
-        noted = _noted.pop()
-        dispatcher, arguments = event.data["dispatcher"], tuple(event.data["args"])
-        compiled = dispatcher.overloads.get(arguments)
-        if compiled is None:
-            return
-        function = dispatcher.py_func
-        run = {part for part in noted if isinstance(part, python.CodeType)}
-        try:
-            choices = frozenset(_own_choices(function, arguments, noted - run))
-        except Unknown:
-            _unfit[compiled.library] = True
-            return
-        if not _opaque(function):
-            run.add(function.__code__)
-        # What was spelled out at compile time was spelled by a function that is followed itself.
-        codes = frozenset(code for code in run if code.co_filename not in (SPELLED, *WHOLE))
-        _contents[compiled.library] = Contents(choices, codes)
-
-
-event.register("numba:compile", _Watch())
-
-
-def _own_choices(function: Callable, arguments: tuple, noted: set) -> Iterable[Choice]:
-    for dispatch in _serves.get(function, ()):
-        classes = tuple(tag_class(a) for a in arguments[: dispatch.tags])
-        yield Choice(name_of(dispatch), tuple(_class_name(c) for c in classes))
-    for dispatch, classes in (*_answers.get(function, ()), *noted):
-        yield Choice(name_of(dispatch), tuple(_class_name(c) for c in classes))
-
-
-def contents(library: Any) -> Contents:
-    """What is in the code of a compiled function, and of all that it calls."""
-    choices: set[Choice] = set()
-    codes: set[python.CodeType] = set()
-    ahead, seen = [library], set()
-    while ahead:
-        one = ahead.pop()
-        if one in seen:
-            continue
-        seen.add(one)
-        if one in _unfit:
-            raise Unknown(one.name)
-        if one in _contents:
-            choices |= _contents[one].choices
-            codes |= _contents[one].codes
-        ahead += [*one._linking_libraries, *one.needs]
-    return Contents(frozenset(choices), frozenset(codes))
-
-
-def keep_choices(library: Any, choices: frozenset[Choice]) -> None:
-    """Note the choices in code that was not compiled here, but loaded."""
-    _contents[library] = Contents(choices, frozenset())
 
 
 # --- types ------------------------------------------------------------------------------------
@@ -223,7 +44,7 @@ def describe(numba_type: Any) -> str:
         items = zip(numba_type.fields, numba_type, strict=True)
         inner = ",".join(f"{name}={describe(item)}" for name, item in items)
         how = type(numba_type).__name__  # held or a value
-        return f"{how} {_class_name(numba_type.instance_class)}({inner})"
+        return f"{how} {class_name(numba_type.instance_class)}({inner})"
     if isinstance(numba_type, types.BaseTuple):
         how = type(numba_type).__name__
         return f"{how}({','.join(describe(item) for item in numba_type)},)"
@@ -272,8 +93,8 @@ def fingerprint(
     for argument in arguments:
         ahead += classes_in(argument)
     for choice in sorted(choices):
-        classes = tuple(_found(name) if name else None for name in choice.classes)
-        dispatches = _point_functions.get(choice.point_function)
+        classes = tuple(found_by_name(name) if name else None for name in choice.classes)
+        dispatches = point_functions.get(choice.point_function)
         if not dispatches:
             raise Unknown(choice.point_function)
         ahead += [repr(choice), *(dispatch.find(classes) for dispatch in dispatches)]
@@ -300,13 +121,6 @@ def fingerprint(
     if codes:
         raise Unknown(f"the way to {min(c.co_qualname for c in codes)}")
     return digest.hexdigest()
-
-
-def _opaque(thing: Any) -> bool:
-    module = getattr(thing, "__module__", None)
-    if module is None:
-        return not isinstance(thing, python.FunctionType)
-    return module.partition(".")[0] in _OPAQUE
 
 
 def _look(thing: Any) -> tuple[str, list]:
@@ -337,11 +151,13 @@ def _look(thing: Any) -> tuple[str, list]:
         return kind, [thing.fget]
     if isinstance(thing, (staticmethod, classmethod)):
         return kind, [thing.__func__]
+    if isinstance(thing, functools._lru_cache_wrapper):
+        return kind, [thing.__wrapped__]
     if isinstance(thing, functools.partial):
         return kind, [thing.func, thing.args, thing.keywords]
     if hasattr(thing, "_defn"):  # of Numba's intrinsics
         return kind, [thing._defn]
-    if hasattr(thing, "__name__") and _opaque(thing):
+    if hasattr(thing, "__name__") and is_opaque(thing):
         return f"{kind} {getattr(thing, '__module__', '')} {thing.__name__}", []
     try:
         return kind, [type(thing), pickle.dumps(thing)]
@@ -353,7 +169,7 @@ def _function(function: Callable) -> tuple[str, list]:
     if hasattr(function, "find") and hasattr(function, "tags"):
         # Its implementations are in the choices.
         return f"point function {name_of(function)} {function.tags}", []
-    if _opaque(function):
+    if is_opaque(function):
         return f"function {name_of(function)}", []
     code = function.__code__
     digest, names = _code(code)
@@ -427,7 +243,7 @@ def _codes(code: python.CodeType) -> set[python.CodeType]:
 
 def _class(one: type) -> tuple[str, list]:
     name = name_of(one)
-    if _opaque(one):
+    if is_opaque(one):
         return f"class {name}", []
     fields = getattr(one, "_fields", ())
     parts: list = [*one.__bases__, fields]

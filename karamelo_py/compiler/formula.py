@@ -15,7 +15,29 @@ from typing import NamedTuple
 import numpy as np
 from numba import config, types
 
-from karamelo_py.compiler.compile import by_type, caller_of, entered, loop, subkernel
+from karamelo_py.compiler.addresses import caller_of
+from karamelo_py.compiler.loops import entered, loop, subkernel
+from karamelo_py.compiler.operations import (
+    ABS,
+    ADD,
+    COS,
+    DIV,
+    EXP,
+    FIRST_BINARY,
+    IN_NUMPY,
+    LOG,
+    MAX,
+    MIN,
+    MUL,
+    NEG,
+    POW,
+    SELECT,
+    SIN,
+    SQRT,
+    SUB,
+    function_of,
+    operation_of,
+)
 
 BLOCK = 128
 MAX_DEPTH = 32
@@ -30,35 +52,6 @@ CONSTANT, GLOBAL, POINT = 0, 1, 2
 SPREAD = 3
 # Take the top off into the row `operand` of what is kept; push that row.
 KEEP, KEPT = 150, 151
-
-# fmt: off
-UNARY = (
-    "neg", "not", "abs", "sign", "step", "sqrt", "cbrt", "exp", "log", "log10", "log2",
-    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh",
-    "asinh", "acosh", "atanh", "erf", "erfc", "gamma", "lgamma", "expm1", "log1p",
-    "floor", "ceil", "round", "trunc",
-)
-BINARY = (
-    "+", "-", "*", "/", "^", "%", "<", "<=", ">", ">=", "==", "!=",
-    "&&", "||", "min", "max", "atan2", "hypot",
-)
-# fmt: on
-
-_FIRST_UNARY = 4
-FIRST_BINARY = 64
-SELECT = 128
-OPERATIONS = (
-    {name: _FIRST_UNARY + k for k, name in enumerate(UNARY)}
-    | {name: FIRST_BINARY + k for k, name in enumerate(BINARY)}
-    | {"if": SELECT}
-)
-
-(_NEG, _NOT, _ABS, _SIGN, _STEP, _SQRT, _CBRT, _EXP, _LOG, _LOG10, _LOG2) = range(4, 15)
-(_SIN, _COS, _TAN, _ASIN, _ACOS, _ATAN, _SINH, _COSH, _TANH) = range(15, 24)
-(_ASINH, _ACOSH, _ATANH, _ERF, _ERFC, _GAMMA, _LGAMMA, _EXPM1, _LOG1P) = range(24, 33)
-(_FLOOR, _CEIL, _ROUND, _TRUNC) = range(33, 37)
-(_ADD, _SUB, _MUL, _DIV, _POW, _MOD, _LT, _LE, _GT, _GE, _EQ, _NE) = range(64, 76)
-(_AND, _OR, _MIN, _MAX, _ATAN2, _HYPOT) = range(76, 82)
 
 
 class Program(NamedTuple):
@@ -77,170 +70,50 @@ class Program(NamedTuple):
 
 
 @subkernel
-def _whole(op, a):
-    """A number without its fraction; by sums, which every target of Numba knows."""
-    if not abs(a) < 2.0**52:
-        return a  # whole, or no number
-    far = math.copysign(2.0**52, a)
-    near = (a + far) - far
-    if near > a and (op == _FLOOR or (op == _TRUNC and a > 0.0)):
-        near -= 1.0
-    elif near < a and (op == _CEIL or (op == _TRUNC and a < 0.0)):
-        near += 1.0
-    return math.copysign(near, a)  # -0.0 too
-
-
-@subkernel
-def _function(op, a):
-    """Any function of one number: one chain of choices, where a loop for each would be too much."""
-    if op == _NEG:
-        return -a
-    if op == _NOT:
-        return 1.0 if a == 0.0 else 0.0
-    if op == _ABS:
-        return abs(a)
-    if op == _SIGN:
-        return 1.0 if a > 0.0 else (-1.0 if a < 0.0 else a)
-    if op == _STEP:
-        return 0.0 if a < 0.0 else (1.0 if a >= 0.0 else a)
-    if op == _SQRT:
-        return math.sqrt(a)
-    if op == _EXP:
-        return math.exp(a)
-    if op == _LOG:
-        return math.log(a)
-    if op == _SIN:
-        return math.sin(a)
-    if op == _COS:
-        return math.cos(a)
-    if _FLOOR <= op <= _TRUNC:
-        return _whole(op, a)
-    if op == _CBRT:
-        return math.copysign(math.pow(abs(a), 1.0 / 3.0), a)
-    if op == _LOG10:
-        return math.log10(a)
-    if op == _LOG2:
-        return math.log2(a)
-    if op == _TAN:
-        return math.tan(a)
-    if op == _ASIN:
-        return math.asin(a)
-    if op == _ACOS:
-        return math.acos(a)
-    if op == _ATAN:
-        return math.atan(a)
-    if op == _SINH:
-        return math.sinh(a)
-    if op == _COSH:
-        return math.cosh(a)
-    if op == _TANH:
-        return math.tanh(a)
-    if op == _ASINH:
-        return math.asinh(a)
-    if op == _ACOSH:
-        return math.acosh(a)
-    if op == _ATANH:
-        return math.atanh(a)
-    if op == _ERF:
-        return math.erf(a)
-    if op == _ERFC:
-        return math.erfc(a)
-    if op == _GAMMA:
-        return math.gamma(a)
-    if op == _LGAMMA:
-        return math.lgamma(a)
-    if op == _EXPM1:
-        return math.expm1(a)
-    return math.log1p(a)
-
-
-@subkernel
-def _pair(op, a, b):
-    """Any operation on two numbers: comparisons and logical ones give 1.0 or 0.0."""
-    if op == _ADD:
-        return a + b
-    if op == _SUB:
-        return a - b
-    if op == _MUL:
-        return a * b
-    if op == _DIV:
-        return a / b
-    if op == _POW:
-        return math.pow(a, b)
-    if op == _MIN:
-        return b if b < a else a
-    if op == _MAX:
-        return b if b > a else a
-    if op == _MOD:
-        return a % b  # the sign of the divisor, as in Python
-    if op == _ATAN2:
-        return math.atan2(a, b)
-    if op == _HYPOT:
-        return math.hypot(a, b)
-    if op == _LT:
-        result = a < b
-    elif op == _LE:
-        result = a <= b
-    elif op == _GT:
-        result = a > b
-    elif op == _GE:
-        result = a >= b
-    elif op == _EQ:
-        result = a == b
-    elif op == _NE:
-        result = a != b
-    elif op == _AND:
-        result = (a != 0.0) and (b != 0.0)
-    else:
-        result = (a != 0.0) or (b != 0.0)
-    return 1.0 if result else 0.0
-
-
-@subkernel
 def _unary(op, n, a):
     """Replace the first `n` numbers of `a` by a function of them."""
-    if op == _NEG:
+    if op == NEG:
         for i in range(n):
             a[i] = -a[i]
-    elif op == _SQRT:
+    elif op == SQRT:
         for i in range(n):
             a[i] = math.sqrt(a[i])
-    elif op == _SIN:
+    elif op == SIN:
         for i in range(n):
             a[i] = math.sin(a[i])
-    elif op == _COS:
+    elif op == COS:
         for i in range(n):
             a[i] = math.cos(a[i])
-    elif op == _EXP:
+    elif op == EXP:
         for i in range(n):
             a[i] = math.exp(a[i])
-    elif op == _LOG:
+    elif op == LOG:
         for i in range(n):
             a[i] = math.log(a[i])
-    elif op == _ABS:
+    elif op == ABS:
         for i in range(n):
             a[i] = abs(a[i])
     else:
         for i in range(n):
-            a[i] = _function(op, a[i])
+            a[i] = function_of(op, a[i])
 
 
 @subkernel
 def _binary(op, n, a, b):
     """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
-    if op == _ADD:
+    if op == ADD:
         for i in range(n):
             a[i] += b[i]
-    elif op == _SUB:
+    elif op == SUB:
         for i in range(n):
             a[i] -= b[i]
-    elif op == _MUL:
+    elif op == MUL:
         for i in range(n):
             a[i] *= b[i]
-    elif op == _DIV:
+    elif op == DIV:
         for i in range(n):
             a[i] /= b[i]
-    elif op == _POW:
+    elif op == POW:
         # Small whole powers are the common case, and pow costs ten multiplications.
         power = b[0]
         same = True
@@ -255,15 +128,15 @@ def _binary(op, n, a, b):
         else:
             for i in range(n):
                 a[i] = math.pow(a[i], b[i])
-    elif op == _MIN:
+    elif op == MIN:
         for i in range(n):
             a[i] = b[i] if b[i] < a[i] else a[i]
-    elif op == _MAX:
+    elif op == MAX:
         for i in range(n):
             a[i] = b[i] if b[i] > a[i] else a[i]
     else:
         for i in range(n):
-            a[i] = _pair(op, a[i], b[i])
+            a[i] = operation_of(op, a[i], b[i])
 
 
 @entered
@@ -336,60 +209,6 @@ def _evaluate_compiled(program, globals_, points, count, out, stack):
             out[i] = stack[0, i]
 
 
-# ---- the same in NumPy, for runs without compilation --------------------------------------------
-
-
-def _each(function, nan=math.nan):
-    """`function` of the standard library for arrays, NaN where it refuses."""
-
-    def safe(value):
-        try:
-            return function(value)
-        except ValueError:
-            return math.inf if value == 0.0 else nan
-        except OverflowError:
-            return math.inf
-
-    return np.vectorize(safe, otypes=[float])
-
-
-_NUMPY = {
-    "neg": np.negative,
-    "not": lambda a: (a == 0.0) * 1.0,
-    "step": lambda a: np.where(np.isnan(a), a, (a >= 0.0) * 1.0),
-    "asin": np.arcsin,
-    "acos": np.arccos,
-    "atan": np.arctan,
-    "asinh": np.arcsinh,
-    "acosh": np.arccosh,
-    "atanh": np.arctanh,
-    "erf": _each(math.erf),
-    "erfc": _each(math.erfc),
-    "gamma": _each(math.gamma),
-    "lgamma": _each(math.lgamma, nan=math.inf),
-    "round": np.rint,
-    "+": np.add,
-    "-": np.subtract,
-    "*": np.multiply,
-    "/": np.divide,
-    "^": np.power,
-    "%": np.mod,
-    "<": np.less,
-    "<=": np.less_equal,
-    ">": np.greater,
-    ">=": np.greater_equal,
-    "==": np.equal,
-    "!=": np.not_equal,
-    "&&": lambda a, b: (a != 0.0) & (b != 0.0),
-    "||": lambda a, b: (a != 0.0) | (b != 0.0),
-    "min": lambda a, b: np.where(b < a, b, a),
-    "max": lambda a, b: np.where(b > a, b, a),
-    "atan2": np.arctan2,
-    "if": lambda c, a, b: np.where(c != 0.0, a, b),
-}
-_BY_NUMBER = {number: _NUMPY.get(name) or getattr(np, name) for name, number in OPERATIONS.items()}
-
-
 def _evaluate_numpy(program, globals_, points, count, out, stack):
     values: list = []
     kept: dict = {}
@@ -408,30 +227,8 @@ def _evaluate_numpy(program, globals_, points, count, out, stack):
                 values.append(kept[operand])
             elif op != SPREAD:
                 takes = 1 if op < FIRST_BINARY else 2 if op < SELECT else 3
-                values[-takes:] = [np.asarray(_BY_NUMBER[op](*values[-takes:]), dtype=float)]
+                values[-takes:] = [np.asarray(IN_NUMPY[op](*values[-takes:]), dtype=float)]
     out[:count] = values[0]
-
-
-def of_one(op, a):
-    """The function `op` of one number; inf or NaN where there is no result."""
-    with np.errstate(all="ignore"):
-        return float(_BY_NUMBER[op](a))
-
-
-@by_type(of_one)
-def _of_one(op, a):
-    return lambda op, a: _function(op, a)
-
-
-def of_two(op, a, b):
-    """The operation `op` on two numbers likewise."""
-    with np.errstate(all="ignore"):
-        return float(_BY_NUMBER[op](np.float64(a), b))
-
-
-@by_type(of_two)
-def _of_two(op, a, b):
-    return lambda op, a, b: _pair(op, a, b)
 
 
 evaluate = _evaluate_numpy if config.DISABLE_JIT else _evaluate_compiled

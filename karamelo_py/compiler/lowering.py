@@ -208,7 +208,7 @@ def _as_is(index: int, parameter: Any, argument: Any) -> Any:
     return argument
 
 
-_resolutions: dict[tuple, tuple] = {}
+resolutions: dict[tuple, tuple] = {}
 
 
 def numbers_of(kinds: tuple) -> tuple[int, ...]:
@@ -219,10 +219,10 @@ def numbers_of(kinds: tuple) -> tuple[int, ...]:
 def _resolved(typing: Any, function: Callable, kinds: tuple) -> tuple:
     """Numba's type of a function, and its signature for arguments of these types."""
     key = typing, function, numbers_of(kinds)
-    if key not in _resolutions:
+    if key not in resolutions:
         typed = typing.resolve_value_type(function)
         called = typing.resolve_function_type(typed, kinds, {})
         if called is None:
             raise Untraceable
-        _resolutions[key] = typed, called
-    return _resolutions[key]
+        resolutions[key] = typed, called
+    return resolutions[key]

@@ -19,14 +19,16 @@ from llvmlite import ir
 from numba import typeof, types
 from numba.core.registry import cpu_target
 
-from karamelo_py.compiler.fingerprint import Unknown, describe
+from karamelo_py.compiler.choices import Unknown
+from karamelo_py.compiler.fingerprint import describe
 from karamelo_py.compiler.held import HeldTuple, held_type, is_held
 
 
 class _Array(NamedTuple):
     """What is known of an array as long as it lives. NumPy resizes none that is known in place."""
 
-    alive: weakref.ref
+    alive: weakref.ref  # another array may get the number of one that is gone
+    shape: tuple[int, ...]
     kind: int  # the same for arrays of one type
     words: tuple[int, ...]  # as Numba's model of arrays has them
 
@@ -38,17 +40,27 @@ _kinds: dict[tuple, int] = {}
 def _array(array: np.ndarray) -> _Array:
     number = id(array)
     known = _arrays.get(number)
-    if known is None:
+    if known is None or known.alive() is not array or known.shape != array.shape:
         flags = array.flags
         kind = (
             array.dtype, array.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned,
             flags.writeable,
         )  # fmt: skip
         words = (0, 0, array.size, array.itemsize, array.ctypes.data, *array.shape, *array.strides)
-        alive = weakref.ref(array, lambda _: _arrays.pop(number, None))
         kept = _kinds.setdefault(kind, len(_kinds))
-        known = _arrays[number] = _Array(alive, kept, words)
+        known = _Array(weakref.ref(array, _gone(number)), array.shape, kept, words)
+        _arrays[number] = known
     return known
+
+
+def _gone(number: int) -> Callable[[weakref.ref], None]:
+    """What is done when an array is gone that had this number, if no other has it by now."""
+
+    def drop(alive: weakref.ref) -> None:
+        if number in _arrays and _arrays[number].alive is alive:
+            del _arrays[number]
+
+    return drop
 
 
 def forget(array: np.ndarray) -> None:

@@ -25,8 +25,9 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from karamelo_py.compiler import inlining
-from karamelo_py.compiler.compile import by_type, define, kernel, left, subkernel
+from karamelo_py.compiler.compile import by_type, define
 from karamelo_py.compiler.held import HeldTuple, address, at_address, held_type, hold
+from karamelo_py.compiler.loops import kernel, left, subkernel
 
 
 class Serial(NamedTuple):
@@ -40,6 +41,11 @@ class Threaded(NamedTuple):
 
 
 _TASK = types.none(types.intp, types.intp)  # where its arguments are, and a number
+_I64 = ir.IntType(64)
+
+
+def _word(builder: Any, place: Any) -> Any:
+    return builder.inttoptr(place, _I64.as_pointer())
 
 
 @intrinsic
@@ -57,23 +63,62 @@ def _address_of(typing_context, function):
     return types.intp(function), codegen
 
 
+def _call_at(context: Any, builder: Any, values: list) -> Any:
+    """Code that calls the task at an address; its status."""
+    convention = context.call_conv
+    kind = convention.get_function_type(_TASK.return_type, _TASK.args)
+    function = builder.inttoptr(values[0], kind.as_pointer())
+    return convention.call_function(builder, function, _TASK.return_type, _TASK.args, values[1:])[0]
+
+
 @intrinsic
-def _call(typing_context, task, arguments, number):
-    """Call the function at an address."""
+def _call(typing_context, task, arguments, number, failed):
+    """Call the task at an address. Where it fails, one more than its number goes to `failed`."""
 
     def codegen(context, builder, signature, values):
-        convention = context.call_conv
-        kind = convention.get_function_type(_TASK.return_type, _TASK.args)
-        function = builder.inttoptr(values[0], kind.as_pointer())
-        convention.call_function(builder, function, _TASK.return_type, _TASK.args, values[1:])
+        status = _call_at(context, builder, values[:3])
+        with cgutils.if_unlikely(builder, status.is_error):
+            builder.store(builder.add(values[2], _I64(1)), _word(builder, values[3]))
+        return context.get_dummy_value()
+
+    return types.none(types.intp, types.intp, types.intp, types.intp), codegen
+
+
+@intrinsic
+def _nothing(typing_context):
+    """The address of a word of the function that calls this, 0 by now."""
+
+    def codegen(context, builder, signature, values):
+        place = cgutils.alloca_once(builder, _I64)
+        builder.store(_I64(0), place)
+        return builder.ptrtoint(place, _I64)
+
+    return types.intp(), codegen
+
+
+@intrinsic
+def _fail(typing_context, task, arguments, failed):
+    """Fail as the task did whose number is one less than what is at `failed`, if that is not 0.
+
+    A thread cannot raise what Python is to see: the task is done once more, by who shared it out.
+    """
+
+    def codegen(context, builder, signature, values):
+        first = builder.load(_word(builder, values[2]))
+        with cgutils.if_unlikely(builder, builder.icmp_signed("!=", first, _I64(0))):
+            status = _call_at(context, builder, [*values[:2], builder.sub(first, _I64(1))])
+            with cgutils.if_likely(builder, status.is_error):
+                context.call_conv.return_status_propagate(builder, status)
+            text = "one of several threads failed, and did not when it was asked again"
+            context.call_conv.return_user_exc(builder, RuntimeError, (text,))
         return context.get_dummy_value()
 
     return types.none(types.intp, types.intp, types.intp), codegen
 
 
-def _in_parallel(count, task, arguments):
+def _in_parallel(count, task, arguments, failed):
     for number in prange(count):
-        _call(task, arguments, number)
+        _call(task, arguments, number, failed)
 
 
 inlining.claim(_in_parallel.__qualname__, "kept")
@@ -81,12 +126,6 @@ _in_parallel = kernel(_in_parallel, parallel=True, no_cpython_wrapper=True)
 
 
 # --- words that threads share ---------------------------------------------------------------------
-
-_I64 = ir.IntType(64)
-
-
-def _word(builder: Any, place: Any) -> Any:
-    return builder.inttoptr(place, _I64.as_pointer())
 
 
 @intrinsic
@@ -159,7 +198,8 @@ def _pause(typing_context, long):
 # --- teams ------------------------------------------------------------------------------------
 
 # Words, each in a line of the caches of its own.
-_STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH, _RESULT, _TICKETS = range(0, 9 * 64, 64)
+_STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
+_FAILED, _LED, _RESULT, _TICKETS = range(7 * 64, 11 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
 _SHORT = 3000  # pauses, some 0.1 ms; then threads sleep, since others may need their cores
 _PATIENCE = 6000  # pauses until a thread does not wait for a leader any more
@@ -196,7 +236,8 @@ def _take_part(team, k):
         while left > 0:
             # As long as a number is not done, the loop stays that of now.
             end = _read(team + _COUNT) * (part + 1) // size
-            _call(_read(team + _TASK_AT), _read(team + _ARGUMENTS), end - left)
+            task, arguments = _read(team + _TASK_AT), _read(team + _ARGUMENTS)
+            _call(task, arguments, end - left, team + _FAILED)
             mine += 1
             left = _taken(ticket)
     return mine
@@ -210,6 +251,7 @@ def _share(team, count, task, arguments):
     _write(team + _ARGUMENTS, arguments)
     _write(team + _COUNT, count)
     _write(team + _DONE, 0)
+    _write(team + _FAILED, 0)
     epoch = _read(team + _EPOCH) + 1
     for part in range(size):
         numbers = count * (part + 1) // size - count * part // size
@@ -245,12 +287,22 @@ def _serve(team, k):
 @subkernel
 def _distribute(team, count, task, arguments):
     """Do a loop: by the team that is at work, if one is, else by threads that begin for it."""
+    failed = _nothing()
     if team == 0 or _read(team + _STATE) != _LEADS:
-        _in_parallel(count, task, arguments)
+        _in_parallel(count, task, arguments, failed)
     elif count > 1:
         _share(team, count, task, arguments)
+        _write(failed, _read(team + _FAILED))
     elif count == 1:
-        _call(task, arguments, 0)
+        _call(task, arguments, 0, failed)
+    _fail(task, arguments, failed)
+
+
+@subkernel
+def _begin_and_end(team, body, leads, arguments):
+    """Let threads do `body`: one of them leads, by doing `leads`."""
+    _in_parallel(_read(team + _SIZE), body, arguments, team + _LED)
+    _fail(leads, arguments, team + _LED)
 
 
 def _task_of(name: str, items: Any, lines: tuple, **names: Any) -> Callable:
@@ -308,29 +360,37 @@ def by_team(function: Callable, parameters: str) -> Callable:
         if mode.instance_class is not Threaded:
             return define(names, f"return function({names})", function=inner)
         items = ", ".join(f"a[{k}]" for k in range(1 + len(arguments)))
+        names_of_words = {
+            "LED": _LED, "STATE": _STATE, "LEADS": _LEADS, "ENDED": _ENDED, "RESULT": _RESULT,
+            "SIZE": _SIZE, "WAITS": _WAITS, "read": _read, "write": _write, "function": inner,
+        }  # fmt: skip
+        leads = _task_of(
+            f"{function.__qualname__}.leads", (mode, *arguments),
+            (f"write(a[0].team + RESULT, function({items}))",), **names_of_words,
+        )  # fmt: skip
         lines = (
             "team = a[0].team",
             "if k > 0:",
             "    serve(team, k)",
             "else:",
             "    write(team + STATE, LEADS)",
-            f"    write(team + RESULT, function({items}))",
+            "    call(address_of(leads), arguments, 0, team + LED)",
             "    write(team + STATE, ENDED)",
         )
-        words = {"STATE": _STATE, "LEADS": _LEADS, "ENDED": _ENDED, "RESULT": _RESULT}
         body = _task_of(
-            function.__qualname__, (mode, *arguments), lines,
-            serve=_serve, write=_write, function=inner, **words,
+            function.__qualname__, (mode, *arguments), lines, serve=_serve, call=_call,
+            address_of=_address_of, leads=leads, **names_of_words,
         )  # fmt: skip
         return define(
             names,
             "team = mode.team",
             f"if team == 0: return function({names})",
             "write(team + STATE, WAITS)",
-            f"in_parallel(read(team + SIZE), address_of(body), address(hold(({names}))))",
+            "write(team + LED, 0)",
+            f"begin_and_end(team, address_of(body), address_of(leads), address(hold(({names}))))",
             "return read(team + RESULT)",
-            in_parallel=_in_parallel, address_of=_address_of, address=address, hold=hold,
-            read=_read, write=_write, body=body, function=inner, WAITS=_WAITS, SIZE=_SIZE, **words,
+            begin_and_end=_begin_and_end, address_of=_address_of, address=address, hold=hold,
+            body=body, leads=leads, **names_of_words,
         )  # fmt: skip
 
     return run

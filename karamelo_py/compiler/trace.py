@@ -20,9 +20,9 @@ from __future__ import annotations
 import dis
 import functools
 import inspect
+import itertools
 import os
 import types as python
-from collections import namedtuple
 from collections.abc import Callable, Hashable, Iterable
 from traceback import walk_tb
 from typing import Any, NamedTuple
@@ -34,9 +34,10 @@ from numba.core.imputils import impl_ret_borrowed, lower_builtin
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from karamelo_py.compiler.fingerprint import note, parts_noted, tag_class
+from karamelo_py.compiler.choices import note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
-from karamelo_py.compiler.lowering import Lowering, numbers_of
+from karamelo_py.compiler.lowering import Lowering, numbers_of, resolutions
+from karamelo_py.compiler.methods import refuse_methods
 from karamelo_py.compiler.values import (
     OF_WHOLE,
     Asks,
@@ -46,6 +47,7 @@ from karamelo_py.compiler.values import (
     Untraceable,
     Value,
     asking,
+    at_work,
     counting,
     emit,
     now,
@@ -117,7 +119,23 @@ def _attribute(thing: Any, *name: Any) -> Any:
 
 _OF_NUMBERS = {*OF_WHOLE, float}
 _INSTEAD = {type: _class_of, isinstance: _is_instance, range: counting, getattr: _attribute}
-_SAFE = {len, zip, enumerate, tuple, list, dict, set, sum, reversed, any, all, map, slice, hasattr}
+_SAFE = {
+    callable,
+    len,
+    zip,
+    enumerate,
+    tuple,
+    list,
+    dict,
+    set,
+    sum,
+    reversed,
+    any,
+    all,
+    map,
+    slice,
+    hasattr,
+}
 _CONSTANT = (type(None), bool, int, float, str, np.number, np.bool_)
 
 
@@ -199,37 +217,6 @@ def _copied(function: Callable) -> Callable:
     return Walked(made, lambda: Flow(now()), rolled)
 
 
-_GENERATED = {*vars(namedtuple("_", ())), "__orig_bases__", "__annotations__", "__annotate_func__"}
-
-
-@functools.cache
-def _functions_of(one: type) -> frozenset[str]:
-    """The names of what a class of tuples does with its numbers by functions of its own."""
-    if not getattr(one, "_fields", ()):
-        return frozenset()
-    own = {name: value for base in one.__mro__[:-2] for name, value in vars(base).items()}
-    return frozenset(
-        name
-        for name, value in own.items()
-        if name not in _GENERATED
-        and isinstance(value, python.FunctionType | property | classmethod | staticmethod)
-    )
-
-
-def _names_in(code: python.CodeType) -> set[str]:
-    inner = (c for c in code.co_consts if isinstance(c, python.CodeType))
-    return set(code.co_names).union(*map(_names_in, inner))
-
-
-def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> None:
-    """Methods of tuples would run as they are, and nothing would follow them."""
-    functions = frozenset().union(*map(_functions_of, classes))
-    if any(name.startswith("__") for name in functions):
-        raise Untraceable
-    if functions and not functions.isdisjoint(set().union(*map(_names_in, codes))):
-        raise Untraceable
-
-
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
     """What a point function gives where one that nothing sees through calls it, as methods do."""
     return _seen(dispatch)(*arguments)
@@ -249,6 +236,8 @@ class _Formula(NamedTuple):
 
 
 _formulas: dict[tuple, _Formula | None] = {}
+MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with contact
+_numbers = itertools.count()
 _asking: dict[python.CodeType, int] = {}  # of functions left to Numba: the line that is why
 _own: set[Callable] = set()  # functions that are not written into what calls them
 _rolled: set[python.CodeType] = set()  # of functions with loops that are left to the compiler
@@ -277,10 +266,10 @@ def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
             result = types.unliteral(lowering.kind_of(found))
         codes = {part for part in parts if isinstance(part, python.CodeType)}
-        _refuse_methods(codes, lowering.classes)
+        refuse_methods(codes, lowering.classes)
         if hasattr(dispatch, "tags"):
             parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
-        name = f"{dispatch.__qualname__}.{len(_formulas)}"
+        name = f"{dispatch.__qualname__}.{next(_numbers)}"
         return _Formula(run, result, frozenset(parts), _is_plain(found), name)
     except Asks:
         raise
@@ -302,6 +291,8 @@ def _note_why(chosen: Callable | None, why: BaseException) -> None:
 def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
     """What to run for arguments of these types; None if it is Numba's to compile."""
     key = typing, dispatch, numbers_of(kinds)
+    if len(_formulas) > MOST_FORMULAS and not at_work():
+        forget()
     while key not in _formulas:
         _formulas[key] = None  # of one that calls itself
         try:
@@ -327,8 +318,9 @@ def line_that_asks(file: str, line: int) -> int | None:
 
 
 def forget() -> None:
-    """A point function has another implementation than was known."""
+    """Find anew what is run: a point function has another implementation than was known."""
     _formulas.clear()
+    resolutions.clear()
 
 
 def _chosen(dispatch: Callable, kinds: tuple) -> Callable:

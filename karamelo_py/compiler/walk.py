@@ -11,84 +11,15 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
-import linecache
-import operator
-import os
-import textwrap
-import time
-import types as python
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from numba import types
 
 from karamelo_py.compiler.flow import Counter, Flow, Range, Way, is_value
+from karamelo_py.compiler.terms import BINARY, CHANGING, Terms
+from karamelo_py.compiler.texts import NotKnown, text_of
 from karamelo_py.compiler.values import LONG, Asks, Untraceable
-
-_BINARY = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
-    ast.Div: operator.truediv, ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod,
-    ast.Pow: operator.pow, ast.BitAnd: operator.and_, ast.BitOr: operator.or_,
-    ast.BitXor: operator.xor, ast.LShift: operator.lshift, ast.RShift: operator.rshift,
-    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
-    ast.Eq: operator.eq, ast.NotEq: operator.ne,
-    ast.USub: operator.neg, ast.UAdd: operator.pos, ast.Invert: operator.invert,
-}  # fmt: skip
-
-
-class NotKnown(Exception):
-    """There is no text of a function, or something in it that is not gone through."""
-
-
-# --- text -----------------------------------------------------------------------------------------
-
-_LONGEST_END = 40  # lines of closing brackets, at most, behind the last one with code
-
-
-def _last_line(code: python.CodeType) -> int:
-    own = max(line for _, _, line in code.co_lines() if line is not None)
-    inner = (_last_line(c) for c in code.co_consts if isinstance(c, python.CodeType))
-    return max(own, *inner, own)
-
-
-def _lines(function: Callable) -> Iterator[str]:
-    """The text of a function; longer and longer, until it can be parsed."""
-    text = vars(function).get("text")
-    if text is not None:
-        yield text
-        return
-    code = function.__code__
-    lines = linecache.getlines(code.co_filename)
-    if not _is_read(code.co_filename):
-        return
-    last = _last_line(code)
-    for end in range(last, min(last + _LONGEST_END, len(lines)) + 1):
-        yield textwrap.dedent("".join(lines[code.co_firstlineno - 1 : end]))
-
-
-_began = time.time()
-
-
-def _is_read(file: str) -> bool:
-    """Whether a file is as it was when Python read it."""
-    try:
-        about = os.stat(file)
-    except OSError:
-        return False
-    return max(about.st_ctime, about.st_mtime) < _began
-
-
-def text_of(function: Callable) -> ast.FunctionDef:
-    """The text of a function, parsed."""
-    for text in _lines(function):
-        try:
-            (definition,) = ast.parse(text).body
-        except (SyntaxError, ValueError):
-            continue
-        if isinstance(definition, ast.FunctionDef):
-            return ast.increment_lineno(definition, function.__code__.co_firstlineno - 1)
-        break
-    raise NotKnown(f"the text of {function.__qualname__}")
 
 
 @functools.cache
@@ -131,7 +62,7 @@ class Walked:
         return _Walk(self, self.flow(), dict(bound.arguments)).result()
 
 
-class _Walk:
+class _Walk(Terms):
     """One call of a function.
 
     Attributes
@@ -144,6 +75,7 @@ class _Walk:
 
     def __init__(self, walked: Walked, flow: Flow, names: dict[str, Any]):
         self.walked, self.flow, self.names = walked, flow, names
+        self.function, self.free = walked.function, walked.free
         self.goes = True
         self.returns: list[Way] = []
         self.breaks: list[Way] = []
@@ -204,14 +136,6 @@ class _Walk:
                     why.asking = self.walked.__code__, statement.lineno
                 raise
 
-    def do(self, node: ast.AST) -> Any:
-        """A statement, or the value of an expression."""
-        return getattr(self, type(node).__name__, self.unknown)(node)
-
-    def unknown(self, node: ast.AST) -> None:
-        """Nothing that is gone through."""
-        raise NotKnown(type(node).__name__)
-
     def Pass(self, node: ast.Pass) -> None:
         pass
 
@@ -249,14 +173,14 @@ class _Walk:
             setattr(self.do(target.value), target.attr, value)
         elif isinstance(target, ast.Subscript):
             array = self.do(target.value)
-            if isinstance(array, _CHANGING):
+            if isinstance(array, CHANGING):
                 raise NotKnown("on one of several ways, a list would change on all")
             array[self.do(target.slice)] = value
         else:
             self.unknown(target)
 
     def AugAssign(self, node: ast.AugAssign) -> None:
-        operation = _BINARY[type(node.op)]
+        operation = BINARY[type(node.op)]
         target = node.target
         if isinstance(target, ast.Attribute):
             thing = self.do(target.value)
@@ -265,7 +189,7 @@ class _Walk:
         elif isinstance(target, ast.Subscript):
             array = self.do(target.value)
             place = self.do(target.slice)
-            if isinstance(array, _CHANGING):
+            if isinstance(array, CHANGING):
                 raise NotKnown("on one of several ways, a list would change on all")
             array[place] = operation(array[place], self.do(node.value))
         else:
@@ -365,159 +289,5 @@ class _Walk:
         self.meet(ways)
         self.names.pop(_COUNT, None)
 
-    # --- expressions
 
-    def name(self, name: str) -> Any:
-        """What a name stands for."""
-        if name in self.names:
-            return self.names[name]
-        if name in self.walked.free:
-            return self.walked.free[name]
-        if name in self.walked.__code__.co_varnames:
-            raise NotKnown(name)  # on one of the ways here
-        return self.walked.function.__globals__[name]
-
-    def Name(self, node: ast.Name) -> Any:
-        return self.name(node.id)
-
-    def Constant(self, node: ast.Constant) -> Any:
-        return node.value
-
-    def Attribute(self, node: ast.Attribute) -> Any:
-        return getattr(self.do(node.value), node.attr)
-
-    def Slice(self, node: ast.Slice) -> slice:
-        return slice(*(n and self.do(n) for n in (node.lower, node.upper, node.step)))
-
-    def Subscript(self, node: ast.Subscript) -> Any:
-        return self.flow.item(self.do(node.value), self.do(node.slice))
-
-    def items(self, nodes: list[ast.expr]) -> list:
-        """The items of a tuple, or arguments."""
-        out: list = []
-        for node in nodes:
-            if isinstance(node, ast.Starred):
-                out += self.do(node.value)
-            else:
-                out.append(self.do(node))
-        return out
-
-    def Tuple(self, node: ast.Tuple) -> tuple:
-        return tuple(self.items(node.elts))
-
-    def List(self, node: ast.List) -> list:
-        return self.items(node.elts)
-
-    def BinOp(self, node: ast.BinOp) -> Any:
-        return _BINARY[type(node.op)](self.do(node.left), self.do(node.right))
-
-    def UnaryOp(self, node: ast.UnaryOp) -> Any:
-        value = self.do(node.operand)
-        if isinstance(node.op, ast.Not):
-            return self.flow.negate(value)
-        return _BINARY[type(node.op)](value)
-
-    def Compare(self, node: ast.Compare) -> Any:
-        left = self.do(node.left)
-        result: Any = True
-        for op, right_node in zip(node.ops, node.comparators, strict=True):
-            right = self.do(right_node)
-            one = self.compare(op, left, right)
-            result = one if result is True else self.flow.both(result, one)
-            if result is False:
-                return False
-            left = right
-        return result
-
-    def compare(self, op: ast.cmpop, a: Any, b: Any) -> Any:
-        """One comparison."""
-        if isinstance(op, ast.Is | ast.IsNot):
-            return (a is b) == isinstance(op, ast.Is)
-        if isinstance(op, ast.In | ast.NotIn):
-            if is_value(a):
-                raise NotKnown("in")
-            return (a in b) == isinstance(op, ast.In)
-        return _BINARY[type(op)](a, b)
-
-    def BoolOp(self, node: ast.BoolOp) -> Any:
-        return self.chain(node.values, isinstance(node.op, ast.And))
-
-    def chain(self, nodes: list[ast.expr], every: bool) -> Any:
-        """The first value that decides, or the last one."""
-        value = self.do(nodes[0])
-        if len(nodes) == 1:
-            return value
-        if not is_value(value):
-            return self.chain(nodes[1:], every) if bool(value) == every else value
-        rest, stay = (lambda: self.chain(nodes[1:], every)), (lambda: value)
-        return self.either(value, *((rest, stay) if every else (stay, rest)))
-
-    def either(self, condition: Any, then: Callable, otherwise: Callable) -> Any:
-        """The value of one of two expressions."""
-
-        def of(do: Callable) -> Callable:
-            def put() -> None:
-                self.names["?"] = do()
-
-            return put
-
-        outer = self.names.get("?", _NOTHING)
-        self.branch(condition, of(then), of(otherwise))
-        if "?" not in self.names:
-            raise NotKnown("one of two kinds")
-        value = self.names.pop("?")
-        if outer is not _NOTHING:
-            self.names["?"] = outer
-        return value
-
-    def IfExp(self, node: ast.IfExp) -> Any:
-        condition = self.do(node.test)
-        if not is_value(condition):
-            return self.do(node.body if condition else node.orelse)
-        return self.either(condition, lambda: self.do(node.body), lambda: self.do(node.orelse))
-
-    def Call(self, node: ast.Call) -> Any:
-        function = self.do(node.func)
-        if isinstance(getattr(function, "__self__", None), _CHANGING):
-            raise NotKnown("on one of several ways, a list would change on all")
-        arguments = self.items(node.args)
-        keywords = {k.arg: self.do(k.value) for k in node.keywords}
-        return self.flow.call(function, arguments, keywords)
-
-    def Lambda(self, node: ast.Lambda) -> Callable:
-        names = [a.arg for a in node.args.args]
-
-        def call(*arguments: Any) -> Any:
-            outer = self.names
-            self.names = outer | dict(zip(names, arguments, strict=True))
-            try:
-                return self.do(node.body)
-            finally:
-                self.names = outer
-
-        return call
-
-    def ListComp(self, node: ast.ListComp | ast.GeneratorExp) -> list:
-        out: list = []
-        outer = dict(self.names)
-
-        def go(k: int) -> None:
-            if k == len(node.generators):
-                out.append(self.do(node.elt))
-                return
-            one = node.generators[k]
-            for item in self.do(one.iter):
-                self.give(one.target, item)
-                if all(self.do(test) for test in one.ifs):
-                    go(k + 1)
-
-        go(0)
-        self.names = outer
-        return out
-
-    GeneratorExp = ListComp
-
-
-_CHANGING = list | dict | set
-_NOTHING = object()
 _COUNT = "for"  # no name of a function

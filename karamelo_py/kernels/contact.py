@@ -19,20 +19,33 @@ stopped where it would be less than nothing at the end of the step.
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import entered, point_function, subkernel
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
+from karamelo_py.kernels.contact_pairs import (
+    Where,
+    approach_left,
+    compliance_of,
+    excess_of,
+    friction_of,
+    immovable,
+    length_of,
+    outward_of,
+    pair_of,
+    slide_of,
+    work_of_friction,
+    yielding_of,
+)
 from karamelo_py.kernels.loss import Rubbed, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
-from karamelo_py.kernels.step import touch, touch_velocity
+from karamelo_py.kernels.rows import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
-from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension
 
@@ -64,155 +77,11 @@ class SeparateFields(NamedTuple):
     change: np.ndarray  # (F, d) scratch: of the velocity of each of them
 
 
-class Where(NamedTuple):
-    """A place where fields meet, and the length of the step."""
-
-    x: tuple  # position of the node
-    h: float
-    dt: float
-
-
-class Pair(NamedTuple):
-    """Two bodies at a place: a node of each, mass and share in the common normal."""
-
-    n: int
-    m: int
-    per_a: float  # 1 / mass
-    per_b: float
-    share_a: float
-    share_b: float
-
-
-@subkernel
-def _immovable(contact, n, k):
-    """Whether contact cannot move a node in direction k."""
-    return contact.prescribed[n, k] != 0 or contact.rigid[n // contact.stride]
-
-
-@subkernel
-def _shares(contact, d, nodes, n, m):
-    """Weights of the two bodies' outward sums in their common normal.
-
-    The sum of m grad N points out of a body. Where a body has little mass or ends in an edge it
-    says little about the direction: the larger sum decides (after Lemiale, Nairn & Hurmane 2010),
-    equal ones are averaged. A body with a prescribed velocity knows its surface best.
-    """
-    normal = field(nodes.fields, Normal)
-    of_n = 0.0
-    of_m = 0.0
-    prescribed_n = False
-    prescribed_m = False
-    for k in range(d):
-        of_n += normal[n, k] * normal[n, k]
-        of_m += normal[m, k] * normal[m, k]
-        prescribed_n = prescribed_n or _immovable(contact, n, k)
-        prescribed_m = prescribed_m or _immovable(contact, m, k)
-    if not of_n + of_m > 0:
-        return 0.0, 0.0
-    if prescribed_n != prescribed_m and (of_n if prescribed_n else of_m) > 0:
-        return (1.0, 0.0) if prescribed_n else (0.0, 1.0)
-    share = of_n / (of_n + of_m)
-    return share**4, (1 - share) ** 4
-
-
-@subkernel
-def _pair(contact, d, nodes, n, m):
-    per_a, per_b = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
-    share_a, share_b = _shares(contact, d, nodes, n, m)
-    return Pair(n, m, per_a, per_b, share_a, share_b)
-
-
-@subkernel
-def _yielding(contact, pair, k):
-    """Change of the relative velocity with an impulse along direction k."""
-    of_n = 0.0 if _immovable(contact, pair.n, k) else pair.per_a
-    of_m = 0.0 if _immovable(contact, pair.m, k) else pair.per_b
-    return of_n + of_m
-
-
-@subkernel
-def _outward(nodes, pair, k):
-    """Component k of the common normal, not normalised, from the first body to the second."""
-    normal = field(nodes.fields, Normal)
-    return pair.share_a * normal[pair.n, k] - pair.share_b * normal[pair.m, k]
-
-
-@subkernel
-def _left(contact, nodes, pair, k, push):
-    """Component of the relative velocity once the impulse `push` m grad N has been given."""
-    along = push * _outward(nodes, pair, k)
-    relative = nodes.update[pair.n, k] - nodes.update[pair.m, k]
-    return relative - along * _yielding(contact, pair, k)
-
-
-@subkernel
-def _approach_left(contact, d, nodes, pair, push, size):
-    """What is left of the approach by which a gap closes, over the length of m grad N.
-
-    Friction does not act on it: bodies that are still apart come together freely.
-    """
-    across = 0.0
-    for k in range(d):
-        across += _outward(nodes, pair, k) * _left(contact, nodes, pair, k, push)
-    return across / (size * size)
-
-
-@subkernel
-def _slide(contact, nodes, pair, k, push, across):
-    """Component of the relative velocity along the surface, once `push` has been given."""
-    return _left(contact, nodes, pair, k, push) - across * _outward(nodes, pair, k)
-
-
-@subkernel
-def _length(d, nodes, pair):
-    """Length of the common normal."""
-    size = 0.0
-    for k in range(d):
-        normal = _outward(nodes, pair, k)
-        size += normal * normal
-    return sqrt(size)
-
-
-@subkernel
-def _reach(contact, d, nodes, pair, n, where, side):
-    """How far the body at node `n` of a pair reaches from there, along the normal out of it.
-
-    `side` is 1 for the first body of the pair and -1 for the second.
-    """
-    centre = field(nodes.fields, Centre)
-    mean = 0.0
-    for k in range(d):
-        place = centre[n, k] / nodes.sums[n, MASS] - where.x[k]
-        mean += side * _outward(nodes, pair, k) * place
-    table = contact.surface[n // contact.stride]
-    row = (mean / (_length(d, nodes, pair) * where.h) + 3) * ENTRIES
-    low = min(max(int(row), 0), table.size - 2)
-    share = min(max(row - low, 0.0), 1.0)
-    return where.h * (table[low] + share * (table[low + 1] - table[low]))
-
-
-@subkernel
-def _excess(contact, d, nodes, pair, where):
-    """How much faster two bodies approach than would close the gap between them in a step."""
-    size = _length(d, nodes, pair)
-    if not size > 0:
-        return 0.0
-    approach = 0.0
-    for k in range(d):
-        normal = _outward(nodes, pair, k)
-        approach += normal * (nodes.update[pair.n, k] - nodes.update[pair.m, k])
-    if not approach > 0:
-        return 0.0
-    gap = -_reach(contact, d, nodes, pair, pair.n, where, 1)
-    gap -= _reach(contact, d, nodes, pair, pair.m, where, -1)
-    return approach / size - max(gap, 0.0) / where.dt
-
-
 @subkernel
 def _take(contact, control, a, i, n, k, impulse, per_mass, x):
     """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
-    if not _immovable(contact, n, k):
+    if not immovable(contact, n, k):
         contact.change[i, k] += impulse * per_mass
     if not counts(control.ranks, n):
         return
@@ -277,7 +146,7 @@ def _belongs(which, contact, d, nodes, n, m, b):
 
 @_belongs.on(Approaching)
 def _(which, contact, d, nodes, n, m, b):
-    return _excess(contact, d, nodes, _pair(contact, d, nodes, n, m), which.where) > 0
+    return excess_of(contact, d, nodes, pair_of(contact, d, nodes, n, m), which.where) > 0
 
 
 @_belongs.on(Touched)
@@ -307,70 +176,34 @@ def _share(contact, i, j):
 
 
 @subkernel
-def _compliance(contact, d, nodes, pair, size):
-    """Change of the relative velocity along the normal, of length `size`, with an impulse."""
-    compliance = 0.0
-    for k in range(d):
-        normal = _outward(nodes, pair, k) / size
-        compliance += normal * normal * _yielding(contact, pair, k)
-    return compliance
-
-
-@subkernel
-def _rub(contact, d, nodes, pair, friction, push, size, across, share):
-    """Impulse along the surface over the speed of sliding, and whether it stops all sliding."""
-    compliance = 0.0
-    slip = 0.0
-    for k in range(d):
-        slide = _slide(contact, nodes, pair, k, push / size, across)
-        slip += slide * slide
-        compliance += slide * slide * _yielding(contact, pair, k)
-    if not compliance > 0:
-        return 0.0, False
-    slip = sqrt(slip)
-    stop = share * slip * slip * slip / compliance
-    return min(stop, friction * push) / slip, stop <= friction * push
-
-
-@subkernel
-def _work_of_friction(contact, d, nodes, pair, push, across, rub):
-    """What friction takes of the energy of two bodies: impulse times mean of the sliding speeds."""
-    work = 0.0
-    for k in range(d):
-        slide = _slide(contact, nodes, pair, k, push, across)
-        work += rub * slide * slide * (1.0 - 0.5 * rub * _yielding(contact, pair, k))
-    return work
-
-
-@subkernel
 def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
-    pair = _pair(contact, d, nodes, _node(contact, place, i), _node(contact, place, j))
-    excess = _excess(contact, d, nodes, pair, where)
+    pair = pair_of(contact, d, nodes, _node(contact, place, i), _node(contact, place, j))
+    excess = excess_of(contact, d, nodes, pair, where)
     if not excess > 0:
         return
-    size = _length(d, nodes, pair)
-    compliance = _compliance(contact, d, nodes, pair, size)
+    size = length_of(d, nodes, pair)
+    compliance = compliance_of(contact, d, nodes, pair, size)
     if not compliance > 0:
         return  # the fixes move both
     push = share * excess / compliance
     rub, sticks, across = 0.0, False, 0.0
     friction = contact.friction[a, b]
     if friction > 0:
-        across = _approach_left(contact, d, nodes, pair, push / size, size)
-        rub, sticks = _rub(contact, d, nodes, pair, friction, push, size, across, share)
+        across = approach_left(contact, d, nodes, pair, push / size, size)
+        rub, sticks = friction_of(contact, d, nodes, pair, friction, push, size, across, share)
     step = int(control.values[TIMESTEP]) + 1
     contact.touched[pair.n, b] = -step if sticks else step
     if rub > 0:
-        heat = _work_of_friction(contact, d, nodes, pair, push / size, across, rub)
+        heat = work_of_friction(contact, d, nodes, pair, push / size, across, rub)
         share = contact.warmth[a, b]
         warm_node(field(nodes.fields, Rubbed), pair.n, share * heat * pair.per_a)
         warm_node(field(nodes.fields, Rubbed), pair.m, (1.0 - share) * heat * pair.per_b)
     for k in range(d):
-        impulse = push * _outward(nodes, pair, k) / size
+        impulse = push * outward_of(nodes, pair, k) / size
         if rub > 0:
-            impulse += rub * _slide(contact, nodes, pair, k, push / size, across)
+            impulse += rub * slide_of(contact, nodes, pair, k, push / size, across)
         _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a, where.x)
         _take(contact, control, b, j, pair.m, k, impulse, pair.per_b, where.x)
         force = impulse / control.clock[0].kick
@@ -457,20 +290,20 @@ def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
     across = 0.0
     compliance = 0.0
     for k in range(d):
-        normal = _outward(nodes, pair, k)
+        normal = outward_of(nodes, pair, k)
         across += normal * (v[pair.n, k] - v[pair.m, k])
-        compliance += normal * normal * _yielding(contact, pair, k)
+        compliance += normal * normal * yielding_of(contact, pair, k)
     push = share * across / compliance if compliance > 0 else 0.0
     for k in range(d):
-        yielding = _yielding(contact, pair, k)
+        yielding = yielding_of(contact, pair, k)
         if not yielding > 0:
             continue
-        impulse = push * _outward(nodes, pair, k)
+        impulse = push * outward_of(nodes, pair, k)
         if sticks:
             impulse = share * (v[pair.n, k] - v[pair.m, k]) / yielding
-        if not _immovable(contact, pair.n, k):
+        if not immovable(contact, pair.n, k):
             contact.change[i, k] -= impulse * pair.per_a
-        if not _immovable(contact, pair.m, k):
+        if not immovable(contact, pair.m, k):
             contact.change[j, k] += impulse * pair.per_b
 
 
@@ -485,7 +318,7 @@ def _stay_place(contact, d, nodes, place, count, step):
             for j in range(i + 1, count):
                 touched = contact.touched[n, contact.meeting[j]]
                 if abs(touched) == step:
-                    pair = _pair(contact, d, nodes, n, _node(contact, place, j))
+                    pair = pair_of(contact, d, nodes, n, _node(contact, place, j))
                     share = _share(contact, i, j)
                     _stay_pair(contact, d, nodes, i, j, pair, share, touched < 0)
         for i in range(count):

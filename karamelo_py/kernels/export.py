@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from karamelo_py.compiler.compile import index, loop
+from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.loops import loop
 from karamelo_py.compiler.tuples import put_at, record, row, scale
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, reach, support

@@ -54,17 +54,14 @@ from karamelo_py.kernels.arrays import (
     with_nodes,
 )
 from karamelo_py.kernels.averaging import NodalMean
+from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.g2p import empty, gathered, settled
-from karamelo_py.kernels.hooks import (
-    Warmth,
-    clear_totals,
-    node_hooks,
-    point_hooks,
-    publish_totals,
-)
+from karamelo_py.kernels.node_hooks import node_hooks
 from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
 from karamelo_py.kernels.p2g import load_of, scattered
-from karamelo_py.kernels.step import conduct, read_reports, step_size, visit_here
+from karamelo_py.kernels.passes import read_reports, visit_here
+from karamelo_py.kernels.point_hooks import Warmth, clear_totals, point_hooks, publish_totals
+from karamelo_py.kernels.rows import conduct
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import loop, subkernel
 from karamelo_py.compiler.fields import field, load
 from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.loops import loop, subkernel
 from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.points.kinematics import dimension, vector_at

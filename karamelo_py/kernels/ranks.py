@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.compile import caller_of, entered
-from karamelo_py.kernels.step import sweep_all, sweep_blocks
+from karamelo_py.compiler.addresses import caller_of
+from karamelo_py.compiler.loops import entered
+from karamelo_py.kernels.passes import sweep_all, sweep_blocks
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sweep_points, sweep_shares
 from karamelo_py.kernels.totals import (

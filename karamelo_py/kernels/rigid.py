@@ -11,12 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import entered, over_blocks, point_function
+from karamelo_py.compiler.compile import over_blocks, point_function
 from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
+from karamelo_py.kernels.clock import kick
 from karamelo_py.kernels.p2g import Led
-from karamelo_py.kernels.step import kick, touch, touch_velocity
+from karamelo_py.kernels.rows import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, publish
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, support

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from karamelo_py.compiler.compile import loop, real, shared
+from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.loops import loop
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent, first_node

@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import index, shared, subkernel
+from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.lanes.records import move_record
+from karamelo_py.compiler.loops import subkernel
 from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels.arrays import ADD, CLEAR, Nodes
 

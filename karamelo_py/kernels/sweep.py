@@ -13,7 +13,6 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import (
     by_type,
     choose,
-    entered,
     first_failing,
     in_all,
     index,
@@ -22,12 +21,12 @@ from karamelo_py.compiler.compile import (
     point_function,
     real,
     shared,
-    subkernel,
 )
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.compiler.held import at_hand, hold
 from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
+from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Places

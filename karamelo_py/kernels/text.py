@@ -20,7 +20,8 @@ from llvmlite import ir
 from numba import config, types
 from numba.extending import intrinsic
 
-from karamelo_py.compiler.compile import fma, index, kernel, shared
+from karamelo_py.compiler.compile import fma, index, shared
+from karamelo_py.compiler.loops import kernel
 
 ROWS = 1024  # written at a time
 # The longest: -1.23456789e-308 and -4611686018427387903, a blank, and what is overwritten.

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import entered, point_function, shared, subkernel
+from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.loops import entered, subkernel
 
 LIMBS = 68
 LOST = LIMBS - 1  # counts terms that are no numbers

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import subkernel
 from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import subkernel
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.loss import Rubbed, warm_node
 from karamelo_py.kernels.totals import add_to, counts

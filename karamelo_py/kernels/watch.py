@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from math import inf
 
-from karamelo_py.compiler.compile import entered, over_blocks, shared
+from karamelo_py.compiler.compile import over_blocks, shared
 from karamelo_py.compiler.fields import load, load_vector
+from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import TIMESTEP
 from karamelo_py.kernels.totals import KINETIC, STORED, WORK, add_to, agree_on_heat, collect

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from karamelo_py.compiler.compile import address_of_python
+from karamelo_py.compiler.addresses import address_of_python
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
 from karamelo_py.kernels.arrays import DT, Control
 from karamelo_py.kernels.ranks import CALL, GIVE, LARGEST, NEXT, NUMBER, SWEEP, TAKE, TOTALS

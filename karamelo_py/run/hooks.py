@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.compile import address_of
+from karamelo_py.compiler.addresses import address_of
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 from karamelo_py.kernels.arrays import HELD, HOOK, PROGRAM, Hooks, NoHooks
 from karamelo_py.kernels.hooks import STAGES, CompiledHook

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
@@ -47,6 +48,15 @@ def _kind_of_scene(hub: Hub) -> str:
     parts |= {type(fix).__name__ for fix in hub.fixes.values()}
     parts |= {str(hub.settings.precision), f"threads={hub.settings.threads}"}
     return f"{hub.domain.dimension}D {hub.update.words} {' '.join(sorted(parts))}"
+
+
+def _about(seconds: float) -> str:
+    """How long one processor takes for so many seconds of work; longer where others want it."""
+    wanted = 1 + (os.getloadavg()[0] if hasattr(os, "getloadavg") else 0)
+    longest = seconds * max(1.0, wanted / (os.cpu_count() or 1))
+    if longest < 1.5 * seconds:
+        return f"about {duration(seconds)}"
+    return f"{duration(seconds)} to {duration(longest)}, as others use the processors"
 
 
 class Runner:
@@ -368,7 +378,7 @@ class Runner:
                     self.begun, self.worked = time.perf_counter(), time.process_time()
                     if not self.said:
                         self.said = True
-                        about = f": about {duration(expected)}" if expected else ""
+                        about = f": {_about(expected)}" if expected else ""
                         runner.hub.console.say(
                             f"Compiling the loops of this kind of scene, once{about}"
                             " (the next run starts at once) ..."
@@ -387,7 +397,7 @@ class Runner:
                 yield
         finally:
             event.unregister("numba:compile", listener)
-            spent = self.spent["compilation"]
+            spent = self.processor["compilation"]
             # Where most was in the cache already, the time says nothing about the whole.
             if spent > 0.5 * (expected or 0.0):
                 cache.keep_time(scene, spent)

@@ -23,28 +23,17 @@ from karamelo_py.kernels.arrays import (
     NoHooks,
     Setup,
 )
+from karamelo_py.kernels.clock import STILL, choose_dt, step_size
 from karamelo_py.kernels.export import impose_stress
 from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points, show_heat
 from karamelo_py.kernels.hooks import POINT_STAGES, STAGES, CompiledHook
 from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.kernels.moments import at_nodes, at_points
 from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.kernels.step import (
-    DONE,
-    SORT,
-    STILL,
-    SUMS,
-    Fused,
-    Staged,
-    advance,
-    at_nodes,
-    at_points,
-    choose_dt,
-    measure,
-    run_steps,
-    step_size,
-    sweep,
-)
+from karamelo_py.kernels.passes import sweep
+from karamelo_py.kernels.rows import SUMS
+from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
 from karamelo_py.kernels.sweep import Visit, sweep_nodes
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat

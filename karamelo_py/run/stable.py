@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.arrays import DT
+from karamelo_py.kernels.clock import STILL
 from karamelo_py.kernels.laws import law_on
-from karamelo_py.kernels.step import STILL
 from karamelo_py.points.laws import Absent, initial_state, wave_speed_squared
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.hub import Hub

@@ -22,8 +22,8 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.export import export_velocity_moment
 from karamelo_py.kernels.heat import Supply, Temperature
+from karamelo_py.kernels.moments import corners_that_move
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.kernels.step import corners_that_move
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.view import Shown, View
 

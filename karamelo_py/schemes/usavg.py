@@ -12,7 +12,7 @@ from karamelo_py.kernels.arrays import (
     POST_VELOCITIES_TO_GRID,
 )
 from karamelo_py.kernels.g2p import SecondStrain, Strain
-from karamelo_py.kernels.step import (
+from karamelo_py.kernels.rows import (
     ACCELERATE,
     CONTACT_AFTER,
     CONTACT_BEFORE,

@@ -11,7 +11,7 @@ from karamelo_py.kernels.arrays import (
     POST_UPDATE_GRID_STATE,
 )
 from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.step import (
+from karamelo_py.kernels.rows import (
     ACCELERATE,
     CONTACT_BEFORE,
     FORCE,

@@ -9,7 +9,7 @@ from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
 from karamelo_py.kernels.p2g import SeenMass
-from karamelo_py.kernels.step import ACCELERATE, MOVE, SERIES, SUMS, light_node
+from karamelo_py.kernels.rows import ACCELERATE, MOVE, SERIES, SUMS, light_node
 from karamelo_py.kernels.table import AtPoints, Gather, Nodes
 
 

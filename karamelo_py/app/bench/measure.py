@@ -11,8 +11,9 @@ import numpy as np
 from numba import prange
 
 from karamelo_py.app.bench.workloads import MOST_STEPS, Workload
-from karamelo_py.compiler.compile import kernel
-from karamelo_py.kernels.step import DONE, Fused, begin, finish, step
+from karamelo_py.compiler.loops import kernel
+from karamelo_py.kernels.clock import finish
+from karamelo_py.kernels.step import DONE, Fused, begin, step
 from karamelo_py.kernels.sums import columns_of
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.language.interpreter import Interpreter

@@ -81,7 +81,7 @@ class XPIC(NamedTuple):
 
 @updated_velocity.on(XPIC)
 def _(transfer, v, v_pic, dv):
-    # kernels.step.sum_series has put the sum of the series, with the change, in the place of dv.
+    # kernels.rows.sum_series has put the sum of the series, with the change, in the place of dv.
     return dv
 
 

@@ -7,16 +7,8 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.formula import (
-    CONSTANT,
-    FIRST_BINARY,
-    POINT,
-    SELECT,
-    SPREAD,
-    UNIFORM,
-    of_one,
-    of_two,
-)
+from karamelo_py.compiler.formula import CONSTANT, POINT, SPREAD, UNIFORM
+from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, of_one, of_two
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import NonNegative, Positive

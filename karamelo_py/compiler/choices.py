@@ -1,0 +1,207 @@
+"""What was chosen by type for compiled code: that is in the key of a kernel, and nothing else."""
+
+from __future__ import annotations
+
+import functools
+import sys
+import types as python
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+from numba.core import event
+
+# Known by name: their versions are part of every key.
+_OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
+# What Numba's own functions do with lanes cannot be followed from them: all of it is in every key.
+WHOLE = [str(path) for path in sorted(Path(__file__).with_name("lanes").glob("*.py"))]
+SPELLED = "<spelled>"  # the file of functions that are written at compile time
+
+
+class Unknown(Exception):
+    """Something that a kernel depends on cannot be put into a hash."""
+
+
+# --- implementations of point functions that are in a kernel -----------------------------------
+
+
+class Choice(NamedTuple):
+    """That a kernel asked a point function for these classes of tags, all by name."""
+
+    point_function: str
+    classes: tuple[str, ...]
+
+
+point_functions: dict[str, list[Callable]] = {}
+_serves: WeakKeyDictionary[Callable, list[Callable]] = WeakKeyDictionary()
+
+
+def name_of(thing: Any) -> str:
+    """``module:qualified name`` of a function or class."""
+    return f"{thing.__module__}:{thing.__qualname__}"
+
+
+def declare_point_function(dispatch: Callable) -> None:
+    """Make a point function known by its name; it has ``find(classes)`` and ``tags``."""
+    point_functions.setdefault(name_of(dispatch), []).append(dispatch)
+
+
+def serves(implementation: Callable, dispatch: Callable) -> None:
+    """Note that a point function may choose `implementation`."""
+    function = getattr(implementation, "py_func", implementation)
+    _serves.setdefault(function, []).append(dispatch)
+
+
+_asked: list[set[tuple[Callable, tuple]]] = []  # of the choosers at work, innermost last
+_answers: WeakKeyDictionary[Callable, set[tuple[Callable, tuple]]] = WeakKeyDictionary()
+
+
+def asks(dispatch: Callable, classes: tuple) -> None:
+    """Note that whether `dispatch` is defined for `classes` was asked, maybe by a chooser."""
+    if _asked:
+        _asked[-1].add((dispatch, classes))
+    note([(dispatch, classes)])
+
+
+# Of the functions that are made, innermost last: what was asked of point functions, and the code
+# of functions that were run for them.
+_noted: list[set[tuple[Callable, tuple] | python.CodeType]] = []
+
+
+def note(parts: Iterable[tuple[Callable, tuple] | python.CodeType]) -> None:
+    """Note what the function that is compiled now consists of."""
+    if _noted:
+        _noted[-1].update(parts)
+
+
+@contextmanager
+def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
+    """The set of what is noted meanwhile."""
+    _noted.append(set())
+    try:
+        yield _noted[-1]
+    finally:
+        _noted.pop()
+
+
+def noting(chooser: Callable) -> Callable:
+    """The same chooser of code by type; what it asks is noted with the function that it chooses."""
+
+    @functools.wraps(chooser)
+    def choose(*arguments: Any) -> Callable | None:
+        _asked.append(set())
+        try:
+            chosen = chooser(*arguments)
+        finally:
+            asked = _asked.pop()
+        if asked and chosen is not None:
+            _answers.setdefault(getattr(chosen, "py_func", chosen), set()).update(asked)
+        return chosen
+
+    return choose
+
+
+def tag_class(numba_type: Any) -> Any:
+    """The Python class that a Numba type stands for, as far as point functions select by it."""
+    return getattr(numba_type, "instance_class", None)
+
+
+def found_by_name(name: str) -> Any:
+    """What `name_of` called so; Unknown if nothing is, or something else."""
+    module, _, path = name.partition(":")
+    try:
+        return functools.reduce(getattr, path.split("."), sys.modules[module])
+    except (KeyError, AttributeError) as error:
+        raise Unknown(name) from error
+
+
+def class_name(tag: type | None) -> str:
+    if tag is None:
+        return ""
+    name = name_of(tag)
+    if found_by_name(name) is not tag:
+        raise Unknown(name)
+    return name
+
+
+class Contents(NamedTuple):
+    """What is in compiled code: choices, and the Python functions that it was made of."""
+
+    choices: frozenset[Choice]
+    codes: frozenset[python.CodeType]
+
+
+_contents: WeakKeyDictionary[Any, Contents] = WeakKeyDictionary()
+_unfit: WeakKeyDictionary[Any, bool] = WeakKeyDictionary()
+
+
+class _Watch(event.Listener):
+    """Notes which implementation each piece of compiled code is."""
+
+    def on_start(self, event: Any) -> None:
+        """What is chosen while it is compiled is noted."""
+        _noted.append(set())
+
+    def on_end(self, event: Any) -> None:
+        """A function was compiled, or failed to."""
+        noted = _noted.pop()
+        dispatcher, arguments = event.data["dispatcher"], tuple(event.data["args"])
+        compiled = dispatcher.overloads.get(arguments)
+        if compiled is None:
+            return
+        function = dispatcher.py_func
+        run = {part for part in noted if isinstance(part, python.CodeType)}
+        try:
+            choices = frozenset(_own_choices(function, arguments, noted - run))
+        except Unknown:
+            _unfit[compiled.library] = True
+            return
+        if not is_opaque(function):
+            run.add(function.__code__)
+        # What was spelled out at compile time was spelled by a function that is followed itself.
+        codes = frozenset(code for code in run if code.co_filename not in (SPELLED, *WHOLE))
+        _contents[compiled.library] = Contents(choices, codes)
+
+
+event.register("numba:compile", _Watch())
+
+
+def _own_choices(function: Callable, arguments: tuple, noted: set) -> Iterable[Choice]:
+    for dispatch in _serves.get(function, ()):
+        classes = tuple(tag_class(a) for a in arguments[: dispatch.tags])
+        yield Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
+    for dispatch, classes in (*_answers.get(function, ()), *noted):
+        yield Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
+
+
+def contents(library: Any) -> Contents:
+    """What is in the code of a compiled function, and of all that it calls."""
+    choices: set[Choice] = set()
+    codes: set[python.CodeType] = set()
+    ahead, seen = [library], set()
+    while ahead:
+        one = ahead.pop()
+        if one in seen:
+            continue
+        seen.add(one)
+        if one in _unfit:
+            raise Unknown(one.name)
+        if one in _contents:
+            choices |= _contents[one].choices
+            codes |= _contents[one].codes
+        ahead += [*one._linking_libraries, *one.needs]
+    return Contents(frozenset(choices), frozenset(codes))
+
+
+def keep_choices(library: Any, choices: frozenset[Choice]) -> None:
+    """Note the choices in code that was not compiled here, but loaded."""
+    _contents[library] = Contents(choices, frozenset())
+
+
+def is_opaque(thing: Any) -> bool:
+    module = getattr(thing, "__module__", None)
+    if module is None:
+        return not isinstance(thing, python.FunctionType)
+    return module.partition(".")[0] in _OPAQUE

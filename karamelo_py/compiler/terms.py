@@ -1,0 +1,206 @@
+"""Expressions of functions that are walked through (`karamelo_py.compiler.walk`)."""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from karamelo_py.compiler.flow import Flow, is_value
+from karamelo_py.compiler.texts import NotKnown
+
+BINARY = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+    ast.Div: operator.truediv, ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod,
+    ast.Pow: operator.pow, ast.BitAnd: operator.and_, ast.BitOr: operator.or_,
+    ast.BitXor: operator.xor, ast.LShift: operator.lshift, ast.RShift: operator.rshift,
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
+    ast.Eq: operator.eq, ast.NotEq: operator.ne,
+    ast.USub: operator.neg, ast.UAdd: operator.pos, ast.Invert: operator.invert,
+}  # fmt: skip
+
+
+class Terms:
+    """What expressions are, by what the names in them stand for.
+
+    Attributes
+    ----------
+    function, free
+        The function that they are of, with the globals that it is to see, and its closure.
+    flow
+        Writes the code of ways.
+    names
+        What the function's own names stand for.
+    """
+
+    function: Callable
+    free: dict[str, Any]
+    flow: Flow
+    names: dict[str, Any]
+
+    def branch(self, condition: Any, then: Callable, otherwise: Callable) -> None:
+        """Go both ways, and on from where they meet."""
+        raise NotImplementedError
+
+    def do(self, node: ast.AST) -> Any:
+        """A statement, or the value of an expression."""
+        return getattr(self, type(node).__name__, self.unknown)(node)
+
+    def unknown(self, node: ast.AST) -> None:
+        """Nothing that is gone through."""
+        raise NotKnown(type(node).__name__)
+
+    def name(self, name: str) -> Any:
+        """What a name stands for."""
+        if name in self.names:
+            return self.names[name]
+        if name in self.free:
+            return self.free[name]
+        if name in self.function.__code__.co_varnames:
+            raise NotKnown(name)  # on one of the ways here
+        return self.function.__globals__[name]
+
+    def Name(self, node: ast.Name) -> Any:
+        return self.name(node.id)
+
+    def Constant(self, node: ast.Constant) -> Any:
+        return node.value
+
+    def Attribute(self, node: ast.Attribute) -> Any:
+        return getattr(self.do(node.value), node.attr)
+
+    def Slice(self, node: ast.Slice) -> slice:
+        return slice(*(n and self.do(n) for n in (node.lower, node.upper, node.step)))
+
+    def Subscript(self, node: ast.Subscript) -> Any:
+        return self.flow.item(self.do(node.value), self.do(node.slice))
+
+    def items(self, nodes: list[ast.expr]) -> list:
+        """The items of a tuple, or arguments."""
+        out: list = []
+        for node in nodes:
+            if isinstance(node, ast.Starred):
+                out += self.do(node.value)
+            else:
+                out.append(self.do(node))
+        return out
+
+    def Tuple(self, node: ast.Tuple) -> tuple:
+        return tuple(self.items(node.elts))
+
+    def List(self, node: ast.List) -> list:
+        return self.items(node.elts)
+
+    def BinOp(self, node: ast.BinOp) -> Any:
+        return BINARY[type(node.op)](self.do(node.left), self.do(node.right))
+
+    def UnaryOp(self, node: ast.UnaryOp) -> Any:
+        value = self.do(node.operand)
+        if isinstance(node.op, ast.Not):
+            return self.flow.negate(value)
+        return BINARY[type(node.op)](value)
+
+    def Compare(self, node: ast.Compare) -> Any:
+        left = self.do(node.left)
+        result: Any = True
+        for op, right_node in zip(node.ops, node.comparators, strict=True):
+            right = self.do(right_node)
+            one = self.compare(op, left, right)
+            result = one if result is True else self.flow.both(result, one)
+            if result is False:
+                return False
+            left = right
+        return result
+
+    def compare(self, op: ast.cmpop, a: Any, b: Any) -> Any:
+        """One comparison."""
+        if isinstance(op, ast.Is | ast.IsNot):
+            return (a is b) == isinstance(op, ast.Is)
+        if isinstance(op, ast.In | ast.NotIn):
+            if is_value(a):
+                raise NotKnown("in")
+            return (a in b) == isinstance(op, ast.In)
+        return BINARY[type(op)](a, b)
+
+    def BoolOp(self, node: ast.BoolOp) -> Any:
+        return self.chain(node.values, isinstance(node.op, ast.And))
+
+    def chain(self, nodes: list[ast.expr], every: bool) -> Any:
+        """The first value that decides, or the last one."""
+        value = self.do(nodes[0])
+        if len(nodes) == 1:
+            return value
+        if not is_value(value):
+            return self.chain(nodes[1:], every) if bool(value) == every else value
+        rest, stay = (lambda: self.chain(nodes[1:], every)), (lambda: value)
+        return self.either(value, *((rest, stay) if every else (stay, rest)))
+
+    def either(self, condition: Any, then: Callable, otherwise: Callable) -> Any:
+        """The value of one of two expressions."""
+
+        def of(do: Callable) -> Callable:
+            def put() -> None:
+                self.names["?"] = do()
+
+            return put
+
+        outer = self.names.get("?", _NOTHING)
+        self.branch(condition, of(then), of(otherwise))
+        if "?" not in self.names:
+            raise NotKnown("one of two kinds")
+        value = self.names.pop("?")
+        if outer is not _NOTHING:
+            self.names["?"] = outer
+        return value
+
+    def IfExp(self, node: ast.IfExp) -> Any:
+        condition = self.do(node.test)
+        if not is_value(condition):
+            return self.do(node.body if condition else node.orelse)
+        return self.either(condition, lambda: self.do(node.body), lambda: self.do(node.orelse))
+
+    def Call(self, node: ast.Call) -> Any:
+        function = self.do(node.func)
+        if isinstance(getattr(function, "__self__", None), CHANGING):
+            raise NotKnown("on one of several ways, a list would change on all")
+        arguments = self.items(node.args)
+        keywords = {k.arg: self.do(k.value) for k in node.keywords}
+        return self.flow.call(function, arguments, keywords)
+
+    def Lambda(self, node: ast.Lambda) -> Callable:
+        names = [a.arg for a in node.args.args]
+
+        def call(*arguments: Any) -> Any:
+            outer = self.names
+            self.names = outer | dict(zip(names, arguments, strict=True))
+            try:
+                return self.do(node.body)
+            finally:
+                self.names = outer
+
+        return call
+
+    def ListComp(self, node: ast.ListComp | ast.GeneratorExp) -> list:
+        out: list = []
+        outer = dict(self.names)
+
+        def go(k: int) -> None:
+            if k == len(node.generators):
+                out.append(self.do(node.elt))
+                return
+            one = node.generators[k]
+            for item in self.do(one.iter):
+                self.give(one.target, item)
+                if all(self.do(test) for test in one.ifs):
+                    go(k + 1)
+
+        go(0)
+        self.names = outer
+        return out
+
+    GeneratorExp = ListComp
+
+
+CHANGING = list | dict | set
+_NOTHING = object()

@@ -1,0 +1,97 @@
+"""How long steps are, and what ends one."""
+
+from __future__ import annotations
+
+from math import inf
+
+from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.loops import entered
+from karamelo_py.kernels.arrays import (
+    DT,
+    MASS,
+    TIME,
+    TIMESTEP,
+)
+
+
+@shared
+def step_size(s):
+    """dt of the present step, in the precision of the run: how long points move."""
+    return real(s.control.values[DT], s.nodes.sums[0, MASS])
+
+
+@shared
+def last_step_size(s):
+    """dt of the step before, which the velocity at the start of this one belongs to.
+
+    Before the first step there was none: the state at the start has its strain already. It takes
+    next to nothing, since rates of strain are asked for.
+    """
+    share = NEXT_TO_NOTHING if s.control.values[TIMESTEP] == 0 else 1.0
+    return real(share * s.control.clock[0].last_dt, s.nodes.sums[0, MASS])
+
+
+@shared
+def kick(s):
+    """How long forces act in this step.
+
+    Places belong to the ends of steps, velocities to their middles: forces lead from the middle of
+    one step to that of the next.
+    """
+    return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
+
+
+NEXT_TO_NOTHING = 1e-9  # of a step
+ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
+
+# Points that go from cell to cell feed energy to a body, by so much a cell, and the more the longer
+# the step. Until they have gone so far, in cells, a scene takes the steps of bodies at rest.
+STILL = 0.25
+
+
+@entered
+def choose_dt(control):
+    """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end.
+
+    The last two steps are shortened alike. Where velocities are mapped or prescribed, a step takes
+    impulses that do not vanish with its length: in a last step that is a small part of the others,
+    forces (impulses over dt) would be many times what they are before.
+    """
+    clock = control.clock[0]
+    limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
+    dt = min(clock.dt_factor * limit, clock.heat_factor * clock.heat_limit)
+    dt = clock.fixed_dt if clock.fixed_dt > 0 else dt
+    limit = min(limit, clock.heat_limit)
+    clock.limit = limit
+    clock.over_limit = clock.over_limit + 1 if dt > limit else 0
+    remaining = clock.end_time - control.values[TIME]
+    # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end, and
+    # none more than there are.
+    if 0 < remaining <= dt * (1 + ROUNDING):
+        dt = remaining
+    elif 0 < remaining < 2 * dt * (1 - ROUNDING):
+        dt = 0.5 * remaining
+    control.values[DT] = dt
+    if control.values[TIMESTEP] == 0:
+        clock.last_dt = dt
+    clock.kick = 0.5 * (clock.last_dt + dt)
+
+
+@entered
+def finish(control):
+    """End of a step: the points are where they moved to, time goes on, the next dt is chosen."""
+    clock = control.clock[0]
+    clock.now = 1 - clock.now
+    dt = control.values[DT]
+    clock.last_dt = dt
+    time = control.values[TIME] + dt
+    # Exactly the end, when this step was shortened to reach it.
+    control.values[TIME] = clock.end_time if clock.end_time - control.values[TIME] == dt else time
+    control.values[TIMESTEP] += 1
+    clock.drift += clock.move
+    clock.path += clock.move
+    clock.pace = max(clock.pace, clock.move)
+    clock.move = 0.0
+    if clock.path > STILL:
+        clock.courant, clock.dt_factor = clock.courant_moving, clock.dt_factor_moving
+    choose_dt(control)

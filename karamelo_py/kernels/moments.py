@@ -1,0 +1,70 @@
+"""When fixes act: on nodes, and on points."""
+
+from __future__ import annotations
+
+from karamelo_py.compiler.compile import (
+    over_blocks,
+    point_function,
+    shared,
+)
+from karamelo_py.kernels.arrays import (
+    Hooks,
+    NoHooks,
+)
+from karamelo_py.kernels.clock import kick, step_size
+from karamelo_py.kernels.node_hooks import node_hooks
+from karamelo_py.kernels.point_hooks import Motion, clear_totals, point_hooks, publish_totals
+from karamelo_py.points.basis import placed
+from karamelo_py.points.frames import follows
+
+
+@point_function()
+def at_nodes(hooks, stage, target, s):
+    """Let the fixes act on the nodes."""
+
+
+@at_nodes.on(NoHooks)
+def _(hooks, stage, target, s):
+    return None
+
+
+@at_nodes.on(Hooks)
+def _(hooks, stage, target, s):
+    clock = s.control.clock[0]
+    node_hooks(
+        stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), clock.kept
+    )
+    clock.set_low = clock.set_high = 0.0  # of temperatures only
+
+
+@shared
+def corners_that_move(s):
+    """How many corners stand behind the position of a point, and move with it."""
+    return placed(s.basis, s.kin) if follows(s.frame) else 0
+
+
+def _point_hooks(block, s, hooks, stage, now, then):
+    points = block.points
+    motion = Motion(points.v, points.mass, points.x[now], points.x[then], corners_that_move(s))
+    point_hooks(stage, motion, s.kin, points.id, hooks, s.control, step_size(s))
+
+
+hook_points = over_blocks(_point_hooks)
+
+
+@point_function()
+def at_points(hooks, stage, then, s):
+    """Let the fixes act on the points; `then` is 1 when their new positions are known, else 0."""
+
+
+@at_points.on(NoHooks)
+def _(hooks, stage, then, s):
+    return None
+
+
+@at_points.on(Hooks)
+def _(hooks, stage, then, s):
+    clear_totals(stage, hooks, s.control)
+    now = s.control.clock[0].now
+    hook_points(s, hooks, stage, now, 1 - now if then else now)
+    publish_totals(stage, hooks, s.control)

@@ -1,0 +1,247 @@
+"""Compiled hooks of fixes on nodes, those of heat too (`karamelo_py.kernels.hooks`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from karamelo_py.compiler.addresses import caller_of
+from karamelo_py.compiler.formula import BLOCK
+from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import (
+    BEFORE,
+    MASS,
+    ON_SUMS,
+    ON_UPDATE,
+    ON_VELOCITY,
+    POST_UPDATE_GRID_STATE,
+    POST_VELOCITIES_TO_GRID,
+    TIME,
+    VALUE,
+    of_change,
+    of_force,
+    of_momentum,
+)
+from karamelo_py.kernels.hooks import (
+    NODE_FUNCTION,
+    NONE,
+    clear_total,
+    directions,
+    evaluate,
+    publish_total,
+)
+from karamelo_py.kernels.totals import WORK, add_many, add_to, counts, number_of_all
+from karamelo_py.kernels.walls import FRICTION, rub, stick
+from karamelo_py.points.grid import node_position
+from karamelo_py.points.kinematics import dimension
+
+_call_node_function = caller_of(NODE_FUNCTION)
+
+COUNT, ACT, RUB = 0, 1, 2  # what is done with the members of a hook
+
+
+@subkernel
+def _locate_nodes(kin, grids, hooks, count):
+    """Positions of the chosen nodes."""
+    where = hooks.scratch
+    for q in range(count):
+        n = hooks.chosen[q]
+        g = 0
+        while g + 1 < grids.first.size and n >= grids.first[g + 1]:
+            g += 1
+        x = node_position(record(grids, g), n)
+        for axis in range(3):
+            where[axis, q] = x[axis]
+            where[3 + axis, q] = x[axis]
+
+
+@subkernel
+def _clear_held(kin, spans, held):
+    """Nobody holds a node yet."""
+    if held.size > 0:
+        for s in range(1, 1 + spans[0, 0]):
+            for n in range(spans[s, 0], spans[s, 1]):
+                for c in range(dimension(kin)):
+                    held[n, c].slot = 0
+
+
+@subkernel
+def _taken_over(hooks, control, h, n, c, force):
+    """Hook `h` holds node `n` by `force`: what those had of it that held it before."""
+    before = 0.0
+    if hooks.held.size > 0 and hooks.table[h].holds:
+        held = hooks.held[n, c]
+        if held.slot > 0:
+            before = held.force
+            if counts(control.ranks, n):
+                add_to(control.totals, held.slot - 1, -before)
+        held.slot = 1 + hooks.table[h].slot + c
+        held.force = before + force
+    return before
+
+
+@subkernel
+def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, share):
+    """Act on the chosen nodes; add to the totals, and to the work that is done."""
+    step_back = min(control.clock[0].last_dt, control.values[TIME])  # nothing was before time 0
+    slot = hooks.table[h].slot
+    stage = hooks.table[h].stage
+    remaps = target == ON_VELOCITY and stage == POST_VELOCITIES_TO_GRID
+    # What is strained by before the forces belongs to the last step, and to what held it then.
+    strains_first = target == ON_VELOCITY and stage == POST_UPDATE_GRID_STATE
+    strains_first = strains_first and hooks.table[h].holds > 0
+    given = BEFORE if strains_first and hooks.table[h].uses_before else VALUE
+    for c in range(directions(hooks)):
+        if hooks.programs[h, c].begin < 0:
+            continue
+        evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
+        if hooks.table[h].uses_before:
+            evaluate(hooks, h, c, count, control, np.int64(BEFORE), -step_back)
+        for q in range(count):
+            n = hooks.chosen[q]
+            work = before = 0.0
+            mass = nodes.sums[n, MASS]
+            if target == ON_SUMS:
+                v = nodes.sums[n, of_momentum(kin) + c] / mass
+                star = v
+            elif target == ON_UPDATE:
+                star = nodes.update[n, c]
+                v = star - nodes.update[n, of_change(kin) + c]
+            else:
+                v = nodes.velocity[n, c]
+                star = v
+                last = nodes.update[n, c]  # before the forces, that of the step before
+                if remaps or (strains_first and last == hooks.scratch[given, q]):
+                    star = last
+            old, old_star = v, star
+            old_force = nodes.sums[n, of_force(kin) + c]
+            v, star, force, total = _call_node_function(
+                hooks.table[h].address,
+                mass,
+                v,
+                star,
+                old_force,
+                hooks.scratch[given, q],
+                hooks.scratch[BEFORE, q],
+                dt,
+                share,
+            )
+            if target == ON_UPDATE:
+                # Points that keep their velocity take the change v* - v: another v is an impulse.
+                total += kept * mass * (old - v) / dt
+                if star == hooks.scratch[VALUE, q]:
+                    before = _taken_over(hooks, control, h, n, c, total)
+            # Impulse times the mean of the velocities before and after it.
+            if target == ON_SUMS:
+                work = dt * (force - old_force) * (v + 0.5 * dt * (force + old_force) / mass)
+                nodes.sums[n, of_force(kin) + c] = force
+            elif target == ON_UPDATE:
+                work = 0.5 * mass * (star - old_star + kept * (old - v)) * (v + star)
+                clock = control.clock[0]
+                clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
+                nodes.update[n, c] = star
+                nodes.update[n, of_change(kin) + c] = star - v
+            else:
+                nodes.velocity[n, c] = star if strains_first else v
+            # Formulas have been taken: their rows hold what is to be added up.
+            own = counts(control.ranks, n)
+            hooks.scratch[VALUE, q] = total if own else 0.0
+            hooks.scratch[BEFORE, q] = work if own else 0.0
+            if own and before != 0:
+                add_to(control.totals, slot + c, before)
+        add_many(control.totals, WORK, hooks.scratch[BEFORE], count)
+        if slot >= 0:
+            add_many(control.totals, slot + c, hooks.scratch[VALUE], count)
+
+
+@subkernel
+def _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count):
+    """Friction of the chosen nodes along their wall."""
+    programs = hooks.programs[h]
+    if target == ON_VELOCITY:
+        if hooks.table[h].stage == POST_VELOCITIES_TO_GRID:  # else v* is that of the step before
+            for q in range(count):
+                stick(kin, nodes, programs, hooks.chosen[q])
+        return
+    evaluate(hooks, h, FRICTION, count, control, np.int64(VALUE), 0.0)
+    slot = hooks.table[h].slot
+    for q in range(count):
+        n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
+        rub(kin, nodes, programs, hooks.held, n, mu, dt, kept, control, slot)
+
+
+@subkernel
+def _choose_nodes(nodes, spans, hooks, h, span, member):
+    """The next members with mass, up to a block: how many, and where to go on."""
+    begin = hooks.table[h].begin
+    ranges = spans[0, 0] if begin < 0 else 1
+    count = 0
+    while span < ranges:
+        low = spans[1 + span, 0] if begin < 0 else begin
+        high = spans[1 + span, 1] if begin < 0 else hooks.table[h].end
+        for m in range(max(low, member), high):
+            n = m if begin < 0 else hooks.members[m]
+            if nodes.sums[n, MASS] > 0:
+                hooks.chosen[count] = n
+                count += 1
+                if count == BLOCK:
+                    return count, span, m + 1
+        span, member = span + 1, NONE
+    return count, span, member
+
+
+@subkernel
+def _go_through(task, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share):
+    """Do `task` with the members that have mass, block by block; return their number here."""
+    heavy = 0
+    count, span, member = BLOCK, NONE, NONE
+    while count == BLOCK:
+        count, span, member = _choose_nodes(nodes, spans, hooks, h, span, member)
+        if task == COUNT:
+            for q in range(count):
+                heavy += counts(control.ranks, hooks.chosen[q])
+        else:
+            _do_at_nodes(task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share)
+    return heavy
+
+
+@subkernel
+def _do_at_nodes(task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share):
+    if hooks.table[h].uses_place:
+        _locate_nodes(kin, grids, hooks, count)
+    if task == RUB:
+        _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count)
+    else:
+        _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, share)
+
+
+@entered
+def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept):
+    """Call the node functions of `stage` on the members that have mass.
+
+    `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
+    """
+    dt = float(dt)
+    if target == ON_UPDATE:
+        _clear_held(kin, spans, hooks.held)
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage != stage:
+            continue
+        clear_total(hooks, h, control)
+        share = 1.0
+        if hooks.table[h].uses_share:
+            heavy = _go_through(
+                COUNT, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share
+            )
+            share = 1.0 / max(number_of_all(control.ranks, control, heavy), 1)
+        _go_through(ACT, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share)
+        publish_total(hooks, h, control)
+    # Walls rub when it is known which of them hold a node.
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage != stage:
+            continue
+        rubs = hooks.programs[h, FRICTION].begin >= 0
+        if rubs:
+            _go_through(RUB, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, 1.0)
+        if rubs or (hooks.table[h].holds and hooks.held.size > 0):
+            publish_total(hooks, h, control)

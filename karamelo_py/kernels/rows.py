@@ -1,0 +1,282 @@
+"""Rows of the tables of schemes, and what only some scenes have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import entered
+from karamelo_py.compiler.tuples import clear_first
+from karamelo_py.kernels import table
+from karamelo_py.kernels.arrays import (
+    DT,
+    MASS,
+    ON_SUMS,
+    ON_UPDATE,
+    POST_ADVANCE_PARTICLES,
+    POST_GRID_TO_POINT,
+    POST_PARTICLES_TO_GRID,
+    POST_UPDATE_GRID_STATE,
+    of_change,
+    of_force,
+    of_momentum,
+)
+from karamelo_py.kernels.averaging import FBar
+from karamelo_py.kernels.clock import step_size
+from karamelo_py.kernels.g2p import AverageStress, Move, SeriesTerm, TrialStrain
+from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.nodes import (
+    ClearRubbed,
+    ExtendSeries,
+    KeepLoss,
+    MomentumToVelocity,
+    StartSeries,
+    SumsToVelocity,
+    TakeMean,
+    TakeMeanStress,
+    Update,
+    UpdateToVelocity,
+)
+from karamelo_py.kernels.p2g import (
+    AveragedForce,
+    InternalForce,
+    MassMomentum,
+    MomentumAgain,
+    Normal,
+    SeriesBack,
+    Volumes,
+)
+from karamelo_py.kernels.passes import visit_here
+from karamelo_py.kernels.sweep import (
+    OldWeights,
+    Visit,
+    sweep_nodes,
+)
+from karamelo_py.points.kinematics import Axisymmetric, dimension
+from karamelo_py.points.transfers.xpic import XPIC
+
+
+class Insulated(NamedTuple):
+    """No heat flows between points."""
+
+
+@point_function()
+def conduct(heat, s, mode, hooks):
+    """Let heat flow between points for the length of a step; by default none does."""
+
+
+@conduct.otherwise
+def _(heat, s, mode, hooks):
+    return None
+
+
+@point_function()
+def touch(contact, s):
+    """Let solids with velocity fields of their own act on each other; by default there are none."""
+
+
+@touch.otherwise
+def _(contact, s):
+    return None
+
+
+@point_function()
+def touch_velocity(contact, s, steps):
+    """See that the velocity that deforms the points agrees with contact, where it is not v*.
+
+    `steps` is 1 when v* of this step is known, and 0 before: what touched in the last step counts.
+    """
+
+
+@touch_velocity.otherwise
+def _(contact, s, steps):
+    return None
+
+
+@entered
+def _clear_radial(kin, nodes, grids):
+    for g in range(grids.first.size):
+        if abs(grids.x0[g]) > grids.slack[g] * grids.h[g]:
+            continue
+        for n in range(grids.first[g], grids.first[g] + grids.step_x[g]):
+            if nodes.sums[n, MASS] > 0:
+                nodes.sums[n, of_momentum(kin)] = 0
+                nodes.sums[n, of_force(kin)] = 0
+                nodes.update[n, 0] = 0
+                nodes.update[n, of_change(kin)] = 0
+                nodes.velocity[n, 0] = 0
+                clear_first(field(nodes.fields, Normal), n)
+
+
+@point_function()
+def hold_axis(kin, s):
+    """Let no node on an axis of symmetry leave it; by default there is none."""
+
+
+@hold_axis.otherwise
+def _(kin, s):
+    return None
+
+
+@hold_axis.on(Axisymmetric)
+def _(kin, s):
+    # v_r = 0 at r = 0: N / r of a node there grows without bound where a point comes near. And a
+    # body that touches another on the axis has a normal along it.
+    _clear_radial(kin, s.nodes, s.grids)
+
+
+@point_function()
+def sum_series(transfer, s, mode):
+    """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
+
+
+@sum_series.otherwise
+def _(transfer, s, mode):
+    return None
+
+
+@sum_series.on(XPIC)
+def _(transfer, s, mode):
+    # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
+    dt = step_size(s)
+    sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.spans, dt)
+    for k in range(transfer.order - 1):
+        visit = Visit((SeriesTerm(k),), (SeriesBack(),), OldWeights())
+        visit_here(s, mode, visit, dt, True, True)
+        sweep_nodes(mode, ExtendSeries(), s.kin, s.nodes, s.spans, dt)
+    hold_axis(s.kin, s)
+
+
+@point_function()
+def average_volumes(averaging, s, mode, dt):
+    """Average the change of volume of the strain to come at the nodes; by default it is not."""
+
+
+@average_volumes.otherwise
+def _(averaging, s, mode, dt):
+    return None
+
+
+@average_volumes.on(FBar)
+def _(averaging, s, mode, dt):
+    visit_here(s, mode, Visit((TrialStrain(),), (Volumes(),), OldWeights()), dt, True, True)
+    sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.spans, dt)
+
+
+@point_function()
+def average_stress(averaging, s, mode):
+    """Put the averaged mean stress in the place of the points' own; by default each has its own."""
+
+
+@average_stress.otherwise
+def _(averaging, s, mode):
+    return None
+
+
+@average_stress.on(FBar)
+def _(averaging, s, mode):
+    dt = step_size(s)
+    sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.spans, dt)
+    visit_here(s, mode, Visit((AverageStress(),), (AveragedForce(),), OldWeights()), dt, True, True)
+
+
+@shared
+def sum_loss(s, mode):
+    """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
+    if field(s.nodes.fields, Rubbed) is not None:
+        sweep_nodes(mode, ClearRubbed(), s.kin, s.nodes, s.spans, step_size(s))
+    if field(s.nodes.fields, Lost) is not None:
+        sweep_nodes(mode, KeepLoss(), s.kin, s.nodes, s.spans, step_size(s))
+
+
+@shared
+def light_node(s):
+    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of a point that the node sees.
+
+    Less than one: a share below m / m_p would be less than what comes back to the node through the
+    points' velocities, and the strain of the node would run ahead of its stress.
+    """
+    clock = s.control.clock[0]
+    courant = clock.rate * s.control.values[DT] / clock.spacing
+    masses = min(dimension(s.kin) * courant * courant, 1.0)
+    return UpdateToVelocity(real(masses, s.nodes.sums[0, MASS]))
+
+
+light_node.goes_through = UpdateToVelocity.goes_through
+
+
+def _call(do: Callable, says: Callable[[Any], str | None]) -> table.Call:
+    """A row that does something; `says` tells what in a scene."""
+    do.says = says
+    return table.Call(do)
+
+
+HEAT = _call(
+    lambda s, mode, hooks: conduct(s.heat, s, mode, hooks),
+    lambda s: (
+        None
+        if isinstance(s.heat, Insulated)
+        else "heat to the nodes, its flow, temperature of the points"
+    ),
+)
+LOSS = _call(
+    lambda s, mode, hooks: sum_loss(s, mode),
+    lambda s: (
+        None
+        if field(s.nodes.fields, Lost) is None
+        else "kinetic energy that the nodes do not keep, as heat to the points"
+    ),
+)
+AVERAGED = _call(
+    lambda s, mode, hooks: average_stress(s.averaging, s, mode),
+    lambda s: (
+        "force of the averaged mean stress in one visit of the points"
+        if isinstance(s.averaging, FBar)
+        else None
+    ),
+)
+CONTACT = _call(
+    lambda s, mode, hooks: touch(s.contact, s),
+    lambda s: "contact of v*" if touch.defined(type(s.contact)) else None,
+)
+CONTACT_BEFORE = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 0), lambda s: None)
+CONTACT_AFTER = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 1), lambda s: None)
+AXIS = _call(
+    lambda s, mode, hooks: hold_axis(s.kin, s),
+    lambda s: "v_r = 0 on the axis" if hold_axis.defined(type(s.kin)) else None,
+)
+SERIES = _call(
+    lambda s, mode, hooks: sum_series(s.transfer, s, mode),
+    lambda s: "series of XPIC" if isinstance(s.transfer, XPIC) else None,
+)
+
+SUMS = table.Scatter((MassMomentum(), InternalForce()))
+MASS_AND_MOMENTUM = table.Scatter((MassMomentum(),))
+# For schemes that strain first.
+VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.Nodes(SumsToVelocity()))
+FORCE = table.Scatter((InternalForce(),), OldWeights())
+# v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
+ACCELERATE = (
+    LOSS,
+    AVERAGED,
+    HEAT,
+    table.AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS),
+    AXIS,
+    table.Nodes(Update()),
+    table.AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE),
+    CONTACT,
+)
+MOVE = (
+    table.Gather(Move()),
+    table.AtPoints(POST_GRID_TO_POINT, 1),
+    table.AtPoints(POST_ADVANCE_PARTICLES, 1),
+    table.Check(),
+)
+# The velocity of the moved points, at the nodes once more.
+MOMENTUM_AGAIN = (
+    table.Scatter((MomentumAgain(),), OldWeights()),
+    table.Nodes(MomentumToVelocity()),
+    AXIS,
+)
