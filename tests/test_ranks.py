@@ -19,7 +19,9 @@ from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run import tiles
 from karamelo_py.run.curve import along_curve
+from karamelo_py.run.part import Part
 from karamelo_py.run.plan import bytes_of_node, plan
+from karamelo_py.run.ranks import Ranks
 from karamelo_py.run.shares import SharedTiles, work_of
 from karamelo_py.run.work import Work
 from karamelo_py.scene.hub import Hub
@@ -223,3 +225,25 @@ def test_costs_are_measured(monkeypatch):
     work.done([3, 10, 4], 10)
     work.learn(SimpleNamespace(added=lambda numbers: numbers))
     assert work.costs.tolist() == [100, 50, 10]
+
+
+def test_no_process_has_the_whole(state_interpreted, tmp_path, monkeypatch):
+    """Neither to begin, nor for dumps and energies, nor when points are sorted: none gathers it."""
+    script = block(
+        2, *DUMPS, *MOVING, "compute(E, energy_balance, all)", "run(9)", ppc=3, size=(0.3, 0.2)
+    )
+    state_interpreted(script, boxes=True, out="whole")
+    account, has = Part.account, []
+
+    def gathered(self, **_):
+        raise AssertionError("the first gathers")
+
+    def noted(self):
+        has.append(sum(block.points.mass.size for block in self.setup.blocks))
+        account(self)
+
+    monkeypatch.setattr(Ranks, "gather", gathered)
+    monkeypatch.setattr(Part, "account", noted)
+    state_interpreted(script, boxes=True, ranks=3, out="parts")
+    same_files(tmp_path / "whole", tmp_path / "parts")
+    assert has and max(has) < 54
