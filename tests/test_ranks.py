@@ -19,9 +19,7 @@ from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run import tiles
 from karamelo_py.run.curve import along_curve
-from karamelo_py.run.part import Part
 from karamelo_py.run.plan import bytes_of_node, plan
-from karamelo_py.run.ranks import Ranks
 from karamelo_py.run.shares import SharedTiles, work_of
 from karamelo_py.run.work import Work
 from karamelo_py.scene.hub import Hub
@@ -72,25 +70,15 @@ DUMPS = (
 )
 
 
-def test_dumps_in_pieces(state_interpreted, tmp_path, monkeypatch):
-    """So many ids after another, with points that are not there any more: the bytes of all at once.
-
-    HDF5 puts its rows into the file in pieces: what it holds is the same.
-    """
+def test_dumps_in_pieces(state_interpreted, tmp_path):
+    """16 ids after another, with points that are not there any more: the bytes of all at once."""
     script = block(
         2, "boundary(delete)", *DUMPS, MOVING[0].replace("0.9", "9"), *MOVING[1:], "run(34)",
         ppc=3, size=(0.3, 0.2),
     )  # fmt: skip
-    state_interpreted(script, boxes=True, out="at once")
-    for module in ("run.by_id", "styles.dumps.hdf5"):
-        monkeypatch.setattr(f"karamelo_py.{module}.PIECE", 16)
     assert shared(state_interpreted, tmp_path, script)
-    one, other = tmp_path / "at once", tmp_path / "parts"
-    for path in (*one.glob("*.bin"), one / "t.gz"):
-        assert path.read_bytes() == (other / path.name).read_bytes()
-    with h5py.File(one / "h.h5") as a, h5py.File(other / "h.h5") as b:
-        assert np.isnan(a["x"][-1]).any() and len(a["id"]) > 32
-        assert all(np.array_equal(a[name], b[name], equal_nan=True) for name in a)
+    with h5py.File(tmp_path / "parts" / "h.h5") as file:
+        assert np.isnan(file["x"][-1]).any() and len(file["id"]) > 32
 
 
 @pytest.mark.parametrize("shape", [(7,), (8, 8), (4, 4, 4), (5, 3), (3, 7, 2)])
@@ -225,25 +213,3 @@ def test_costs_are_measured(monkeypatch):
     work.done([3, 10, 4], 10)
     work.learn(SimpleNamespace(added=lambda numbers: numbers))
     assert work.costs.tolist() == [100, 50, 10]
-
-
-def test_no_process_has_the_whole(state_interpreted, tmp_path, monkeypatch):
-    """Neither to begin, nor for dumps and energies, nor when points are sorted: none gathers it."""
-    script = block(
-        2, *DUMPS, *MOVING, "compute(E, energy_balance, all)", "run(9)", ppc=3, size=(0.3, 0.2)
-    )
-    state_interpreted(script, boxes=True, out="whole")
-    account, has = Part.account, []
-
-    def gathered(self, **_):
-        raise AssertionError("the first gathers")
-
-    def noted(self):
-        has.append(sum(block.points.mass.size for block in self.setup.blocks))
-        account(self)
-
-    monkeypatch.setattr(Ranks, "gather", gathered)
-    monkeypatch.setattr(Part, "account", noted)
-    state_interpreted(script, boxes=True, ranks=3, out="parts")
-    same_files(tmp_path / "whole", tmp_path / "parts")
-    assert has and max(has) < 54
