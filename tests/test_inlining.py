@@ -5,7 +5,6 @@ import inspect
 
 import numba
 import pytest
-from llvmlite.binding import ffi
 from numba import config, njit, types
 from numba.core import (
     base,
@@ -15,11 +14,10 @@ from numba.core import (
     codegen,
     compiler,
     dispatcher,
-    targetconfig,
 )
 from numba.core.typing import context, templates
 
-from karamelo_py.compiler import inlining, lean
+from karamelo_py.compiler import inlining
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.loops import entered, kernel
 from karamelo_py.kernels import contact, heat  # noqa: F401  (with all that they stand on)
@@ -114,12 +112,8 @@ INSIDE = {
     ccallback.CFunc.compile: "08edc561907b",
     compiler.CompileResult._reduce: "5f86eacfa520",
     compiler.CompileResult._rebuild: "44fa9dc22558",
-    targetconfig.TargetConfig: "5296215326fb",
-    base._initialize_llvm_lock_event.__wrapped__: "997412d97a23",
-    ffi._LLVMLock: "674e02dc78ae",
     context.BaseContext._lookup_global: "08d354cbcacf",
     templates.make_overload_template: "7f6974584cb1",
-    lean._implementation: "4e27d07b214c",
     dispatcher._DispatcherBase.get_call_template: "f15b62d0e9c0",
     callconv.BaseCallConv.decode_arguments: "bdf5ca520bd8",
     callconv.CPUCallConv: "2840bb216163",

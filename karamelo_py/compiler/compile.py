@@ -10,7 +10,6 @@ import numba
 from numba import config
 from numba.extending import intrinsic, overload
 
-from karamelo_py.compiler import inlining, lean  # noqa: F401
 from karamelo_py.compiler.choices import (
     SPELLED,
     asks,

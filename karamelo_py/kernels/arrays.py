@@ -211,7 +211,7 @@ CLOCK = np.dtype(
     [
         ("fixed_dt", np.float64),  # step of set_dt, or 0
         ("dt_factor", np.float64),  # share of the stable step of waves
-        ("dt_factor_moving", np.float64),  # the same once points have moved: see kernels.step
+        ("dt_factor_moving", np.float64),  # the same once points have moved: see kernels.clock
         ("heat_factor", np.float64),  # of that of conduction
         ("end_time", np.float64),
         ("last_dt", np.float64),  # of the last step; of the present one before there was any
