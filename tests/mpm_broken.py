@@ -1,5 +1,6 @@
 """A package of styles that are wrong, each in its way; scripts call them in small letters."""
 
+import sys
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.fields import scalar
@@ -123,6 +124,16 @@ class Stop(Group):
 class Weigh(Group):
     def initial_integrate(self, points):
         points.mass[:] = 0
+
+
+class Leaving(Group):
+    def initial_integrate(self, points):
+        sys.exit("bye")
+
+
+class Silenced(Group):
+    def initial_integrate(self, points):
+        raise SystemExit(0)
 
 
 class Gauge(Compute):

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.xdist_group("faults")
 
 FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
-    "silent stop weigh bare formless oneword clashing first again doubled lost",
+    "silent stop weigh bare formless oneword clashing first again doubled lost leaving silenced",
     "compute": "gauge",
     "material": "motionless growing raising short uncompiled hiding double",
     "strength": "forgetful",
@@ -205,6 +205,8 @@ def scene(**lines):
     [
         ({"fix": "fix(s, spring, all)"}, 7, "fix spring", "initial_integrate: NameError: name 'mi"),
         ({"fix": "fix(s, weigh, all)"}, 7, "fix weigh", "initial_integrate: ValueError: assign"),
+        ({"fix": "fix(s, leaving, all)"}, 7, "fix leaving", "initial_integrate: SystemExit: bye"),
+        ({"fix": "fix(s, silenced, all)"}, 7, "fix silenced", "initial_integrate: SystemExit: 0"),
         ({"dump": "dump(t, all, torn, 1, t)"}, 9, "dump torn", "write: KeyError: 'lost' (mpm_bro"),
         ({"material": "material(m, motionless, 1)"}, 4, "material motionless", "advance is not "),
         ({"material": "material(m, raising, 1)"}, 4, "material raising", "name 'unknown' is not"),

@@ -25,7 +25,7 @@ from karamelo_py.app.options import (
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
 from karamelo_py.run.crew import Crew, launched
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError, nearest, render_message
+from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
 
 ERROR = 1
 SIGNALLED = 128  # as a shell reports a program that a signal ended: this and its number
@@ -63,21 +63,19 @@ def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
     """How something ends, with what is left to be said."""
     try:
         return Outcome(act())
-    except SystemExit as done:  # argparse has shown what was asked for
-        return Outcome(int(done.code or 0))
     except KeyboardInterrupt:
         return Outcome(INTERRUPTED, render_message("error", "interrupted"))
     except BrokenPipeError:
         # Whoever read our output has gone; what was written stays.
         sys.stderr.close()
         return Outcome(ERROR)
-    except Exception as error:
+    except FAILURES as error:
         if debugging:
             traceback.print_exc()
         return Outcome(ERROR, _rendered(error))
 
 
-def _rendered(error: Exception) -> str:
+def _rendered(error: BaseException) -> str:
     """What the user is told; no traceback, also where the fault is ours or of a plug-in."""
     if isinstance(error, ScriptError):
         return error.render()
@@ -127,7 +125,10 @@ def _dispatch(arguments: list[str]) -> int:
     if arguments[0] in ("run", "check"):
         arguments = _one_file(arguments)
     parser, commands = _parser(arguments[0])
-    options, surplus = parser.parse_known_args(arguments)
+    try:
+        options, surplus = parser.parse_known_args(arguments)
+    except SystemExit:  # argparse has shown what was asked for
+        return 0
     if surplus:
         raise _surplus(surplus, arguments[0], commands.choices.get(arguments[0], parser))
     size, rank = launched()

@@ -15,7 +15,7 @@ from numba.core.errors import NumbaError
 from karamelo_py.compiler.compile import Undefined
 from karamelo_py.compiler.trace import line_that_asks
 from karamelo_py.language import registry
-from karamelo_py.script.errors import Place, Quit, ScriptError
+from karamelo_py.script.errors import FAILURES, Place, Quit, ScriptError
 
 TRACEBACK = "; --debug shows the traceback"
 
@@ -42,7 +42,7 @@ def told(name: str, where: str, code: Any, place: Place | None) -> Iterator[None
         yield
     except KNOWN:
         raise
-    except Exception as error:
+    except FAILURES as error:
         what = f"{cause_of(error)}{place_in(code, error)}"
         raise fault(name, f"{where}: {what}", place, TRACEBACK) from error
 
@@ -73,17 +73,17 @@ def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptEr
     return error
 
 
-def is_of_numba(error: Exception) -> bool:
+def is_of_numba(error: BaseException) -> bool:
     """Whether Numba refuses to compile something."""
     return isinstance(error, NumbaError) or type(error).__module__.startswith("numba.")
 
 
-def cause_of(error: Exception) -> str:
+def cause_of(error: BaseException) -> str:
     """What went wrong, in one line; of Numba, the cause that it gives."""
     if isinstance(error, Undefined):
         return str(error)
     if not is_of_numba(error):
-        return f"{type(error).__name__}: {error}"
+        return ": ".join(filter(None, (type(error).__name__, str(error))))
     text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
     inner = text.rpartition("raised a specific error:")[2] or text
     lines = (line.strip() for line in inner.splitlines())
@@ -97,7 +97,7 @@ def cause_of(error: Exception) -> str:
     return text
 
 
-def places_of(error: Exception) -> list[tuple[str, int]]:
+def places_of(error: BaseException) -> list[tuple[str, int]]:
     """Files and lines that took part in an exception, the innermost first.
 
     Of Numba those that its text names, and the functions that it was compiling.

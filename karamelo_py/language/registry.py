@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py import __version__
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import FAILURES, ScriptError, meant
 from karamelo_py.script.other_programs import instead
 
 PREFIX = "karamelo_py."
@@ -105,7 +105,7 @@ def find(family: str, name: str) -> Any:
             _loaded[key] = entry.load()
         except ScriptError:
             raise
-        except Exception as error:  # A plug-in may fail in any way.
+        except FAILURES as error:
             raise ScriptError(
                 f"{family} '{name}' of {_origin(entry)} cannot be loaded: "
                 f"{type(error).__name__}: {error}",

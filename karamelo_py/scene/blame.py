@@ -11,6 +11,7 @@ from karamelo_py.language import registry
 from karamelo_py.language.faults import KNOWN, TRACEBACK, cause_of, fault, places_of
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.laws import law_kind
+from karamelo_py.script.errors import FAILURES
 
 
 class Part(NamedTuple):
@@ -70,7 +71,7 @@ def blamed(hub: Scene, usual: Part | None = None) -> Iterator[None]:
         yield
     except KNOWN:
         raise
-    except Exception as error:
+    except FAILURES as error:
         if isinstance(error, Undefined):
             own = [part for part in foreign_parts(hub) if part.kind in error.classes]
             places = [(part, "") for part in own]

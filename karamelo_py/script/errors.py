@@ -30,6 +30,10 @@ class Quit(Exception):
     """The statement quit: the script ends here, and that is fine."""
 
 
+# What code that is not ours may raise: exit() in it would end the program without a word.
+FAILURES = (Exception, SystemExit)
+
+
 class Pause(Exception):
     """The script waits in front of a run."""
 

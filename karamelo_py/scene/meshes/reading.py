@@ -11,7 +11,7 @@ import meshio
 import numpy as np
 
 from karamelo_py.scene.meshes.geometry import refuse_commands
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import FAILURES, ScriptError, meant
 
 GEOMETRIES = (".geo", ".geo_unrolled")
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
@@ -66,7 +66,7 @@ def _by_meshio(path: Path, name: str | None = None) -> meshio.Mesh:
         ):
             warnings.simplefilter("ignore")
             mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:
+    except FAILURES as error:
         unknown = "Could not deduce" in str(error)
         reason = "its ending tells no format" if unknown else _reason(error)
         raise ScriptError(

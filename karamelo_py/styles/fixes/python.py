@@ -18,7 +18,7 @@ from karamelo_py.language.signature import Argument
 from karamelo_py.scene.group import AnyGroup, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import FAILURES, ScriptError, nearest
 
 MOMENTS = tuple(STAGES)
 # What a function may keep something in.
@@ -58,7 +58,7 @@ class PythonFunction:
             if beside.is_file() and not _is_of(sys.modules.get(module), beside):
                 sys.modules.pop(module, None)
             found = import_module(module)
-        except (Exception, SystemExit) as error:  # a module may fail in any way
+        except FAILURES as error:
             raise ScriptError(
                 f"the module {module} cannot be imported: {cause_of(error)}", place=argument.place
             ) from error
@@ -173,7 +173,7 @@ class Python(Fix):
             given = self.function(view)
         except KNOWN:
             raise
-        except (Exception, SystemExit) as error:  # exit() would end the program without a word
+        except FAILURES as error:
             what = f"{cause_of(error)}{place_in(self.function, error)}"
             told = ScriptError(
                 f"fix python: {_name(self.function)}: {what}",
