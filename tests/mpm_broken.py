@@ -95,13 +95,22 @@ class Viewless(Group):
     def initial_integrate(self): ...
 
 
+class Orphan(Fix):
+    def __init__(self, hub, group: ParticleGroup):
+        self.formulas = (Expression(1.0),)
+
+    def initial_integrate(self, points): ...
+
+
 class Idle(Fix):
     published = ()
 
     def initial_integrat(self, points): ...
 
 
-class Misspelt(Idle):
+class Misspelt(Group):
+    published = ()
+
     def initial_integrate(self, points): ...
 
     def post_gird_to_point(self, points): ...

@@ -25,7 +25,8 @@ pytestmark = pytest.mark.xdist_group("faults")
 
 FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
-    "silent stop weigh bare formless oneword clashing first again doubled lost leaving silenced",
+    "silent stop weigh bare formless oneword clashing first again doubled lost leaving silenced "
+    "orphan",
     "compute": "gauge",
     "material": "motionless growing raising short uncompiled hiding double",
     "strength": "forgetful",
@@ -104,6 +105,16 @@ def test_a_fix_that_cannot_be_meant(hub, style, message):
     assert f"tell the author of {style}" in text
 
 
+def test_a_fix_that_forgets_its_base(hub):
+    with pytest.raises(ScriptError) as caught:
+        run(hub, "\nfix(s, orphan, all)")
+    assert re.match(
+        r"in\.wrong:2:1: error: fix orphan \(of mpm-broken 0\.1\): initial_integrate acts on a "
+        r"group, .* super\(\).__init__\(hub, group\) \(mpm_broken\.py:\d+\)\n",
+        caught.value.render(),
+    )
+
+
 def test_a_column_belongs_to_one_field(hub):
     with pytest.raises(ScriptError, match=r"hiding .*: the column 'seq' is one of every scene"):
         run(hub, "material(m, hiding, 1)")
@@ -123,8 +134,8 @@ def test_a_column_belongs_to_one_field(hub):
         ("idle)", "idle has no hook and no refresh: it does nothing"),
         ("idle)", "initial_integrat, which is no hook"),
         ("idle)", "meant initial_integrate, or begins"),
-        ("misspelt)", "post_gird_to_point, which is no hook and is never called"),
-        ("misspelt)", "meant post_grid_to_point, or begins the name with _"),
+        ("misspelt, all)", "post_gird_to_point, which is no hook and is never called"),
+        ("misspelt, all)", "meant post_grid_to_point, or begins the name with _"),
         ("silent, all)", "says in `published` that it publishes, and none of its hooks does: s_x"),
     ],
 )

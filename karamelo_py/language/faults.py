@@ -5,7 +5,7 @@ import linecache
 import re
 import sysconfig
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -126,6 +126,12 @@ def steps_to(error: BaseException) -> list[str]:
         for frame in traceback.extract_tb(error.__traceback__)
         if not frame.filename.startswith(_OTHERS)
     ]
+
+
+def place_of(function: Callable) -> str:
+    """`` (spring.py:12)``: where a function in Python begins."""
+    code = function.__code__
+    return f" ({Path(code.co_filename).name}:{code.co_firstlineno})"
 
 
 def place_in(code: Any, error: BaseException) -> str:

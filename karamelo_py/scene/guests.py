@@ -11,7 +11,7 @@ from typing import Any
 from karamelo_py.compiler.fields import columns_of
 from karamelo_py.kernels import table
 from karamelo_py.kernels.hooks import ACTS_ON, STAGES, CompiledHook
-from karamelo_py.language.faults import fault, told
+from karamelo_py.language.faults import fault, place_of, told
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.fields import ABSENT_AT_POINTS, PARTICLE_NAMES
 from karamelo_py.points.kinematics import KINEMATICS
@@ -60,6 +60,12 @@ def check_fix(hub: Scene, fix: Fix) -> None:
 def _faults_of_hooks(fix: Fix) -> Iterator[str]:
     """What is wrong with the hooks of a fix."""
     compiled = {}
+    acts = next((moment for moment in STAGES if hasattr(fix, moment)), None)
+    if acts and fix.group is None and not fix.for_method:
+        yield (
+            f"{acts} acts on a group, and the fix has none: its __init__ has to call "
+            f"super().__init__(hub, group){place_of(type(fix).__init__)}"
+        )
     for moment in STAGES:
         hook = getattr(fix, moment, None)
         if isinstance(hook, CompiledHook):
