@@ -67,6 +67,16 @@ def test_what_has_been_run_is_sure(folder, capsys):
     assert "-var N 20" in out
 
 
+def test_a_misspelt_word_ends_the_study(folder, capsys):
+    (folder / "in.law").write_text(
+        'word = "linear"\n' + SCRIPT.replace("FLIP, linear", "FLIP, word")
+    )
+    advise("-var", "word=linaer,linear", status=1)
+    captured = capsys.readouterr()
+    assert captured.err.count("error: ") == 1 and "unknown basis style 'linaer'" in captured.err
+    assert "this is the script with N = 10, word = linaer" in captured.err and not captured.out
+
+
 def test_errors_that_stop_falling_are_no_promise(folder, capsys):
     """Order 4 that ends at 0.03: the last order is 1, and it is told that it may be 0 next."""
     advise("-var", "slope=4", "-var", "least=0.03", "-run", status=1)

@@ -67,6 +67,30 @@ def test_failures_have_reasons(folder):
     assert "the step is 3 times the stable one" in table["message"][1]
 
 
+def test_a_mistake_of_the_script_is_no_failure(folder, capsys):
+    """What says that the step is too long is one."""
+    (folder / "in.bar").write_text(SCRIPT.replace("linear, 1)", "linear, share)") + "share = 1\n")
+    words = ["-var", "factor=0.5,3", "-var", "push=0", "-o", "map.png"]
+    assert main(["stability", "in.bar", *words]) == 1
+    captured = capsys.readouterr()
+    assert (
+        captured.err.count("error: ") == 1 and "method(tlmpm, FLIP, linear, share)" in captured.err
+    )
+    assert "this is the script with factor = " in captured.err
+    assert not captured.out and not (folder / "map.png").exists()
+
+
+def test_steps_beyond_those_that_conduction_bears_have_failed(folder):
+    text = SCRIPT.replace("linear, 1)", "linear, 1, thermo-mechanical)", 1)
+    text = text.replace("100, 0)", "100, 0, 1, 1)").replace(
+        "set_dt(factor*0.1)", "dt_factor(factor)"
+    )
+    (folder / "in.bar").write_text(text, encoding="utf-8")
+    words = ["-var", "factor=0.5,30", "-var", "push=0", "-o", "map.svg"]
+    assert main(["stability", "in.bar", *words]) == 0
+    assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["stable", "failed"]
+
+
 def test_what_limits_the_step_stands_in_the_map(folder):
     """usl by light nodes, where the step is a share of the stable one; set_dt is no limit."""
     text = SCRIPT.replace("set_dt(factor*0.1)", "dt_factor(factor)\nscheme(usl)")

@@ -54,7 +54,7 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     table = pandas.read_csv(folder / "sweep.csv")
     assert list(table["N"]) == [2, 2, 4, 4] and list(table["kind"]) == ["linear", "cubic"] * 2
     good, bad = table[table.kind == "linear"], table[table.kind == "cubic"]
-    assert (good.status == "done").all() and (bad.status == "failed").all()
+    assert (good.status == "done").all() and (bad.status == "refused").all()
     # Free flight at speed 3 from a centre of 1.5: 5 lines, at 0, 0.01, ... 0.04.
     assert good["v_x"].to_numpy() == pytest.approx(3)
     assert good["mean:c_x"].to_numpy() == pytest.approx(1.5 + 3 * 0.02)
@@ -69,7 +69,11 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     assert (good["bytes_per_particle"] > 8 * 5).all() and (good["dt"] == 0.01).all()
     assert bad["reason"].str.contains("unknown basis style 'cubic'").all()
     assert (folder / good["folder"].iloc[0] / "log.mpm").exists()
-    assert "2 of 4 runs are done, 2 are not" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "2 of 4 runs are done, 2 are not" in out
+    last = out.splitlines()[-1]
+    assert last.startswith("2 of them were refused before any step, by a mistake of the script: ")
+    assert last.count("unknown basis style 'cubic'") == 1
     beside = json.loads((folder / "sweep.json").read_text())
     assert beside["threads"] == 1 and beside["versions"]["numba"] and beside["processor"]
 
@@ -81,6 +85,12 @@ def test_a_run_that_breaks_off_has_no_values(folder):
     assert good["v_x"] == "3" and bad["status"] == "failed" and "moves by 6 cells" in bad["reason"]
     assert read_log(folder / bad["folder"])["v_x"].size > 0  # though it has a log
     assert bad["v_x"] == bad["max:c_x"] == ""
+
+
+def test_a_sweep_of_which_nothing_is_done_fails(folder, capsys):
+    assert main(["sweep", "in.flight", "-var", "kind=linaer,lin"]) == 1
+    assert "error: no run is done: method: unknown basis style 'linaer'" in capsys.readouterr().err
+    assert [row["status"] for row in records.read(folder / "sweep.csv")] == ["refused"] * 2
 
 
 def test_what_is_known_is_not_run_again(folder, capsys):

@@ -18,12 +18,15 @@ from typing import Any
 
 import karamelo_py
 from karamelo_py.output.files import write_whole
+from karamelo_py.script.errors import ScriptError
 
 KEPT = "case.json"
 # Facts are indented by 2, the parts of the time by 4.
 _FACT = re.compile(r"^( {2}| {4})(\S.*?) {2,}(\S.*)$")
 _ERROR = re.compile(r"(?:^|: )error: (.*)")
 _NOT_ITS_OWN = re.compile(r"internal error|another run is writing")
+# Before the first step as well, and no mistake of a script: larger scenes, longer steps.
+_TOO_MUCH = re.compile(r"memory|times the stable one")
 
 
 @dataclass
@@ -33,7 +36,8 @@ class Outcome:
     Attributes
     ----------
     status
-        ``done``, ``failed`` (the script ended with an error), ``too long`` or ``killed``.
+        ``done``, ``failed`` (the run ended with an error), ``refused`` (by a mistake of the script,
+        before any step), ``too long`` or ``killed``.
     reason
         Why, of what did not end well; the message of the program.
     facts
@@ -46,6 +50,11 @@ class Outcome:
     reason: str = ""
     facts: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
+
+    @property
+    def complaint(self) -> str:
+        """All that the program said of what went wrong."""
+        return (self.folder / "err.txt").read_text(encoding="utf-8", errors="replace")
 
 
 # What is measured of every run beside the log, with its meaning.
@@ -63,6 +72,29 @@ COLUMNS = {
     "peak_memory_mib": "largest resident memory of the process, MiB",
     "wall_s": "seconds of the whole process",
 }
+
+
+class Refused(ScriptError):
+    """A variant that the program refuses by a mistake of its script, told in the program's words.
+
+    Parameters
+    ----------
+    case
+        Values of its variables.
+    outcome
+        What became of it.
+    """
+
+    def __init__(self, case: Mapping[str, str], outcome: Outcome):
+        super().__init__(outcome.reason)
+        lines = outcome.complaint.rstrip().splitlines()
+        first = next((k for k, line in enumerate(lines) if _ERROR.search(line)), 0)
+        said = ", ".join(f"{name} = {value}" for name, value in case.items())
+        self._whole = "\n".join([*lines[first:], f"this is the script with {said}"])
+
+    def render(self) -> str:
+        """The whole message, and the values of the variables."""
+        return self._whole
 
 
 class Stop(Exception):
@@ -109,8 +141,8 @@ class Launch:
             return None
         if found.get("key") != self.key(case):
             return None
-        # Somebody else's doing, which the next time may not come.
-        if found["status"] == "killed" or _NOT_ITS_OWN.search(found["reason"]):
+        # Somebody else's doing, which the next time may not come, or a file that was missing.
+        if found["status"] in ("killed", "refused") or _NOT_ITS_OWN.search(found["reason"]):
             return None
         # A run that was given up is tried again when it may take longer.
         if found["status"] == "too long" and (self.limit or 1e300) > found["facts"]["wall_s"]:
@@ -172,8 +204,12 @@ class Launch:
             reason = f"ended by signal {-process.returncode}"
             return Outcome("killed", reason, facts, folder)
         if process.returncode:
-            complaint = (folder / "err.txt").read_text(encoding="utf-8", errors="replace")
-            return Outcome("failed", reason_in(complaint), facts, folder)
+            outcome = Outcome("failed", "", facts, folder)
+            outcome.reason = reason_in(outcome.complaint)
+            others = _NOT_ITS_OWN, _TOO_MUCH
+            if "points" not in facts and not any(each.search(outcome.reason) for each in others):
+                outcome.status = "refused"
+            return outcome
         return Outcome("done", "", facts, folder)
 
     def _wait(self, process: subprocess.Popen, begun: float) -> tuple[float | None, bool]:

@@ -76,7 +76,7 @@ def look_at(row: Mapping[str, str], folder: Path, over: str, column: str, within
     warned = any(_WARNED.search(line) for line in lines)
     log = read_log(place)
     if not log or row["status"] in ("too long", "killed"):
-        word = "refused" if row["status"] == "failed" else "unknown"
+        word = "refused" if row["status"] in ("refused", "failed") else "unknown"
         return Kept(word, np.nan, tuple(dict.fromkeys(causes)), warned)
     for name in (over, column):
         if name not in log:

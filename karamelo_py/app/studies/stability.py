@@ -30,9 +30,9 @@ from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
 Maps where a script is stable over one or two of its variables: stable, growing (its energy exceeds
-a bound), or failed, with the reason. Edges are searched by halves: cells between like ones are not
-run. The table is written beside the picture (map.csv), and says which cells were run; -var with one
-value is passed on.
+a bound), or failed, with the reason. A mistake of the script ends the study. Edges are searched by
+halves: cells between like ones are not run. The table is written beside the picture (map.csv), and
+says which cells were run; -var with one value is passed on.
 
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
 
@@ -86,7 +86,7 @@ def run(options: Any) -> int:
     energy = energy_column(options.energy, logged(options.script), options.script)
     table = out.with_suffix(".csv")
     items = [records.Recorded(f"max:{energy}")]
-    study = Study(launch, out.with_suffix(""), items, jobs, again=options.again)
+    study = Study(launch, out.with_suffix(""), items, jobs, again=options.again, strict=True)
     records.describe(
         table, script=str(options.script), variables=values, energy=energy, bound=options.bound,
         threads=launch.threads, jobs=jobs,

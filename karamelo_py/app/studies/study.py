@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.logs import read_log
-from karamelo_py.app.studies.case import Launch, Outcome, folder_name
+from karamelo_py.app.studies.case import Launch, Outcome, Refused, folder_name
 from karamelo_py.app.studies.records import Recorded, row
 from karamelo_py.output.console import duration
 from karamelo_py.script.terms import number_of
@@ -39,6 +39,8 @@ class Study:
         Whether to run also what has been run before.
     title
         Heads the table on the terminal.
+    strict
+        Whether a variant that is refused ends the study.
 
     Attributes
     ----------
@@ -59,6 +61,7 @@ class Study:
         *,
         again: bool = False,
         title: str = "",
+        strict: bool = False,
     ):
         self.launch = launch
         self.folder = folder
@@ -66,6 +69,7 @@ class Study:
         self.jobs = max(1, jobs)
         self.again = again
         self.title = title
+        self.strict = strict
         self.rows: dict[tuple[str, ...], dict[str, Any]] = {}
         self.names: list[str] = []
         self.ran = 0
@@ -76,6 +80,8 @@ class Study:
 
         Raises
         ------
+        Refused
+            For a variant that is refused, in a strict study.
         KeyboardInterrupt
             When the user interrupts; the runs in progress are taken down, finished ones are kept.
         """
@@ -136,6 +142,8 @@ class Study:
         return None
 
     def _put(self, case: Mapping[str, str], outcome: Outcome) -> None:
+        if self.strict and outcome.status == "refused":
+            raise Refused(case, outcome)
         found = row(case, outcome, self.items, self.folder.parent)
         lacking = [item for item in self.items if found[item.word] is None]
         if outcome.status == "done" and lacking:
@@ -302,7 +310,7 @@ def results_table(
     table.add_column("status", overflow="fold", min_width=6)
     for k, each in enumerate(rows):
         end = each["status"] + (f": {each['reason']}" if each["reason"] else "")
-        style = {"done": "green", "failed": "red"}.get(each["status"], "yellow")
+        style = {"done": "green", "failed": "red", "refused": "red"}.get(each["status"], "yellow")
         cells = [Text(values[name][k]) for name in (*names, *columns)]
         table.add_row(*cells, Text(end if len(end) < 60 else end[:59] + "…", style=style))
     for case, state in running:

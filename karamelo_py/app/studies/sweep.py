@@ -24,9 +24,9 @@ Runs a script with every combination of values of its variables, and writes one 
   karamelo-py sweep in.file -var N=10,20,40 -var basis=linear,quadratic-spline -record err,max:Etot
 
 Each run has a folder of its own, named after its values, in a folder named after the table. A run
-that fails is recorded with its reason and stops nothing. An interrupted sweep goes on where it
-stopped when the same command is given again. Processor, threads and versions are written beside
-the table (sweep.json)."""
+that fails is recorded with its reason and stops nothing; where none is done, the exit status is 1.
+An interrupted sweep goes on where it stopped when the same command is given again. Processor,
+threads and versions are written beside the table (sweep.json)."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -80,6 +80,11 @@ def run(options: Any) -> int:
         raise
     records.write(out, rows)
     tell(rows, values, items, study, out)
+    if not any(row["status"] == "done" for row in rows):
+        raise ScriptError(
+            f"no run is done: {rows[0]['reason']}",
+            hint=f"{out.parent / rows[0]['folder'] / 'err.txt'} has all that it said",
+        )
     return 0
 
 
@@ -99,3 +104,9 @@ def tell(rows: list, values: dict, items: list, study: Study, out: Path) -> None
         + (f"; {old} were known" if old > 0 else "")
         + f"; the table is {out}"
     )
+    refused = [row["reason"] for row in rows if row["status"] == "refused"]
+    if refused and done:
+        print(
+            f"{len(refused)} of them {'was' if len(refused) == 1 else 'were'} refused before any "
+            "step, by a mistake of the script: " + "; ".join([*dict.fromkeys(refused)][:3])
+        )
