@@ -235,6 +235,26 @@ def test_a_text_of_one_line(tmp_path, monkeypatch):
         Simulation("dimensio(1, 0, 1, 0.1)")
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"threads": 0}, "threads=0 is not a number of threads\nexpected: 1, 2, ..., or None"),
+        ({"threads": -3}, "threads=-3 is not a number"),
+        ({"threads": "x"}, "threads='x' is not a number"),
+        ({"threads": True}, "threads=True is not a number"),
+        ({"out": "taken"}, 'cannot write to .*taken: .*\nexpected: a folder, .*\n.*out="files" is'),
+        ({"out": "taken/files"}, "cannot write to .*files: "),
+        ({"out": 3}, "out=3 is no name of a folder"),
+        ({"script": 3}, "3 is no script\nexpected: the name of a script, or its text"),
+    ],
+)
+def test_what_it_is_given_wrongly(tmp_path, monkeypatch, given, message):
+    monkeypatch.chdir(tmp_path)
+    Path("taken").write_text("")
+    with pytest.raises(SimulationError, match=message):
+        Simulation(**({"script": "a = 1"} | given))
+
+
 def test_two_in_one_folder(tmp_path):
     """They are told; when the first is closed, or gone, the second may."""
     first = Simulation(out=tmp_path / "files")

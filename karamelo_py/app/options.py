@@ -21,14 +21,14 @@ def threads_option(text: str) -> int | None:
     """The value of --threads: a number, or None for auto."""
     if text == "auto":
         return None
-    if not text.isdigit() or int(text) < 1:
+    if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is not a number of threads (1, 2, ... or auto)")
     return int(text)
 
 
 def positive(text: str) -> int:
     """A whole number of at least 1."""
-    if not text.isdigit() or int(text) < 1:
+    if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
     return int(text)
 
@@ -56,6 +56,32 @@ def add_output_options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def make_folder(folder: Path, option: str) -> None:
+    """Make a folder for the files of a scene, unless it is there.
+
+    Parameters
+    ----------
+    folder
+        Its path.
+    option
+        How one is named: ``-out {}``.
+
+    Raises
+    ------
+    ScriptError
+        If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        name = "files" if Path(folder.name).exists() else folder.name
+        raise ScriptError(
+            f"cannot write to {folder}: {error.strerror}",
+            expected="a folder, or the name of one that can be made",
+            hint=f"{option.format(name)} is a folder in this one",
+        ) from error
+
+
 def direct(hub: Hub, options: argparse.Namespace) -> None:
     """Send the files of a scene where the options say.
 
@@ -65,15 +91,8 @@ def direct(hub: Hub, options: argparse.Namespace) -> None:
         If the folder cannot be made, or that of the log is not there.
     """
     if options.out is not None:
-        try:
-            if not hub.checking:
-                options.out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ScriptError(
-                f"cannot write to {options.out}: {error.strerror}",
-                expected="a folder, or the name of one that can be made",
-                hint=f"-out {options.out.name or 'run'} is a folder in this one",
-            ) from error
+        if not hub.checking:
+            make_folder(options.out, "-out {}")
         hub.folder = options.out.absolute()
     if options.log is not None:
         hub.output.log.file = options.log

@@ -9,6 +9,7 @@ import os
 import re
 import sys
 import warnings
+from argparse import ArgumentTypeError
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
@@ -17,6 +18,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from karamelo_py.app.options import make_folder, threads_option
 from karamelo_py.app.shown import Picture, Table
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
@@ -29,6 +31,7 @@ from karamelo_py.script.errors import Pause, Quit, ScriptError, nearest
 from karamelo_py.script.expressions import Expression
 from karamelo_py.script.parser import parse, parse_text
 
+SCRIPT = "the name of a script, or its text: statements, as in name = 1"
 _folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
 
 
@@ -86,7 +89,8 @@ class Simulation:
     Raises
     ------
     SimulationError
-        For a wrong script; it carries the message and the place that the command line shows.
+        For a wrong script, number of threads or folder; it carries the message and the place
+        that the command line shows.
 
     Notes
     -----
@@ -118,16 +122,16 @@ class Simulation:
         if not alone:
             _refuse_copies()
         self.hub = hub = Hub(Console() if verbose else _Quiet())
-        hub.settings.threads = threads
         hub.settings.trusts = trust_geometries
         hub.pausing = True
         hub.output.log.rows = []
         hub.output.writes = out is not None
-        if out is not None:
-            hub.folder = self._claimed(Path(out).absolute())
         self._numbers = itertools.count(1)
         self._name = "a scene"
         try:
+            hub.settings.threads = _threads(threads)
+            if out is not None:
+                hub.folder = self._claimed(out)
             presets = {name: _said(value) for name, value in variables.items()}
             self._interpreter = Interpreter(hub, presets)
             if script is not None:
@@ -135,12 +139,15 @@ class Simulation:
         except ScriptError as error:
             _tell(error)
 
-    def _claimed(self, folder: Path) -> Path:
-        folder.mkdir(parents=True, exist_ok=True)
+    def _claimed(self, out: str | PathLike) -> Path:
+        if not isinstance(out, (str, PathLike)):
+            raise ScriptError(f"out={out!r} is no name of a folder", hint='out="files"')
+        folder = Path(out).absolute()
+        make_folder(folder, 'out="{}"')
         if folder in _folders:
             gc.collect()  # one that is not in use any more
         if folder in _folders:
-            raise SimulationError(
+            raise ScriptError(
                 f"another simulation writes to {folder}",
                 expected="a folder of its own for each, or close() for the other",
             )
@@ -148,6 +155,10 @@ class Simulation:
         return folder
 
     def _read(self, script: str | PathLike) -> None:
+        if not isinstance(script, (str, PathLike)):
+            raise ScriptError(
+                f"{script!r} is no script", expected=SCRIPT, hint="variables by name, as in N=3"
+            )
         there = os.path.exists(script)  # False for what is too long for a name
         is_text = isinstance(script, str) and not there and any(c in script for c in "\n(=")
         self._name = "a script" if is_text else str(script)
@@ -160,7 +171,7 @@ class Simulation:
             pass
         except ScriptError as error:
             if isinstance(script, str) and not is_text and not there:
-                error.expected = "the name of a script, or its text: statements, as in name = 1"
+                error.expected = SCRIPT
             raise
 
     # -- commands ---------------------------------------------------------------------------------
@@ -361,6 +372,17 @@ def _refuse_copies() -> None:
         expected=f"mpiexec -n {size} karamelo-py SCRIPT, by which they share a scene",
         hint="Simulation(..., alone=True) where each is to have a scene of its own",
     )
+
+
+def _threads(given: Any) -> int | None:
+    """The number of threads, as `--threads` takes it; None for auto."""
+    try:
+        return None if given is None else threads_option(str(given))
+    except ArgumentTypeError:
+        raise ScriptError(
+            f"threads={given!r} is not a number of threads",
+            expected="1, 2, ..., or None: all cores where the scene is large enough",
+        ) from None
 
 
 def _said(value: Any) -> str:
