@@ -155,3 +155,58 @@ def test_check_tells_too(run_interpreted):
     script = INPUTS / "in.spinning_disk"
     said = run_interpreted(script, "-var", "transfer", "PIC", command="check").err
     assert "angular momentum: " in said
+
+
+GIVES = "gives 36 points of this group another {}: this fix decides"
+VELOCITIES = [
+    (["velocity_particles, left, 0.1, 0", "velocity_particles, left, 0.2, 1"], "vx and vy"),
+    (["velocity_particles, left, 0.1, 0", "velocity_particles, all, NULL, 1"], "vy"),
+    (["velocity_particles, left, 0.1, 0", "velocity_particles, left, 0.05*2, 0"], ""),
+    (["velocity_particles, left, 2*x, 0", "velocity_particles, left, x*2, 0"], ""),
+    (["velocity_particles, left, 0.1, 0", "velocity_particles, right, 0.2, 0"], ""),
+    (["velocity_particles, left, 0.1, NULL", "velocity_particles, left, NULL, 0.2"], ""),
+    (["initial_velocity_particles, left, 0, 1", "initial_velocity_particles, left, 0, 2"], "vy"),
+    (["initial_velocity_particles, all, 0, 1", "initial_velocity_particles, left, 0, 2"], ""),
+    (["initial_velocity_particles, left, 0, 1", "run(1)",
+      "initial_velocity_particles, left, 0, 2"], ""),
+    (["velocity_particles, left, -0.1, 0", "initial_velocity_particles, left, 0.3, 0"], "vx"),
+    (["initial_velocity_particles, left, 0.3, 0", "velocity_particles, all, -0.1, 0"], "vx"),
+    (["initial_velocity_particles, all, 0.3, 0", "velocity_particles, left, -0.1, 0"], ""),
+    (["initial_velocity_particles, left, 0, 0", "velocity_particles, left, 0.1*time, 0"], ""),
+]  # fmt: skip
+
+
+def _with_fixes(*lines: str) -> str:
+    fixes = [
+        line if line.startswith("run") else f"fix(f{k}, {line})" for k, line in enumerate(lines)
+    ]
+    scene = SCENE.format(**QUIET)
+    scene = "\n".join(line for line in scene.splitlines() if "fix(" not in line)
+    return scene.replace("set_dt(0.01)", "set_dt(0.01)\n    " + "\n    ".join(fixes))
+
+
+@pytest.mark.parametrize(("fixes", "told"), VELOCITIES)
+def test_two_velocities_of_one_point_are_told(run_interpreted, fixes, told):
+    said = run_interpreted(_with_fixes(*fixes)).err
+    assert (GIVES.format(told) in said) == bool(told)
+    assert ("another v" in said) == bool(told)
+
+
+@pytest.mark.parametrize("method", ["ulmpm", "tlmpm"])
+@pytest.mark.parametrize(
+    ("region", "velocity", "told"),
+    [
+        ("1.5, 5.5, 1.5, 5.5", "0.1, 0", True),
+        ("1.5, 5.5, 1.5, 5.5", "0, 0", False),
+        ("1.5, 5.5, 1.5, 5.5", "NULL, 0", False),
+        ("1.5, 3.5, 1.5, 5.5", "0.1, 0", False),  # a third of its cells: a wall
+        ("6.5, 11, 1.5, 5.5", "0.1, 0", False),  # the other body
+    ],
+)
+def test_held_nodes_around_driven_points_are_told(run_interpreted, method, region, velocity, told):
+    lines = f"region(held, block, {region})\n    group(held, nodes, region, held, all)"
+    fixes = ["velocity_nodes, held, 0, 0", f"velocity_particles, left, {velocity}"]
+    scene = _with_fixes(*fixes).replace("set_dt", lines + "\n    set_dt").replace("ulmpm", method)
+    said = run_interpreted(scene, command="check").err
+    told_of = "gives all nodes around 36 points of this group another vx: this fix decides how"
+    assert (told_of in said) == told and ("another v" in said) == told

@@ -32,6 +32,7 @@ from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.motion import Motion
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import one_a_cell, own_step_instead, sparse
+from karamelo_py.run.velocities import warn_about_velocities
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.musl import MUSL
@@ -347,6 +348,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     _warn_about_groups(hub)
     _warn_about_step(hub, simulation, halves)
     _warn_about_precision(hub, simulation)
+    warn_about_velocities(hub, simulation)
     scene = Foreseen(hub, simulation, duration)
     for rule in RULES:
         for failure in rule(scene):

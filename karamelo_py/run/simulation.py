@@ -187,6 +187,7 @@ class Simulation(ById):
         self.hooks: Hooks | NoHooks = NoHooks()
         self._first: PythonHooks | None = None
         self._first_fixes: list = []
+        self.beginning: list = []  # fixes of the first step that act in this run
         self._watched = -1  # the version whose balance of energy is followed
         self.told_of_growth = False  # since it is followed
         self.mapped = False  # whether the nodes show a state of this simulation
@@ -573,6 +574,7 @@ class Simulation(ById):
             # Nothing happens in a step before this hook: the state shows it from the start.
             self.set_initial(fix.id)
         self._begun |= set(at_once)
+        self.beginning = new
         self._first_fixes = [fix for fix in new if fix not in at_once]
         self._first = None
         if self._first_fixes:

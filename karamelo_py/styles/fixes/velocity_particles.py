@@ -32,7 +32,9 @@ class VelocityParticles(Fix):
 
     Notes
     -----
-    Publishes the force that holds the points as ID_x, ID_y, ID_z.
+    Publishes the force that holds the points as ID_x, ID_y, ID_z. Where several such fixes lead a
+    point in one direction, the last of them decides, and over initial velocities and held nodes,
+    too; a run says so before its first step.
 
     See Also
     --------
