@@ -180,6 +180,27 @@ def test_files_that_are_no_meshes(name, content, says, tmp_path, monkeypatch, ca
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize(
+    ("line", "beside", "meant"),
+    [
+        ("solid(s, mesh, nofile.msh, steel, 0.1)", "o.fixless", None),
+        ("solid(s, mesh, nofile.msh, steel, 0.1)", "o.file.geo", "o.file.geo"),
+        ("region(r, mesh, body.msh)", "body.csv", None),
+        ("region(r, mesh, body.msh)", "body.VTU", "body.VTU"),
+        ("strength(s, tabulated, 80, body.crv)", "body.msh", None),
+        ("strength(s, tabulated, 80, body.crv)", "body.txt", "body.txt"),
+    ],
+)
+def test_files_that_may_be_meant(line, beside, meant, tmp_path, monkeypatch):
+    """Those that can be read, by their endings."""
+    monkeypatch.chdir(tmp_path)
+    Path(beside).write_text("")
+    text = message(SCENE + line)
+    assert "does not exist" in text
+    assert ("did you mean" in text) == bool(meant)
+    assert not meant or f"did you mean '{meant}'?" in text
+
+
 def test_without_the_libraries_of_gmsh(tmp_path, monkeypatch):
     (tmp_path / "a.geo").write_text("Point(1) = {0, 0, 0};")
     original = builtins.__import__

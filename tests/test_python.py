@@ -159,6 +159,8 @@ def test_a_function_of_a_module(run_interpreted, tmp_path):
         ("ropes.pul", "did you mean 'ropes.pull'?"),
         ("rops.pull", "the module rops cannot be imported"),
         ("pull", "'pull' names no module"),
+        ("ropes.py, pull", "hint: a function f of the file ropes.py is ropes.f"),
+        ("rops.py, pull", "hint: a function f of the file rops.py is rops.f"),
         ("ropes.pull, final", "one of post_particles_to_grid"),
         ("ropes.broken", "fix python: broken: ZeroDivisionError: division by zero (ropes.py:4)"),
         ("ropes.leaves", "fix python: leaves: SystemExit: 0 (ropes.py:6)"),

@@ -252,6 +252,18 @@ def test_a_longer_run_with_other_steps(run_interpreted):
     assert [path.name for path in sorted(folder.glob("d.*"))] == ["d.5.txt", "d.6.txt"]
 
 
+def test_a_longer_run_time(run_interpreted):
+    """Its last two steps are shortened: bits are the same from files of the steps before them."""
+    text = with_files(FLY.replace("run(4)", "run_time({})"), "restart(1, r.*.h5)\n")
+    longer = arrays(run_interpreted(text.format(0.008), folder="longer").folder / "r.6.h5")
+    run_interpreted(text.format(0.0045))  # steps 4 and 5 are shortened
+    position = next(name for name in longer if name.endswith("/x"))
+    for step, same in ((4, False), (3, True)):  # each writes the files behind it again
+        folder = run_interpreted(text.format(0.008), "-restart", f"r.{step}.h5").folder
+        again = arrays(folder / "r.6.h5")
+        assert np.array_equal(longer[position], again[position]) == same
+
+
 @pytest.mark.parametrize(
     ("run", "says"),
     [

@@ -5,7 +5,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType, UnionType
@@ -59,9 +59,16 @@ def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -
 
 
 class InputFile:
-    """For signatures: a file to read, looked for in the current folder, then beside the script."""
+    """For signatures: a file to read, looked for in the current folder, then beside the script.
+
+    Attributes
+    ----------
+    endings
+        Of files that can be read as what is asked for, in small letters; None: of any.
+    """
 
     script_kind = "the name of a file"
+    endings: Container[str] | None = None
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
@@ -73,14 +80,23 @@ class InputFile:
             if path.is_file():
                 return path
         here = folders[-1] / name
-        siblings = [p.name for p in here.parent.iterdir()] if here.parent.is_dir() else []
+        siblings = here.parent.iterdir() if here.parent.is_dir() else ()
+        files = [p for p in siblings if p.is_file()]
+        if cls.endings is not None:
+            files = [p for p in files if p.suffix.lower() in cls.endings]
         what = "is a folder, not a file" if here.is_dir() else "does not exist"
         raise ScriptError(
             f"the file {name} {what}",
             place=argument.place,
             expected="a file in the current folder or beside the script",
-            hint=meant(here.name, siblings),
+            hint=meant(here.name, [p.name for p in files]),
         )
+
+
+class TableFile(InputFile):
+    """For signatures: a file with numbers in columns."""
+
+    endings = ("", ".csv", ".dat", ".tsv", ".txt")
 
 
 class OutputFile:

@@ -7,7 +7,7 @@ their annotations what a script has to give::
         def __init__(self, hub, group: NodeGroup, g: Annotated[float, Positive] = 9.81):
 
 Annotations that are understood: float, int, bool, str, Literal words, Expression, InputFile,
-OutputFile, Argument (left to the callee), any class with a classmethod
+TableFile, OutputFile, Argument (left to the callee), any class with a classmethod
 ``from_script(cls, hub, argument)``, and unions of these, where None is the word NULL. Constraints
 are added with Annotated. ``*args`` take any number, keyword-only parameters are given as
 ``name=value``.
@@ -32,6 +32,7 @@ from karamelo_py.language.kinds import (
     NonNegative,
     OutputFile,
     Positive,
+    TableFile,
     Unfit,
     is_raw,
     kind_of,
@@ -41,6 +42,7 @@ from karamelo_py.script.errors import Place, ScriptError, meant, nearest
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
+    "TableFile",
 ]  # fmt: skip
 
 

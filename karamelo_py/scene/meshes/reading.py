@@ -10,11 +10,19 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from karamelo_py.language.kinds import InputFile
 from karamelo_py.scene.meshes.geometry import refuse_commands
 from karamelo_py.script.errors import FAILURES, ScriptError, meant
 
 GEOMETRIES = (".geo", ".geo_unrolled")
+
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
+
+
+class MeshFile(InputFile):
+    """For signatures: a file that `read` can read, by its ending."""
+
+    endings = {*meshio.extension_to_filetypes, *GEOMETRIES} - {".svg"}  # only written
 
 
 def read(path: Path, dimension: int, trusted: bool = False) -> meshio.Mesh:

@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.language.signature import Argument, InputFile
+from karamelo_py.language.signature import Argument, TableFile
 from karamelo_py.output.quantity import Quantity
 from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -77,7 +77,7 @@ class Reference(Compute):
         self,
         hub: Hub,
         subject: GroupOrValue,
-        file: InputFile,
+        file: TableFile,
         column: Argument,
         *norm: Literal["L1", "L2", "max", "absolute", "relative"],
     ):
@@ -95,7 +95,7 @@ class Reference(Compute):
         if self.points:
             self._check_columns(hub, file, column)
 
-    def _check_columns(self, hub: Hub, file: InputFile, column: Argument) -> None:
+    def _check_columns(self, hub: Hub, file: TableFile, column: Argument) -> None:
         known = [*hub.fields.particle_names(), "ux", "uy", "uz"]
         for name in (self.along, self.column):
             if name not in known:

@@ -32,6 +32,11 @@ def _is_of(module: Any, path: Path) -> bool:
     return module is not None and getattr(module, "__file__", None) == str(path)
 
 
+def _not_a_file(module: str, function: str) -> str | None:
+    """The hint where the name of a file stands in the place of a function."""
+    return f"a function f of the file {module}.py is {module}.f" if function == "py" else None
+
+
 class PythonFunction:
     """For signatures: a function of a module, or one that a program has given the scene."""
 
@@ -60,7 +65,9 @@ class PythonFunction:
             found = import_module(module)
         except FAILURES as error:
             raise ScriptError(
-                f"the module {module} cannot be imported: {cause_of(error)}", place=argument.place
+                f"the module {module} cannot be imported: {cause_of(error)}",
+                place=argument.place,
+                hint=_not_a_file(module, function),
             ) from error
         finally:
             sys.path.pop(0)
@@ -70,7 +77,8 @@ class PythonFunction:
             raise ScriptError(
                 f"the module {module} has no function '{function}'",
                 place=argument.place,
-                hint=f"did you mean '{module}.{close}'?" if close else None,
+                hint=_not_a_file(module, function)
+                or (f"did you mean '{module}.{close}'?" if close else None),
             )
         return getattr(found, function)
 

@@ -4,11 +4,10 @@ from typing import Literal
 
 import numpy as np
 
-from karamelo_py.language.signature import InputFile
 from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.meshes.elements import elements_of
-from karamelo_py.scene.meshes.reading import read
+from karamelo_py.scene.meshes.reading import MeshFile, read
 from karamelo_py.scene.meshes.simplices import Simplices, split
 from karamelo_py.scene.region import EXTERIOR, Region
 
@@ -47,7 +46,7 @@ class MeshRegion(Region):
     def __init__(
         self,
         hub: Hub,
-        file: InputFile,
+        file: MeshFile,
         group: str | int | None = None,
         exterior: Literal["exterior"] | None = None,
     ):

@@ -4,10 +4,9 @@ from typing import Literal
 
 import numpy as np
 
-from karamelo_py.language.signature import InputFile
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.meshes.reading import read
+from karamelo_py.scene.meshes.reading import MeshFile, read
 from karamelo_py.scene.meshes.surface import Surface
 from karamelo_py.scene.region import EXTERIOR, Region
 from karamelo_py.script.errors import ScriptError
@@ -42,7 +41,7 @@ class STL(Region):
     mesh, difference
     """
 
-    def __init__(self, hub: Hub, file: InputFile, exterior: Literal["exterior"] | None = None):
+    def __init__(self, hub: Hub, file: MeshFile, exterior: Literal["exterior"] | None = None):
         if require_domain(hub).dimension != 3:
             raise ScriptError(
                 "a surface encloses space in 3D only",

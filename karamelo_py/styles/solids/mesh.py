@@ -4,12 +4,12 @@ from typing import Annotated
 
 import numpy as np
 
-from karamelo_py.language.signature import InputFile, Positive
+from karamelo_py.language.signature import Positive
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.meshes.elements import elements_of, measured
-from karamelo_py.scene.meshes.reading import read
+from karamelo_py.scene.meshes.reading import MeshFile, read
 from karamelo_py.scene.placement import Placement
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
@@ -59,7 +59,7 @@ class MeshSolid(Solid):
     def __init__(
         self,
         hub: Hub,
-        file: InputFile,
+        file: MeshFile,
         material: Material,
         h: Annotated[float, Positive],
         T0: float | None = None,

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import real
-from karamelo_py.language.signature import InputFile, Positive
+from karamelo_py.language.signature import Positive, TableFile
 from karamelo_py.points.laws.numbers import Numbers
 from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
 from karamelo_py.script.errors import ScriptError
@@ -48,7 +48,7 @@ class Tabulated(NamedTuple):
     syntax = "G, ep1, Y1[, ep2, Y2, ...] | file"
 
     @classmethod
-    def given(cls, G: Annotated[float, Positive], *curve: float | InputFile):
+    def given(cls, G: Annotated[float, Positive], *curve: float | TableFile):
         """The law from the points of its curve."""
         points = _points(curve)
         _check(points, G)
