@@ -29,6 +29,10 @@ class Dependents:
     def __init__(self) -> None:
         self._names: set[str] = set()
 
+    def add(self, names: set[str]) -> None:
+        """Note names, too."""
+        self._names |= names
+
     def note(self, statement: Statement) -> bool:
         """Note what `statement` would have defined; False where nothing can be said any more."""
         if isinstance(statement, Assignment):
@@ -67,6 +71,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     dependents = Dependents()
     statement = interpreter.statement
     while dependents.note(statement) and len(found) < MOST:
+        dependents.add(interpreter.presets.blamed)
         statement = interpreter.next_statement()
         while statement is not None and not dependents.includes(statement):
             try:
