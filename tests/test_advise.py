@@ -101,6 +101,7 @@ def test_a_variable_that_coarsens_is_turned_round(folder, capsys):
     ("words", "said"),
     [
         (["-var", "N=1,2"], "at least 3 values"),
+        (["-var", "N=1"], "-var N has 1 value\n"),
         (["-var", "slope=a,b,c"], "no variable makes the scene finer"),
         (["-var", "N=1,2,3", "-cost", "money"], "one of seconds"),
         (["-var", "N=1,2,3", "-accuracy", "error"], "did you mean 'err'?"),

@@ -47,6 +47,13 @@ def test_variables(run_script, option):
     assert "a = 4" in run_script("a = 3\nprint(a)\n", option, "a", "4").out
 
 
+def test_a_text_in_the_place_of_a_number_is_told_once(run_script):
+    script = "n = 3\nm = n + 1\nk = 2*n\nj = o + 1\n"
+    said = run_script(script, "-var", "n", "ten", status=1).err
+    assert said.count("'ten' is text") == 1
+    assert "unknown name 'o'" in said  # which is another mistake
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
@@ -55,6 +62,8 @@ def test_variables(run_script, option):
         ("in.a --treads=2", "did you mean --threads?"),
         ("sweep in.a -var n=1,2 --job 2", "did you mean -jobs?"),
         ("in.a -var n=10", "hint: -var n 10"),
+        ("in.a -var n 5*", "-var n:1:2: error: the expression ends after '*'"),
+        ("in.a -var n 10 -v n 20", "-var n is given twice, 10 and 20"),
         ("in.a -var n ten", "-var n ten is a text, and the script has a number"),
         ("in.a in.b", "one word too many: in.b"),
         ("in.a --ranks 100000", "--ranks 100000: this machine has"),

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -9,10 +10,27 @@ from karamelo_py.script.errors import ScriptError
 VARIABLE = ("-var", "--var", "-v")
 
 
+class _Variable(argparse.Action):
+    """A variable and its value, each variable once."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any,
+        option_string: str | None = None,
+    ) -> None:  # fmt: skip
+        given = getattr(namespace, self.dest)
+        for name, value in given:
+            if name == values[0]:
+                raise ScriptError(
+                    f"-var {name} is given twice, {value} and {values[1]}",
+                    expected="each variable once",
+                )
+        setattr(namespace, self.dest, [*given, values])
+
+
 def add_variables(parser: argparse.ArgumentParser, text: str) -> None:
     """Let a command line set variables of scripts."""
     parser.add_argument(
-        *VARIABLE, nargs=2, action="append", default=[], metavar=("NAME", "VALUE"),
+        *VARIABLE, nargs=2, action=_Variable, default=[], metavar=("NAME", "VALUE"),
         help=text,
     )  # fmt: skip
 

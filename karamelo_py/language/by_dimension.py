@@ -12,7 +12,7 @@ from typing import Any
 from karamelo_py.language.arguments import with_gap
 from karamelo_py.language.own_words import words_of
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import ScriptError, meant, plural
 
 # Karamelo's own stand-in for infinity; scripts that write it mean INF.
 _HUGE = 1e20
@@ -80,14 +80,14 @@ class Forms:
         message = (
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing in {dimension}D"
             if missing
-            else f"{got - len(names)} argument{'s' if got - len(names) > 1 else ''} too many "
-            f"in {dimension}D"
+            else f"{plural(got - len(names), 'argument')} too many in {dimension}D"
         )
         gap = with_gap(arguments)
         fitting = [d for d, names in self.names.items() if len(names) == got and d != dimension]
         hint = self._own_line(arguments, dimension) if got else None
         if fitting and got:
-            other = f"{got} arguments are the form for {fitting[0]}D"
+            verb = "is" if got == 1 else "are"
+            other = f"{plural(got, 'argument')} {verb} the form for {fitting[0]}D"
             hint = other if missing else f"{other}; here {hint}"
         raise ScriptError(
             message,

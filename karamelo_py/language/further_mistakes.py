@@ -36,6 +36,10 @@ class Dependents:
     def __init__(self) -> None:
         self._names: set[str] = set()
 
+    def add(self, names: set[str]) -> None:
+        """Note names, too."""
+        self._names |= names
+
     def note(self, statement: Statement) -> bool:
         """Note what `statement` would have defined; False where nothing can be said any more."""
         if isinstance(statement, Assignment):
@@ -85,6 +89,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
         if not dependents.note(wrong):
             passed_over += _rest_of(interpreter)
             break
+        dependents.add(interpreter.presets.blamed)
         wrong = None
         while wrong is None and (statement := interpreter.next_statement()) is not None:
             if dependents.includes(statement):

@@ -29,7 +29,10 @@ class Presets(dict[str, str]):
     def __init__(self, script: Any, given: Mapping[str, str]):
         super().__init__(given)
         self._script = script
-        self._texts: dict[str, str] = {}  # those that may have to be numbers
+        again = isinstance(given, Presets)
+        # Those that may have to be numbers, and of these what a mistake was put down to.
+        self._texts: dict[str, str] = given._texts if again else {}
+        self.blamed: set[str] = given.blamed if again else set()
         for name in given:
             if not name.isidentifier():
                 raise ScriptError(
@@ -57,21 +60,31 @@ class Presets(dict[str, str]):
                 variables[name] = present
 
     def stand_for(self, statement: Assignment) -> None:
-        """Take the place of what a script assigns."""
+        """Take the place of what a script assigns.
+
+        Raises
+        ------
+        ScriptError
+            For what is no expression, in the place of a number.
+        """
         name, variables = statement.name, self._script.variables
         # What was a word at first may have become an expression of variables.
         if isinstance(variables.get(name), str):
             variables[name] = self._value(name)
         if isinstance(variables[name], str):
             # A method may take a text for a number; a mistake is told where it is used.
+            own = None
             with suppress(ScriptError):
-                if isinstance(self._script.evaluate(statement.node, statement.right), float):
-                    self._texts[name] = statement.right.code.strip()
+                own = self._script.evaluate(statement.node, statement.right)
+            if isinstance(own, float):
+                parse_text(self[name], "-var " + name)
+                self._texts[name] = statement.right.code.strip()
 
     def blame(self, statement: Statement, error: ScriptError) -> None:
         """Say so where a mistake may come from a text in the place of a number."""
         for name, own in self._texts.items():
             if re.search(rf"\b{name}\b", spelled(statement)):
+                self.blamed.add(name)
                 error.hint = (
                     f"-var {name} {self[name]} is a text, and the script has a number there, as in "
                     f"-var {name} {own}"

@@ -16,7 +16,7 @@ from karamelo_py.scene.domain import CHUNK, Domain, require_domain
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.scene.region import look_up
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Place, ScriptError, plural
 
 _SAMPLE = 5000
 
@@ -271,4 +271,4 @@ def _keys(x: np.ndarray, h: float) -> np.ndarray:
 def _counted(outside: float) -> str:
     if math.isinf(outside):
         return "points"
-    return "1 point" if outside == 1 else f"{outside:.0f} points"
+    return plural(outside, "point")

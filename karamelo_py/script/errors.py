@@ -156,6 +156,11 @@ def meant(name: str, names: Iterable[str]) -> str | None:
     return f"did you mean '{close}'?" if close else None
 
 
+def plural(count: float, noun: str) -> str:
+    """``1 cell``, ``2 cells``."""
+    return f"{count:g} {noun}" if count == 1 else f"{count:.0f} {noun}s"
+
+
 def unknown(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
     """The error for a `name` that is none of the `known`, which it lists; `where` it stands."""
     known = list(dict.fromkeys(known))

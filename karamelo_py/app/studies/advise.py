@@ -24,7 +24,7 @@ from karamelo_py.app.studies.options import (
 )  # fmt: skip
 from karamelo_py.app.studies.study import Study, shown, terminal
 from karamelo_py.app.studies.variables import cases, logged
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
@@ -187,7 +187,7 @@ def run(options: Any) -> int:
     if name not in numeric or len(values[name]) < 3:
         raise ScriptError(
             "no variable makes the scene finer" if name not in numeric
-            else f"-var {name} has {len(values[name])} values",
+            else f"-var {name} has {plural(len(values[name]), 'value')}",
             expected="a number with at least 3 values, such as -var N=10,20,40,80",
         )  # fmt: skip
     others = {n: v for n, v in values.items() if n != name}

@@ -20,7 +20,7 @@ from karamelo_py.app.studies.case import environment
 from karamelo_py.app.studies.options import new_parser
 from karamelo_py.output.console import duration
 from karamelo_py.output.files import write_whole
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import ScriptError, meant, plural
 
 DESCRIPTION = """\
 Makes the pictures and tables of an atlas again: a file (TOML) that lists them with the commands of
@@ -179,7 +179,7 @@ def run(options: Any) -> int:
         if state == "failed":
             failed[entry.name] = ""
         elif bad:
-            state += f", {len(bad)} of {count} runs ended early"
+            state += f", {len(bad)} of {plural(count, 'run')} ended early"
             if not entry.ends_early:
                 failed[entry.name] = f" ({_few(bad)})"
         print(f"{said} {state} ({duration(time.perf_counter() - begun)})", flush=True)

@@ -25,7 +25,7 @@ from karamelo_py.app.studies.study import Study
 from karamelo_py.app.studies.variables import logged
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, nearest, plural
 from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
@@ -99,7 +99,8 @@ def run(options: Any) -> int:
     chart.tell(known, inferred)
     width = unseen(chart.shape, options.stride)
     if inferred and width:
-        print(f"islands and strips up to {width} cells wide between runs are not seen (-stride)")
+        wide = plural(width, "cell")
+        print(f"islands and strips up to {wide} wide between runs are not seen (-stride)")
     print(f"drawn: {out}; the table is {table}")
     return 0
 
@@ -264,10 +265,10 @@ class Map:
         print(f"{len(known)} of {len(classes)} cells were run (the others lie between like ones)")
         for kind in CLASSES:
             if count[kind]:
-                print(f"  {kind:<8} {count[kind]} cells")
+                print(f"  {kind:<8} {plural(count[kind], 'cell')}")
         why = Counter(row["why"] for row in self.found.values() if row["class"] == "failed")
         for reason, times in why.most_common():
-            print(f"    {reason}: {times} runs")
+            print(f"    {reason}: {plural(times, 'run')}")
         margins = self.margins(classes)
         if margins:
             low, high = min(margins), max(margins)

@@ -16,7 +16,7 @@ from karamelo_py.app.studies.options import (
 )
 from karamelo_py.app.studies.study import Study, results_table, terminal
 from karamelo_py.app.studies.variables import cases, logged
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, plural
 
 DESCRIPTION = """\
 Runs a script with every combination of values of its variables, and writes one table (CSV).
@@ -95,7 +95,7 @@ def tell(rows: list, values: dict, items: list, study: Study, out: Path) -> None
     done = sum(row["status"] == "done" for row in rows)
     old = len(rows) - study.ran
     print(
-        f"{done} of {len(rows)} runs are done"
+        f"{done} of {plural(len(rows), 'run')} {'is' if done == 1 else 'are'} done"
         + (
             f", {len(rows) - done} {'is' if len(rows) - done == 1 else 'are'} not (see reason)"
             if done < len(rows)

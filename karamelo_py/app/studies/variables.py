@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py.output.quantity import KEYWORDS
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import ScriptError, meant, plural
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text
@@ -91,7 +91,7 @@ def cases(
         lengths = {other: len(values[other]) for other in together}
         if len(set(lengths.values())) > 1:
             raise ScriptError(
-                "-zip: " + ", ".join(f"{k} has {n} values" for k, n in lengths.items()),
+                "-zip: " + ", ".join(f"{k} has {plural(n, 'value')}" for k, n in lengths.items()),
                 expected="lists of the same length",
             )
         rows = list(zip(*(values[other] for other in together), strict=True))

@@ -13,7 +13,7 @@ from karamelo_py.app.studies.records import value
 from karamelo_py.app.studies.study import shown, terminal
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tidy
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
 
@@ -62,7 +62,8 @@ def pairs(
     values = list(dict.fromkeys(row[name] for row in rows))
     if len(values) != 2:
         raise ScriptError(
-            f"-versus {name}: {made['table']} has {len(values)} values of it", expected="two"
+            f"-versus {name}: {made['table']} has {plural(len(values), 'value')} of it",
+            expected="two",
         )
     others = [n for n in variables if n != name]
     cases: dict[tuple[str, ...], dict[str, Mapping[str, str]]] = {}

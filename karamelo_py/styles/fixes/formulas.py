@@ -7,7 +7,7 @@ import numpy as np
 
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, plural
 
 AXES = "xyz"
 
@@ -21,13 +21,13 @@ def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
     wanted = ", ".join(name + axis for axis in AXES[:d])
     if len(formulas) < d:
         raise ScriptError(
-            f"{len(formulas)} component{'s' if len(formulas) != 1 else ''} in {d} dimensions",
+            f"{plural(len(formulas), 'component')} in {plural(d, 'dimension')}",
             expected=f"{wanted} (NULL leaves a component alone)",
         )
     for extra in formulas[d:]:
         if extra is not None and not (extra.is_constant and extra.constant == 0):
             raise ScriptError(
-                f"more components than the {d} dimension{'s' if d > 1 else ''} of the domain",
+                f"more components than the {plural(d, 'dimension')} of the domain",
                 expected=f"{wanted} (a further one may only be NULL or 0)",
             )
     if all(formula is None for formula in formulas[:d]):

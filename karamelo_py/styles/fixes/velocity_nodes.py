@@ -11,7 +11,7 @@ from karamelo_py.language.signature import Argument
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, node_hook
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import AXES, per_direction
 
@@ -198,7 +198,7 @@ class VelocityNodes(Fix):
             shared = np.intersect1d(self.group.members, other.group.members) if axes else ()
             if len(shared):
                 names = " and ".join(f"v{axis}" for axis in axes)
-                count = f"{len(shared)} node{'s' if len(shared) > 1 else ''}"
+                count = plural(len(shared), "node")
                 self.hub.warn(
                     f"fix '{other.id}' (line {other.place.line}) gives {count} of this group "
                     f"another {names}: this fix decides there",
