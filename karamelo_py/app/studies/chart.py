@@ -43,7 +43,7 @@ def add_parser(subparsers: Any) -> None:
     )
     wanted.add_argument(
         "-keeps", metavar="COLUMN",
-        help="a table of words: does a log column stay (keeps, falls, grows, breaks, refused)? "
+        help="a table of words: does a log column stay (keeps, damps, gains, breaks, refused)? "
         "Rows are -by, columns the other variables",
     )  # fmt: skip
     parser.add_argument("-cost", metavar="COLUMN", help="the cost (seconds)")
@@ -216,7 +216,7 @@ def keeps(options: Any, rows: list, by: list[str], variables: list[str]) -> int:
     for word in dict.fromkeys(one.word for one in kept):
         print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
     for line in found.silent:
-        print(f"no warning names a cause: {line}")
+        print(f"nothing says why: {line}")
     if out:
         out.write_text(text, encoding="utf-8")
         print(f"written: {out}")

@@ -12,7 +12,7 @@ from karamelo_py.app.studies.curves import missing
 
 WITHIN = 0.1  # of what it was, which still counts as kept
 SHARE = 0.2  # of the run: means over its first and its last part are compared
-WRONG = ("grows", "breaks")
+WRONG = ("gains", "breaks")
 _SAID = re.compile(r"(?:^|: )(?:warning|error): (.*)")
 _WARNED = re.compile(r"(?:^|: )warning: ")
 _CAUSE = re.compile(r"Known to do that here: (.*)|(numerical fracture)")
@@ -26,7 +26,7 @@ class Kept(NamedTuple):
     Attributes
     ----------
     word
-        ``keeps``, ``falls``, ``grows``, ``breaks`` (the run was stopped on its way), ``refused``
+        ``keeps``, ``damps``, ``gains``, ``breaks`` (the run was stopped on its way), ``refused``
         (it made no step), or ``unknown`` (given up or killed).
     number
         Mean of the last part of the run over that of the first; of a run that breaks, when.
@@ -44,10 +44,7 @@ class Kept(NamedTuple):
 
     @property
     def silent(self) -> bool:
-        """Whether it grows or breaks and no warning names a cause.
-
-        What grows need not be wrong: a kinetic energy does under gravity.
-        """
+        """Whether it went wrong and nothing says why."""
         return self.word in WRONG and not self.warned
 
 
@@ -57,8 +54,8 @@ def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, fl
     first, last = y[x <= x[0] + span].mean(), y[x >= x[-1] - span].mean()
     ratio = float(last / first) if first else np.nan
     if not ratio <= 1 + within:  # nor for NaN
-        return "grows", ratio
-    return ("falls" if ratio < 1 - within else "keeps"), ratio
+        return "gains", ratio
+    return ("damps" if ratio < 1 - within else "keeps"), ratio
 
 
 def look_at(row: Mapping[str, str], folder: Path, over: str, column: str, within: float) -> Kept:
@@ -137,7 +134,7 @@ def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[
             number = f" at{number}"
         marks = f" [{marks}]" if marks else ""
         place = tuple(row[name] for name in across)
-        cells[key, place] = one.word + number + marks + (" (no warning)" if one.silent else "")
+        cells[key, place] = one.word + number + marks + (" (silent)" if one.silent else "")
         if one.silent:
             silent.append(", ".join(f"{name} = {row[name]}" for name in (*by, *across)))
     headings = [", ".join(f"{n} = {v}" for n, v in zip(across, c, strict=True)) for c in columns]
