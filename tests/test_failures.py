@@ -4,6 +4,7 @@ Interpreted; the compiled loop finds the same things in the same places.
 """
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -50,11 +51,26 @@ def test_a_formula_that_gives_nan(run_interpreted):
                    "run(200)")  # fmt: skip
     result = run_interpreted(script, status=1)
     message = stopped(result, "not a number", "formula", "point ")
+    assert "fix g gets NaN from sqrt(0.02 - time)\n" in message
+    assert re.search(r"\n +\d+ \| fix\(g, body_force", message)
     [good] = result.folder.glob("last_good.*")
     # The force is NaN from the 22nd step on; found within 100 steps of it (issue 2).
     step = int(good.name.split(".")[1])
     assert 20 <= step <= 121
     assert "Traceback" not in message
+
+
+def test_the_fix_whose_formula_gives_no_number(run_interpreted):
+    """Where it does; not one that reads its NaN, nor one that only measures."""
+    lines = (
+        "fix(reads, body_force, all, 0)",
+        "fix(measures, check_solution, all, sqrt(-1-x))",
+        "fix(g, body_force, all, if(time < 0.002, 0, 1/(x-0.5)))",
+        "fix(reads, body_force, all, g_x)",
+    )
+    script = block(1, *lines, "set_dt(0.001)", *OUTPUT, "run(200)")
+    message = stopped(run_interpreted(script, status=1), "not a number")
+    assert "fix g gets inf at (0.5) from if(time < 0.002, 0, 1/(x - 0.5))\n" in message
 
 
 def test_a_point_that_leaves_the_domain(run_interpreted):

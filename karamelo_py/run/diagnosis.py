@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from math import nan
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK, STOPPE
 from karamelo_py.kernels.watch import sum_energies
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
+from karamelo_py.run.no_number import culprit
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead
 from karamelo_py.run.tiles import in_tiles
@@ -29,23 +30,31 @@ LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
 
 
-def trouble(hub: Hub, simulation: Simulation, status: int) -> tuple[str, str]:
+class Trouble(NamedTuple):
+    """What went wrong, what can be done, and the line of the script at fault where one is known."""
+
+    message: str
+    hint: str
+    place: Place | None = None
+
+
+def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
     """What went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
-        return _above_limit(hub, simulation)
+        return Trouble(*_above_limit(hub, simulation))
     if status == SHRUNK:
-        return _shrunk(hub, simulation)
+        return Trouble(*_shrunk(hub, simulation))
     if status == GAINED:
-        return _gained(hub, simulation)
+        return Trouble(*_gained(hub, simulation))
     if status == HEATED:
-        return _heated(hub, simulation)
-    message, hint = _wrong_point(hub, simulation)
+        return Trouble(*_heated(hub, simulation))
+    message, hint, place = Trouble(*_wrong_point(hub, simulation))
     message = f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}"
-    if has_grown(simulation):
+    if place is None and has_grown(simulation):
         cause, cure = cause_of_gain(hub, simulation)
         message += f", after energy had come from nowhere. Known to do that here: {cause}"
         hint = cure
-    return message, hint
+    return Trouble(message, hint, place)
 
 
 def stop(
@@ -57,7 +66,7 @@ def stop(
     with the last state that has no trouble of its own.
     """
     step = simulation.step
-    message, hint = trouble(hub, simulation, status)
+    message, hint, at_fault = trouble(hub, simulation, status)
     grown = not grown_little(simulation)
     if grown or status in (GAINED, HEATED, STOPPED):
         simulation.restore(snapshot)
@@ -80,7 +89,9 @@ def stop(
         name = os.path.relpath(path)
         which = "The state from before energy grew" if grown else "The last good state"
         hint += f". {which} is in {name}; karamelo-py SCRIPT -restart {name} goes on"
-    raise ScriptError(message, place=place, hint=hint)
+    error = ScriptError(message, place=at_fault or place, hint=hint)
+    error.complete = at_fault is not None
+    raise error
 
 
 def _energy(simulation: Simulation) -> float:
@@ -151,11 +162,28 @@ def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     return message, f"something went wrong before: look at the dumps; {smaller}"
 
 
-def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+def _no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
+    """The trouble with what is NaN, and the formula that it comes from, where that is found."""
+    found = culprit(hub, simulation)
+    if found is None:
+        return Trouble(message, hint)
+    what = "NaN" if np.isnan(found.value) else f"{found.value:g}"
+    where = "" if found.x is None else f" at {_place(found.x[: hub.domain.dimension])}"
+    return Trouble(
+        f"{message}: fix {found.fix.id} gets {what}{where} from {found.formula.text}",
+        "a formula that is a number at all times and places of the run, such as by max(a, b) or "
+        "if(condition, a, b)",
+        found.fix.place,
+    )
+
+
+def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     """What is wrong with the first point that went wrong, and what can be done."""
     wrong = [(int(block.points.id[p]), block, p) for block, p in simulation.wrong_points()]
     if not wrong and hub.update.thermal:
-        return (
+        return _no_number(
+            hub,
+            simulation,
             "the temperature of a point is not a number",
             "look at the fixes that act on heat: a formula that gives NaN, or heat without bounds",
         )
@@ -168,9 +196,16 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     name = _named(hub, simulation, number)
     smaller = _smaller_step(hub, simulation)
     if not np.isfinite(old).all():
-        return f"{name} has no position (NaN)", f"look for a formula that gives NaN; {smaller}"
+        return _no_number(
+            hub,
+            simulation,
+            f"{name} has no position (NaN)",
+            f"look for a formula that gives NaN; {smaller}",
+        )
     if not np.isfinite(new).all() or not np.isfinite(block.points.v[:, p]).all():
-        return (
+        return _no_number(
+            hub,
+            simulation,
             f"{name} at {_place(old)} gets a velocity that is not a number",
             f"look for a formula that gives NaN, such as a division by zero; else {smaller}",
         )
