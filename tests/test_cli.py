@@ -1,6 +1,7 @@
 """The command line: what it says when it is not used as meant."""
 
 import pytest
+from scenes import block
 
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.cli import main
@@ -52,6 +53,25 @@ def test_a_text_in_the_place_of_a_number_is_told_once(run_script):
     said = run_script(script, "-var", "n", "ten", status=1).err
     assert said.count("'ten' is text") == 1
     assert "unknown name 'o'" in said  # which is another mistake
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("dimension(2, 0, 1, 0, 1, h)", "hint: h comes from -var L 2, -var N -5\n"),
+        ("dimension(2, 0, 1, 0, N, 0.1)", "hint: N comes from -var N -5\n"),
+        ("dimension(2, 0, 1, 0, 1, k)", None),
+        # Found before the run, in a rehearsal of what follows it.
+        (f"{block(2, 'run(1)')}set_dt(h)", "hint: h comes from -var L 2, -var N -5\n"),
+        ("dimension(2, 0, 1, 0, 1, -1)  # h", None),
+    ],
+)
+def test_mistakes_of_variables(run_interpreted, line, says):
+    """What is marked is of the script; the number is of the command line."""
+    script = f"L = 1\nN = 10\nh = L/N\nk = h\nk = -1\nw = N*1\nprint(w)\n{line}\n"
+    said = run_interpreted(script, "-var", "N", "-5", "-var", "L", "2", status=1).err
+    assert (says or "error: dimension: ") in said
+    assert ("comes from" in said) == bool(says)
 
 
 @pytest.mark.parametrize(

@@ -210,6 +210,31 @@ def test_groups_of_nodes_belong_to_solids(run_interpreted):
     assert (log.ContactForce_base_x == 0).all()
 
 
+@pytest.mark.parametrize(
+    "fix",
+    [
+        "contact/friction, a, b, {mu}",
+        "contact/minimize_penetration, a, b, {mu}",
+        "contact/minimize_penetration/plane, a, 0.1, 0, 0, 1, 0, 0, {mu}",
+        "indent/minimize_penetration, all, sphere, 0.1, 0.9, 0, 0, 0, 0, 0, {mu}",
+        "velocity_nodes, wall, 0, NULL, mu={mu}",
+    ],
+)
+def test_friction_that_nothing_has(run_interpreted, fix):
+    """Coefficients in tables end at 1.5; 30 is meant as 30 %."""
+    region = "region(w, block, 0, 0.1, INF, INF)"
+    for mu, told in ((1.5, 0), (30, 1)):
+        lines = (
+            region,
+            "group(wall, nodes, region, w, all)",
+            f"fix(f, {fix.format(mu=mu)})",
+            "run(1)",
+        )
+        said = run_interpreted(bars(0.0, *lines, d=2)).err
+        assert said.count("warning: the coefficient of friction is 30: ") == told
+        assert said.count("0.3 is 30 %") == told
+
+
 def incline(mu: float) -> str:
     """A disk (R 0.4) on a base that is held; gravity leans by 30 degrees."""
     return f"""

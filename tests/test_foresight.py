@@ -1,5 +1,7 @@
 """What is known to fail is told before the first step, with its cure."""
 
+from textwrap import dedent
+
 import pytest
 from conftest import INPUTS
 
@@ -149,6 +151,35 @@ def test_failures_of_long_runs(run_interpreted, name, method, more, steps, told)
     if "dt_factor" in more:
         text = text.replace("set_dt(0.01)", "")
     assert (name in run_interpreted(text, command="check").err) == told
+
+
+STEEL = "linear, {rho}, {E}, 0.3"
+
+
+@pytest.mark.parametrize(
+    ("units", "material", "says"),
+    [
+        # Steel: 7850 kg/m^3, 210 GPa.
+        ("units(m, kg, s)", STEEL.format(rho=7850, E=210e9), ""),
+        ("units(mm, g, ms)", STEEL.format(rho=7.85e-3, E=210e3), ""),
+        ("units(mm, t, s)", STEEL.format(rho=7.85e-9, E=210e3), ""),
+        ("", STEEL.format(rho=7850, E=1e3), ""),
+        ("units(mm, g, ms)", STEEL.format(rho=7850, E=210e9), "density is 7.85e+09 kg/m^3"),
+        ("units(mm, g, ms)", STEEL.format(rho=7850, E=210e9), "density 0.001; 1 GPa is 1e+03 MPa"),
+        # sqrt((K + 4/3 G) / rho) = 5172 m/s sqrt(1.346), and 1000 times that
+        ("units(m, kg, s)", STEEL.format(rho=7850, E=210e15), "speed of waves is 6e+06 m/s"),
+        ("units(m, kg, s)", STEEL.format(rho=7.85, E=210e6), "density is 7.85 kg/m^3"),
+        ("units(m, kg, s)", "eos-strength, thin, thin", ""),  # air
+        ("units(m, kg, s)", "rigid, 7850", ""),
+    ],
+)
+def test_units_that_do_not_fit(run_interpreted, units, material, says):
+    gas = "eos(thin, ideal-gas, 1.2, 1.4, p=1e5)\nstrength(thin, fluid, 0)"
+    first = f"{units}\n{gas}\nmaterial(steel, {material})\n"
+    text = first + dedent(SCENE.format(**(QUIET | {"law": "steel"})))
+    said = run_interpreted(text, command="check").err
+    assert said.count("warning: units of material 'steel'") == bool(says)
+    assert says in said
 
 
 def test_check_tells_too(run_interpreted):

@@ -279,7 +279,9 @@ def units(
     """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.
 
     No number changes by it: a scene in mm, g, ms has forces in N, stresses in MPa and energies in
-    mJ, whether it says so or not.
+    mJ, whether it says so or not. A warning tells before the first step of a material whose
+    density or speed of waves would be that of no real one in these units (densities of 10 to
+    100000 kg/m^3, of gases from 0.001 on; speeds of 1 m/s to 50 km/s).
 
     Parameters
     ----------

@@ -339,6 +339,7 @@ class Interpreter(Meanings):
                 hint="choose another name",
             )
         self.variables[name] = self._right_hand_side(statement.node, statement.right)
+        self.presets.follow(statement)
 
     def _right_hand_side(self, node: Node, raw: Raw) -> Value:
         try:

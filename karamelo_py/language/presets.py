@@ -33,6 +33,9 @@ class Presets(dict[str, str]):
         # Those that may have to be numbers, and of these what a mistake was put down to.
         self._texts: dict[str, str] = given._texts if again else {}
         self.blamed: set[str] = given.blamed if again else set()
+        # Which of them a variable is made of, by its name.
+        itself = {name: {name: None} for name in given}
+        self._made_of: dict[str, dict[str, None]] = dict(given._made_of) if again else itself
         for name in given:
             if not name.isidentifier():
                 raise ScriptError(
@@ -80,8 +83,23 @@ class Presets(dict[str, str]):
                 parse_text(self[name], "-var " + name)
                 self._texts[name] = statement.right.code.strip()
 
+    def follow(self, statement: Assignment) -> None:
+        """Note what a script makes of them."""
+        if self:
+            self._made_of[statement.name] = self._in(statement.right.code)
+
+    def _in(self, code: str) -> dict[str, None]:
+        """Those that some code is made of."""
+        words = re.findall(_WORD, re.sub(r'"[^"]*"', " ", code))
+        return {name: None for word in words for name in self._made_of.get(word, ())}
+
     def blame(self, statement: Statement, error: ScriptError) -> None:
-        """Say so where a mistake may come from a text in the place of a number."""
+        """Say so where a mistake may come from them: from numbers, or texts in their place."""
+        place = error.place
+        if place != statement.place and not error.hint:
+            marked = place.text[place.column - 1 : place.column - 1 + place.length]
+            if given := ", ".join(f"-var {name} {self[name]}" for name in self._in(marked)):
+                error.hint = f"{marked} comes from {given}"
         for name, own in self._texts.items():
             if re.search(rf"\b{name}\b", spelled(statement)):
                 self.blamed.add(name)

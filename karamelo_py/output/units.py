@@ -22,7 +22,8 @@ class Powers(NamedTuple):
     temperature: int = 0
 
 
-VELOCITY, FORCE, STRESS, ENERGY = (
+DENSITY, VELOCITY, FORCE, STRESS, ENERGY = (
+    Powers(-3, 1),
     Powers(1, 0, -1),
     Powers(1, 1, -2),
     Powers(-1, 1, -2),
@@ -69,11 +70,15 @@ class Units(NamedTuple):
     def __str__(self) -> str:
         return " ".join(self)
 
+    def si(self, powers: Powers) -> float:
+        """The unit of a mechanical quantity in SI units."""
+        si = LENGTHS[self.length] ** powers.length * MASSES[self.mass] ** powers.mass
+        return si * TIMES[self.time] ** powers.time
+
     def name(self, powers: Powers) -> str:
         """The unit of a quantity: MPa where the set has a name for it, else mm/ms and the like."""
         if powers in NAMED:
-            si = LENGTHS[self.length] ** powers.length * MASSES[self.mass] ** powers.mass
-            order = log10(si * TIMES[self.time] ** powers.time)
+            order = log10(self.si(powers))
             if isclose(order, round(order), abs_tol=1e-9) and round(order) in PREFIXES:
                 return PREFIXES[round(order)] + NAMED[powers]
         parts = [

@@ -16,10 +16,12 @@ import numpy as np
 
 from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language import registry
+from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpgimp import CPGIMPDiagonal
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.points.laws import law_kind
+from karamelo_py.points.laws import law_kind, specific_volume
+from karamelo_py.points.laws.eos.ideal_gas import IdealGas
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
@@ -31,7 +33,7 @@ from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.motion import Motion
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.stable import one_a_cell, own_step_instead, sparse
+from karamelo_py.run.stable import elastic_speed, one_a_cell, own_step_instead, sparse
 from karamelo_py.run.velocities import warn_about_velocities
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -49,6 +51,9 @@ FAR = 25, 150, 150  # ... over so many cells, by dimension
 SWING = 0.05  # strain of vibrations that bodies do not bear for long
 SEPARATE = 0.1  # of ASFLIP's strength of separation, which elastic bodies bear
 SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
+DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
+GAS = 1e-3  # kg/m^3, from where on
+SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
 ELASTIC = LinearElastic, NeoHookean, Thermoelastic
 
 
@@ -321,6 +326,30 @@ def _fast_shocks(s: Foreseen) -> Iterator[Failure]:
         )
 
 
+def _other_units(s: Foreseen) -> Iterator[Failure]:
+    """Of materials whose numbers are in others than those that `units` names."""
+    units = s.hub.output.units
+    for solid in s.hub.solids.values() if units else ():
+        law = solid.material.law
+        density = units.si(DENSITY) / float(specific_volume(law))
+        speed = units.si(VELOCITY) * elastic_speed(s.simulation, solid)[0]
+        least = GAS if IdealGas in law_kind(law) else DENSITIES[0]
+        odd = []
+        if not least <= density <= DENSITIES[1]:
+            odd.append(f"density is {density:.3g} kg/m^3")
+        if speed != 0 and not SPEEDS[0] <= speed <= SPEEDS[1]:  # 0 is rigid
+            odd.append(f"speed of waves is {speed:.3g} m/s")
+        if odd:
+            yield Failure(
+                f"units of material '{solid.material.id}'",
+                f"with units({', '.join(units[:3])}) its {' and its '.join(odd)}, such as no real "
+                "material has",
+                f"in {units.name(DENSITY)} water has the density {1e3 / units.si(DENSITY):.3g}; "
+                f"1 GPa is {1e9 / units.si(STRESS):.3g} {units.name(STRESS)}",
+                solid.material.place,
+            )
+
+
 RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _affine_noise,
     _strained_before,
@@ -334,6 +363,7 @@ RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _lost_spin,
     _loose_points,
     _fast_shocks,
+    _other_units,
 )
 
 

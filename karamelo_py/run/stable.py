@@ -156,14 +156,16 @@ def ruling_limit(simulation: Any) -> str:
 
 def _speed_without_viscosity(simulation: Any) -> float:
     """Fastest wave in the undeformed materials without viscosity; 0 where none is viscous."""
-    fastest, viscous = 0.0, False
-    for solid in simulation.hub.solids.values():
-        law = law_on(solid.material.law, solid.h, solid.T0)
-        if not isinstance(getattr(law, "viscosity", Absent()), Absent):
-            law, viscous = law._replace(viscosity=Absent()), True
-        if getattr(getattr(law, "strength", None), "mu", 0) > 0:
-            law, viscous = law._replace(strength=law.strength._replace(mu=0.0)), True
-        kin = simulation.kin
-        squared = wave_speed_squared(law, kin, initial_state(law, kin, 1.0))
-        fastest = max(fastest, sqrt(float(squared)))
-    return fastest if viscous else 0.0
+    found = [elastic_speed(simulation, solid) for solid in simulation.hub.solids.values()]
+    return max(speed for speed, _ in found) if any(viscous for _, viscous in found) else 0.0
+
+
+def elastic_speed(simulation: Any, solid: Any) -> tuple[float, bool]:
+    """Of an undeformed solid: its fastest wave without viscosity, and whether it is viscous."""
+    law, viscous = law_on(solid.material.law, solid.h, solid.T0), False
+    if not isinstance(getattr(law, "viscosity", Absent()), Absent):
+        law, viscous = law._replace(viscosity=Absent()), True
+    if getattr(getattr(law, "strength", None), "mu", 0) > 0:
+        law, viscous = law._replace(strength=law.strength._replace(mu=0.0)), True
+    kin = simulation.kin
+    return sqrt(float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))), viscous

@@ -8,6 +8,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.fixes.friction import judge_friction
 from karamelo_py.styles.fixes.pairs import check_pair
 
 
@@ -68,3 +69,5 @@ class ContactFriction(Fix):
             )
         self.solids = (solid1, solid2)
         self.friction = inf if mu == "no-slip" else float(mu)
+        if mu != "no-slip":
+            judge_friction(hub, self.friction)

@@ -6,6 +6,7 @@ from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.pairs import MinimizePenetration
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
+from karamelo_py.styles.fixes.friction import judge_friction
 from karamelo_py.styles.fixes.pairs import PairContact
 
 
@@ -48,6 +49,7 @@ class ContactMinimizePenetration(PairContact):
     ):
         super().__init__(hub, solid1, solid2)
         self.mu = float(mu)
+        judge_friction(hub, self.mu)
 
     def law(self) -> NamedTuple:
         """Full undoing of penetration, and friction."""

@@ -8,6 +8,7 @@ from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.friction import judge_friction
 from karamelo_py.styles.fixes.tools import (
     Bodies,
     PointForceFix,
@@ -65,6 +66,7 @@ class ContactMinimizePenetrationPlane(PointForceFix):
     ):
         super().__init__(hub, SolidPoints(hub, solid))
         self.mu = mu
+        judge_friction(hub, mu)
         self.origin = place(hub, x, y, z)
         self.normal = place(hub, nx, ny, nz, "n")
         if not hub.rehearsing:  # which does not know all numbers

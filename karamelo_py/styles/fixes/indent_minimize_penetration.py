@@ -8,6 +8,7 @@ from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.friction import judge_friction
 from karamelo_py.styles.fixes.tools import Bodies, PointForceFix, apart, place, rubbed
 
 
@@ -64,6 +65,7 @@ class IndentMinimizePenetration(PointForceFix):
     ):
         super().__init__(hub, group)
         self.R, self.mu = R, mu
+        judge_friction(hub, mu)
         self.centre = place(hub, x, y, z)
         self.velocity = place(hub, vx, vy, vz, "v")
 

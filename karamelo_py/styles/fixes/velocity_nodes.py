@@ -14,6 +14,7 @@ from karamelo_py.scene.modify import Fix, node_hook
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import AXES, per_direction
+from karamelo_py.styles.fixes.friction import judge_friction
 
 
 def prescribe(mass, v, v_star, force, value, before, dt, share):
@@ -135,6 +136,8 @@ class VelocityNodes(Fix):
                 argument="mu",
                 expected="a number of at least 0",
             )
+        if mu is not None and mu.is_constant:
+            judge_friction(hub, mu.constant)
         if mu is not None and None not in self.formulas:
             raise ScriptError(
                 "nodes that are held in all directions cannot rub",
