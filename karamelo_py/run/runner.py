@@ -96,6 +96,7 @@ class Runner:
         check_scene(hub)
         self._check_condition()
         if hub.rehearsing:
+            hub.later.append(foresight.step_of(hub, self.halve))
             return
         if hub.pausing:
             raise Pause
