@@ -346,7 +346,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
         If temperatures would swing, in a run that does not halve its step then.
     """
     _warn_about_groups(hub)
-    _warn_about_steps(hub, simulation, halves)
+    warn_about_steps(hub, simulation, halves)
     _warn_about_precision(hub, simulation)
     warn_about_velocities(hub, simulation)
     scene = Foreseen(hub, simulation, duration)
@@ -409,17 +409,29 @@ def step_of(hub: Hub, halves: bool) -> Step:
     return Step(hub.place, update.fixed_dt, update.dt_factor, halves, scene)
 
 
-def _warn_about_steps(hub: Hub, simulation: Simulation, halves: bool) -> None:
-    """Say so, once, where the step of this run or of a later one is above the stable limit."""
+def warn_about_steps(
+    hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
+) -> None:
+    """Say so, once, where the step of this run or of a later one is above the stable limit.
+
+    Who goes on from a file is told `again`.
+
+    Raises
+    ------
+    ScriptError
+        See `warn`.
+    """
     present = step_of(hub, halves)
-    _warn_about_step(hub, simulation, present)
+    _warn_about_step(hub, simulation, present, again=again)
     for step in hub.later[len(hub.runs) :]:
         if step.scene == present.scene:
             _warn_about_step(hub, simulation, step, later=True)
     hub.later.clear()
 
 
-def _warn_about_step(hub: Hub, simulation: Simulation, step: Step, *, later: bool = False) -> None:
+def _warn_about_step(
+    hub: Hub, simulation: Simulation, step: Step, *, later: bool = False, again: bool = False
+) -> None:
     limit = simulation.limit_moving
     asked = step.fixed_dt or (step.dt_factor or 0) * limit
     if not asked > limit * (1 + 1e-12):
@@ -441,6 +453,7 @@ def _warn_about_step(hub: Hub, simulation: Simulation, step: Step, *, later: boo
             else ": the run will most likely blow up, and be stopped then"
         )
     name = f"{step.command} {step.fixed_dt or step.dt_factor}"
-    if name not in hub.update.foreseen:
-        hub.update.foreseen.append(name)
+    told = hub.update.foreseen
+    if again or name not in told:
+        told += [name] * (name not in told)
         hub.warn(words, place=step.place, hint=hint)

@@ -174,6 +174,8 @@ class Runner:
             hub.restart.take(hub, outputs=True)
             hub.restart = hub.interpreter.replay = None
             simulation.go_on(self.end_time, self.halvings)
+            if not self.halvings:  # else the step is not that of the script
+                foresight.warn_about_steps(hub, simulation, self.halve, again=True)
             self._tell_of_no_step_left(file, simulation, first_step)
         else:
             simulation.begin(self.end_time)
