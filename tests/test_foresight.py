@@ -211,6 +211,7 @@ def test_held_nodes_around_driven_points_are_told(run_interpreted, method, regio
     said = run_interpreted(scene, command="check").err
     told_of = "gives all nodes around 36 points of this group another vx: this fix decides how"
     assert (told_of in said) == told and ("another v" in said) == told
+    assert ("hint: nodes that these points do not see" in said) == told
 
 
 TOO_LARGE = "the step 0.1 of set_dt is above the stable limit"
