@@ -117,6 +117,12 @@ def test_a_step_above_the_limit(run_interpreted):
     assert result.err.index("warning: ") < result.err.index("error: ")
     assert "above the stable limit 0.0" in result.err
     stopped(result, "set_dt")
+    [good] = result.folder.glob("last_good.*")
+    again = run_interpreted(script, "-restart", good.name, status=1)
+    assert "above the stable limit 0.0" in again.err.split("error: ")[0]
+    # Who goes on with another step is told nothing.
+    smaller = script.replace("set_dt(0.04)", "set_dt(0.004)").replace("run(500)", "run(20)")
+    assert "limit" not in run_interpreted(smaller, "-restart", good.name, status=None).err
 
 
 def test_a_step_that_comes_to_lie_above_the_limit(run_interpreted):

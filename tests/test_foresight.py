@@ -4,6 +4,7 @@ from textwrap import dedent
 
 import pytest
 from conftest import INPUTS
+from scenes import block
 
 SCENE = """
     method({method})
@@ -241,3 +242,29 @@ def test_held_nodes_around_driven_points_are_told(run_interpreted, method, regio
     said = run_interpreted(scene, command="check").err
     told_of = "gives all nodes around 36 points of this group another vx: this fix decides how"
     assert (told_of in said) == told and ("another v" in said) == told
+    assert ("hint: nodes that these points do not see" in said) == told
+
+
+TOO_LARGE = "the step 0.1 of set_dt is above the stable limit"
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        (["run(1)", "set_dt(0.1)", "run(0)"], True),
+        (["run(1)", "set_dt(0.1)", "run(0)", "run(0)"], True),
+        (["set_dt(0.1)", "run(0)", "run(0)"], True),
+        (["run(1)", "set_dt(0.011)", "run(1)"], False),
+        (["compute(E, kinetic_energy, all)", "run(1)", "set_dt(value(0.011+E))", "run(0)"], False),
+        (["run(1)", "set_dt(0.1)"], False),
+    ],
+)  # fmt: skip
+def test_a_large_step_of_a_later_run_is_told_before_the_first(
+    run_interpreted, command, lines, told
+):
+    """Cells of 0.1, and waves of sqrt((K + 4 G/3) / rho) = 8.2: 0.012 is stable."""
+    text = block(2, "set_dt(0.01)", "set_output(1)", *lines)
+    result = run_interpreted(text, command=command)
+    assert result.err.count("the step ") == told
+    assert (TOO_LARGE in result.err) == told

@@ -174,6 +174,21 @@ def test_conditions(run_interpreted):
     assert list(log.Step) == [0, 5, 8]
 
 
+@pytest.mark.parametrize(
+    ("run", "says"),
+    [
+        ("run_until(Ek)", "the condition holds before the first step of this run: it takes none"),
+        ("run_while(Ek < 1e-9)", "the condition does not hold before the first step"),
+        ("run_while(Ek > 1 && timestep < 2)\nrun_until(timestep > 3)", ""),
+    ],
+)
+def test_a_condition_that_ends_a_run_at_once_is_told(run_interpreted, run, says):
+    """Ek = 0.5 * 2 * 0.3 * 2**2 = 1.2 at first."""
+    lines = ["compute(Ek, kinetic_energy, all)", "fix(v, initial_velocity_particles, all, 2)"]
+    err = run_interpreted(block(1, *lines, "set_dt(0.001)", run)).err
+    assert says in err and ("first step" in err) == bool(says)
+
+
 @pytest.mark.parametrize("run", ["run_while(0*w >= 0)", "run_until(w < -1)"])
 def test_a_condition_that_nobody_can_tell(run_interpreted, run):
     """The root of a number below 0 from step 3 on: neither true nor false."""

@@ -96,6 +96,7 @@ class Runner:
         check_scene(hub)
         self._check_condition()
         if hub.rehearsing:
+            hub.later.append(foresight.step_of(hub, self.halve))
             return
         if hub.pausing:
             raise Pause
@@ -173,6 +174,8 @@ class Runner:
             hub.restart.take(hub, outputs=True)
             hub.restart = hub.interpreter.replay = None
             simulation.go_on(self.end_time, self.halvings)
+            if not self.halvings:  # else the step is not that of the script
+                foresight.warn_about_steps(hub, simulation, self.halve, again=True)
             self._tell_of_no_step_left(file, simulation, first_step)
         else:
             simulation.begin(self.end_time)
@@ -218,6 +221,16 @@ class Runner:
             message = f"{holds}, the end of this run: it takes no further step"
             self.hub.console.say(render_message("note", message, hint=hint))
 
+    def _tell_of_no_first_step(self) -> None:
+        """A comparison that was forgotten, or turned round, ends a run at once."""
+        holds = "holds" if self.until else "does not hold"
+        self.hub.warn(
+            f"the condition {holds} before the first step of this run: it takes none",
+            hint="run_until ends where its condition is anything but 0, run_while where it is 0; "
+            "comparisons are 1 or 0",
+            place=self.place,
+        )
+
     def _loop(self, simulation: Simulation, first_step: int, first_time: float) -> None:
         hub, output = self.hub, self.hub.output
         last_step = first_step + self.steps if self.steps is not None else inf
@@ -226,6 +239,8 @@ class Runner:
             self._keep(simulation)
         while simulation.step < last_step and simulation.time < self.end_time:
             if self.condition is not None and not self._goes_on():
+                if simulation.step == first_step:
+                    self._tell_of_no_first_step()
                 break
             if self.interrupted:
                 break

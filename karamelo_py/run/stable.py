@@ -97,9 +97,9 @@ def own_step(hub: Hub, simulation: Any) -> float:
     return float(min(keeping_share(hub) * waves, USUAL * clock.heat_limit))
 
 
-def own_step_instead(hub: Hub) -> str:
-    """What to write in the place of a step that is too large."""
-    if hub.update.fixed_dt is not None:
+def own_step_instead(hub: Hub, command: str = "") -> str:
+    """What to write in the place of a step that is too large, by the command that asks for it."""
+    if command == "set_dt" or (not command and hub.update.fixed_dt is not None):
         return f"set_dt({own_step(hub, hub.simulation):.3g}) or less, or leave set_dt out"
     share = own_step(hub, hub.simulation) / hub.simulation.limit_moving
     return f"dt_factor({share:.3g}) or less, or leave dt_factor out"

@@ -18,6 +18,7 @@ from karamelo_py.styles.fixes.velocity_particles import VelocityParticles
 SAMPLE = 1000  # points at which formulas are compared, about
 ALIKE = 1e-6  # of a velocity, or of the speed of waves: less is no other velocity
 HINT = "groups that have no points in common, or NULL for one of the components"
+AWAY = "nodes that these points do not see, or NULL for one of the components"
 
 
 def warn_about_velocities(hub: Hub, simulation: Simulation) -> None:
@@ -29,7 +30,7 @@ def warn_about_velocities(hub: Hub, simulation: Simulation) -> None:
             hub.warn(
                 f"fix '{other.id}' (line {other.place.line}) gives {words}",
                 place=fix.place,
-                hint=HINT,
+                hint=AWAY if isinstance(other, VelocityNodes) else HINT,
             )
 
 

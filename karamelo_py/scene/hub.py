@@ -118,6 +118,8 @@ class Hub:
         The run in progress, or None.
     runs
         The published values at the end of each run so far.
+    later
+        What the runs ask for that a rehearsal came to (`run.foresight.Step`).
     restart
         What the script goes on from, until it is where that was written.
     rehearsing
@@ -156,6 +158,7 @@ class Hub:
         self.functions: dict[str, Any] = {}
         self.running: Any = None
         self.runs: list[dict[str, float]] = []
+        self.later: list[Any] = []
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None
 
