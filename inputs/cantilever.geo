@@ -1,5 +1,5 @@
-// The beam of in.cantilever_tets, 4 x 1 x 1: gmsh -3 -format msh22 cantilever.geo
-// Another size of its tetrahedra: gmsh -setnumber size 0.25 ...
+// The beam of in.cantilever_tets, 4 x 1 x 1.
+// Another size of its tetrahedra: gmsh -3 -setnumber size 0.25 cantilever.geo -o finer.msh
 DefineConstant[ size = 0.34 ];
 SetFactory("Built-in");
 Point(1) = {0, 0, 0, size};

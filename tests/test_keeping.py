@@ -81,6 +81,35 @@ def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys):
     assert "refused: 2 of 4" in capsys.readouterr().out
 
 
+def test_a_part_of_the_energy_gains_nothing(tmp_path, monkeypatch, capsys):
+    """A block falls from rest: Ek = m g^2 t^2/2, while Ek + m g y stays."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    script = """speed = 1
+method(ulmpm, FLIP, linear, 1)
+dimension(1, 0, 10, 1)
+region(line, block, 6, 7)
+material(rubber, linear, 1, 100, 0)
+solid(body, region, line, 1, rubber, 1, 0)
+fix(v, initial_velocity_particles, all, speed)
+fix(g, body_force, all, -10)
+compute(Ek, kinetic_energy, all)
+compute(c, center_of_mass, all)
+E = Ek + 10*c_x
+set_dt(0.01)
+set_output(1)
+log_modify(custom, step, time, Ek, E)
+run(20)
+"""
+    (tmp_path / "in.fall").write_text(script, encoding="utf-8")
+    assert main(["sweep", "in.fall", "-var", "speed=0", "-o", "runs.csv"]) == 0
+    assert main(["chart", "runs.csv", "-keeps", "Ek"]) == 0
+    out = capsys.readouterr().out
+    assert "| grows " in out and "gains" not in out and "silent" not in out
+    assert main(["chart", "runs.csv", "-keeps", "E"]) == 0
+    assert "| keeps " in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -2,15 +2,18 @@
 
 import builtins
 import math
+import re
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
+from conftest import INPUTS
 from hubs import DENSITY, SmallHub
 from meshed import CUTS, grid_mesh, write
 from test_scene_script import message
 
+from karamelo_py.app.cli import main
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
 from karamelo_py.script.errors import ScriptError
@@ -252,6 +255,22 @@ def test_a_geometry_and_its_groups(plate, name, capfd):
     with pytest.raises(ScriptError, match="group 'rim' does not fit 2D"):
         solid_of(plate / name, 2, group="rim")
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_geometry_in_space_does_not_fit_a_plane():
+    """Its only physical group is a volume: Gmsh would write a mesh of nothing."""
+    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    with pytest.raises(
+        ScriptError, match="does not fit 2D: its physical groups have 3 dim"
+    ) as told:
+        solid_of(INPUTS / "cantilever.geo", 2)
+    assert told.value.argument == "file"
+
+
+def test_the_beam_of_tetrahedra_runs_as_it_is(capsys):
+    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    assert main(["check", str(INPUTS / "in.cantilever_tets")]) == 0
+    assert re.search("^points +[0-9]+ in 1 solid", capsys.readouterr().out, re.M)
 
 
 def test_groups_are_regions(plate):

@@ -82,7 +82,7 @@ def run(options: Any) -> int:
     rows, variables, made = read(options.table, options.where)
     by = [name.strip() for name in options.by.split(",") if name.strip()]
     if options.keeps:
-        return keeps(options, rows, by or variables, variables)
+        return keeps(options, rows, by or variables, variables, made)
     if options.curve:
         return curves(options, rows, by or variables, made)
     said = made.get("record", ())
@@ -202,14 +202,15 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     return 0
 
 
-def keeps(options: Any, rows: list, by: list[str], variables: list[str]) -> int:
+def keeps(options: Any, rows: list, by: list[str], variables: list[str], made: dict) -> int:
     """Show whether a log column stays what it was, and which runs fail without a known cause."""
     out = out_file(options.o, ".md") if options.o else None
     for name in by:
         if name not in variables:
             raise missing("-by", name, variables)
     over, folder = options.x or "Time", options.table.parent
-    kept = [keeping.look_at(row, folder, over, options.keeps, keeping.WITHIN) for row in rows]
+    what = over, options.keeps, keeping.WITHIN, made.get("computes", ())
+    kept = [keeping.look_at(row, folder, *what) for row in rows]
     found = keeping.table(rows, kept, by, variables)
     text = keeping.markdown(found)
     print(text)

@@ -1,7 +1,7 @@
 """Whether a log column, such as an energy, stays what it was: a cell for each run of a study."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ from karamelo_py.app.studies.curves import missing
 WITHIN = 0.1  # of what it was, which still counts as kept
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
+OF_PARTS = {"gains": "grows", "damps": "falls"}
 _SAID = re.compile(r"(?:^|: )(?:warning|error): (.*)")
 _WARNED = re.compile(r"(?:^|: )warning: ")
 _CAUSE = re.compile(r"Known to do that here: (.*)|(numerical fracture)")
@@ -27,7 +28,8 @@ class Kept(NamedTuple):
     ----------
     word
         ``keeps``, ``damps``, ``gains``, ``breaks`` (the run was stopped on its way), ``refused``
-        (it made no step), or ``unknown`` (given up or killed).
+        (it made no step), or ``unknown`` (given up or killed). What is a part of the energy
+        ``falls`` or ``grows``: whether the whole is lost or gained it does not tell.
     number
         Mean of the last part of the run over that of the first; of a run that breaks, when.
     said
@@ -58,8 +60,11 @@ def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, fl
     return ("damps" if ratio < 1 - within else "keeps"), ratio
 
 
-def look_at(row: Mapping[str, str], folder: Path, over: str, column: str, within: float) -> Kept:
-    """What became of a column in a run.
+def look_at(
+    row: Mapping[str, str], folder: Path, over: str, column: str, within: float,
+    parts: Container[str] = (),
+) -> Kept:  # fmt: skip
+    """What became of a column in a run; a value of one of the computes `parts` is no whole.
 
     Raises
     ------
@@ -86,6 +91,8 @@ def look_at(row: Mapping[str, str], folder: Path, over: str, column: str, within
         warned = warned or any(_CAUSE.search(text) for text in said)
     else:
         word, number = judge(log[over], log[column], within)
+        if column in parts or column.rpartition("_")[0] in parts:
+            word = OF_PARTS.get(word, word)
     return Kept(word, number, tuple(dict.fromkeys(causes)), warned)
 
 

@@ -10,6 +10,7 @@ from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import Family, column, usable
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
+from karamelo_py.script.errors import plural
 from karamelo_py.script.terms import number_of
 
 
@@ -86,7 +87,7 @@ def _footnote(figure: Any, family: Family, convergence: bool, front: Any) -> Non
     if convergence and family.without:
         said.append("× at the top: no value (failed)")
     elif family.without:
-        said.append(f"{len(family.without)} runs without a value are not shown")
+        said.append(f"not shown: {plural(len(family.without), 'run')} without a value")
     if said:
         figure.supxlabel("; ".join(said), fontsize=8, color="0.35", x=0.02, ha="left")
 

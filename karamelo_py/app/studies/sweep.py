@@ -15,7 +15,7 @@ from karamelo_py.app.studies.options import (
     zipped,
 )
 from karamelo_py.app.studies.study import Study, results_table, terminal
-from karamelo_py.app.studies.variables import cases, logged
+from karamelo_py.app.studies.variables import cases, computes, logged
 from karamelo_py.script.errors import ScriptError, plural
 
 DESCRIPTION = """\
@@ -63,6 +63,7 @@ def run(options: Any) -> int:
         script=str(options.script),
         variables=values,
         record=[item.text for item in items],
+        computes=computes(options.script),
         timed=options.time,
         repeat=repeat,
         threads=launch.threads,

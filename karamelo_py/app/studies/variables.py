@@ -207,6 +207,16 @@ def logged(path: Path) -> list[str] | None:
     return headings
 
 
+def computes(path: Path) -> list[str]:
+    """The IDs of the computes of a script and of those that it includes, as far as known."""
+    return [
+        statement.arguments[0].code.strip()
+        for text in texts(path)
+        for statement in parse(text, str(path))
+        if isinstance(statement, Call) and statement.name == "compute" and statement.arguments
+    ]
+
+
 def _collect(path: Path, read: set[str], assigned: set[str], seen: set[Path]) -> bool:
     """Gather the names of a script and what it includes; False if not all of it is known."""
     if path in seen:

@@ -129,6 +129,15 @@ def _mesh_geometry(path: Path, dimension: int, target: Path) -> None:
         gmsh.model.mesh.generate(dimension)
         if not len(gmsh.model.mesh.getNodes()[0]):
             raise ScriptError(f"{path.name} has nothing to mesh", argument="file")
+        # Where there are physical groups, Gmsh writes what is in them and no more.
+        groups = {d for d, _ in gmsh.model.getPhysicalGroups()}
+        if groups and min(groups) > dimension:
+            raise ScriptError(
+                f"{path.name} does not fit {dimension}D: its physical groups have "
+                f"{min(groups)} dimensions",
+                argument="file",
+                expected=f"a physical group of {dimension} dimensions, or none",
+            )
         gmsh.write(str(target))
         if not mine:
             gmsh.model.remove()
