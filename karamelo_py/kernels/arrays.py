@@ -252,6 +252,8 @@ CLOCK = np.dtype(
         ("first_mean", np.float64),  # mean of the first window
         ("largest_mean", np.float64),
         ("largest_energy", np.float64),  # of kinetic, stored and work
+        ("largest_own", np.float64),  # the same, without what bodies have that only drift
+        ("of_drift", np.float64),  # kinetic energy of the centres of mass at the start
         ("supplied", np.float64),  # largest work so far, of either sign
         ("energy_floor", np.float64),  # round-off of energies
         ("windows", np.int64),  # in which the balance has grown, one after another

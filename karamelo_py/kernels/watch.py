@@ -29,6 +29,7 @@ from karamelo_py.points.laws import (
 LOOK = 10  # steps between two looks
 LOOKS = 10  # looks that are averaged, in a window of 100 steps
 GROWTH = 0.01  # of the largest energy so far, in a window: more is told
+DRIFTING = 0.01  # of the energy of bodies that drift, which hides what they vibrate by
 BOUND = 10.0  # times the energy that there was and that loads have brought: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
 COARSE = 1000.0  # round-off errors: a strain of so many is noise, too
@@ -98,6 +99,12 @@ def _sum_before(s, step):
     clock.stored_at = step
 
 
+@shared
+def unit_of(clock):
+    """What growth of energy is measured by: the most that there was, of a drift no more than so."""
+    return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
+
+
 @entered
 def judge(control):
     """Take the present sums into account; whether energy keeps within its bound."""
@@ -113,6 +120,8 @@ def judge(control):
     clock.largest_energy = max(
         clock.largest_energy, abs(clock.kinetic), abs(clock.stored), clock.supplied
     )
+    own = max(abs(clock.stored), abs(clock.kinetic - clock.of_drift), clock.supplied)
+    clock.largest_own = max(clock.largest_own, own)
     # Means of windows: a single look shows the shortest waves, too.
     clock.sum_of_balance += balance
     if clock.looks % LOOKS == 0:
@@ -120,7 +129,7 @@ def judge(control):
         clock.sum_of_balance = 0.0
         if clock.looks == LOOKS:
             clock.first_mean = clock.largest_mean = mean
-        unit = max(clock.largest_energy, clock.energy_floor)
+        unit = unit_of(clock)
         growth = (mean - clock.largest_mean) / unit
         clock.windows = clock.windows + 1 if growth > GROWTH else 0
         clock.growth = growth
@@ -189,7 +198,7 @@ def begin_to_look(s, level, anew):
         clock.looks = 0
         clock.windows = 0
         clock.growth = clock.grown = clock.supplied = 0.0
-        clock.sum_of_balance = clock.largest_energy = 0.0
+        clock.sum_of_balance = clock.largest_energy = clock.largest_own = 0.0
     step = int(s.control.values[TIMESTEP])
     if step % LOOK == 0 and (anew or clock.stored_at != step):
         _sum_before(s, step)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
-from karamelo_py.kernels.watch import BORNE, LOOKS
+from karamelo_py.kernels.watch import BORNE, LOOKS, unit_of
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
@@ -166,8 +166,7 @@ def grown_little(simulation: Any) -> bool:
         return True
     # The last look, too: noise that grows by half in a hundred steps is there in the state already.
     before = clock.first_mean if clock.looks > LOOKS else clock.first_balance
-    unit = max(clock.largest_energy, clock.energy_floor)
-    return bool(clock.balance - before < IN_ALL * unit)
+    return bool(clock.balance - before < IN_ALL * unit_of(clock))
 
 
 def forget_growth(simulation: Any) -> None:
