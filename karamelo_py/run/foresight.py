@@ -51,7 +51,7 @@ DRIFT = 0.01  # of the speed of waves, from where on it feeds the noise of FLIP 
 # ... over so many cells times c dt/h in the plane and in space, a sixth of that in 1D: functions
 # whose gradients jump, boxes, quadratic and cubic splines, with two points a cell or with one
 # (a disk that vibrates by 0.3 to 2 % gains 10 % to several times its energy over twice that).
-FAR_JUMPS, FAR_BOXES, FAR_QUADRATIC, FAR_CUBIC = 7, 18, (54, 27), (135, 70)
+FAR_JUMPS, FAR_BOXES, FAR_QUADRATIC, FAR_CUBIC = (7, 4), (18, 18), (54, 27), (135, 70)
 SWING = 0.05  # strain of vibrations that bodies do not bear for long
 SEPARATE = 0.1  # of ASFLIP's strength of separation, which elastic bodies bear
 SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
@@ -214,11 +214,11 @@ def _drift_noise(s: Foreseen) -> Iterator[Failure]:
     elif s.basis.steep_edge:
         far = FAR_BOXES
     else:
-        far = (FAR_CUBIC if isinstance(s.basis, CubicSpline) else FAR_QUADRATIC)[sparse(s.hub)]
+        far = FAR_CUBIC if isinstance(s.basis, CubicSpline) else FAR_QUADRATIC
     spacing = s.simulation.control.clock[0].spacing
     cells = s.drift * s.waves * s.duration / spacing
     step = s.simulation.dt * s.waves / spacing
-    if DRIFT < s.drift < 1 and cells * step > (far if s.d > 1 else far / 6):
+    if DRIFT < s.drift < 1 and cells * step > far[sparse(s.hub)] / (1 if s.d > 1 else 6):
         yield Failure(
             "noise of a drift",
             f"a body drifts at {s.drift:.2g} times the speed of waves through about {cells:.0f} "
