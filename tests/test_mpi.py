@@ -71,10 +71,12 @@ def moving(folder: Path, *lines: str, size: float = 0.2) -> Path:
 def test_compiled_in_the_plane(tmp_path):
     """Three processes; two go on from their file."""
     disks = INPUTS / "in.two_disks"
-    text = disks.read_text(encoding="utf-8").split("run")[0]
+    text = (
+        disks.read_text(encoding="utf-8").split("run")[0].replace("set_dt(0.001)", "dt_factor(0.5)")
+    )
     path = tmp_path / "in.script"
     path.write_text(text + "\n".join(FILES) + "\nrun(20)\n", encoding="utf-8")
-    words = (str(path), "-var", "N", "60", "--threads", "1")
+    words = (str(path), "-var", "N", "60", "-var", "v", "3", "--threads", "1")  # sorted often
     one, three, two = (tmp_path / name for name in ("one", "three", "two"))
     one.mkdir()
     assert main([*words, "-out", str(one)]) == 0

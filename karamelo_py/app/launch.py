@@ -38,6 +38,7 @@ OPEN_MPI = {
 SIGNALLED = 128
 PAUSE = 0.05  # seconds between two looks at mpiexec
 GRACE = 2.0  # seconds that processes have to end after it
+LONGEST = 15.0  # ... after one of them has failed; twice that where mpiexec does not heed
 AT_ONCE = 3  # so many signals end all without waiting for the step
 LONGEST_NAME = 90  # of a socket
 A_CORE = 16  # processes at most: who asks for more means another number
@@ -94,6 +95,7 @@ class Launcher:
         self.reports: dict[int, dict[str, Any]] = {}
         self.lost: list[dict[str, Any]] = []  # ended without a report, in this order
         self.over = False  # the first has done all
+        self.failed = 0.0  # when one has told that it failed
         self.signals: list[int] = []
         self.heeded: list[int] = []
         self.process: Any = None
@@ -111,6 +113,7 @@ class Launcher:
             )  # fmt: skip
             while self.process.poll() is None:
                 self._listen()
+                self._end_those_that_stay()
             end = time.monotonic() + GRACE
             while self.links and time.monotonic() < end:
                 self._listen()
@@ -143,11 +146,21 @@ class Launcher:
     def _pass_on(self, number: int, _: Any) -> None:
         self.signals.append(number)
         first = next((link for link, one in self.links.items() if one["rank"] == 0), None)
-        if first is not None and len(self.signals) < AT_ONCE:
+        if first is not None and 0 not in self.reports and len(self.signals) < AT_ONCE:
             with suppress(OSError):
                 first.sendall(bytes([number]))
         elif self.process is not None:
             self.process.terminate()
+
+    def _end_those_that_stay(self) -> None:
+        """End mpiexec where a process has failed long ago, and others have not seen it."""
+        if any(one["status"] for one in self.reports.values()):
+            self.failed = self.failed or time.monotonic()
+            late = time.monotonic() - self.failed
+            if late > 2 * LONGEST:
+                self.process.kill()
+            elif late > LONGEST:
+                self.process.terminate()
 
     def _listen(self) -> None:
         ready, *_ = select.select([self.door, *self.unknown, *self.links], [], [], PAUSE)

@@ -143,7 +143,10 @@ def together(
 
     status, text = outcome(act)
     if crew is None:
-        return end(status, text, tells=rank == 0, stays=True)
+        end(status, text, tells=rank == 0, stays=True)
+        if status == INTERRUPTED:  # while others join: they would be waited for at the end
+            os._exit(status)
+        return status
     if crew.parted:
         return end(status, text, tells=True, stays=True)
     patience = inf

@@ -77,6 +77,7 @@ class Crew:
         self.world = world = pkl5.Intracomm(MPI.COMM_WORLD)
         self.rank, self.size = world.Get_rank(), world.Get_size()
         self._aside = world.Dup()  # where they meet, whatever is under way elsewhere
+        self._between = world.Dup()  # for what is passed on in steps
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
         mine = socket.gethostname(), cores
         self.beside = self.everyone(mine).count(mine)
@@ -150,8 +151,8 @@ class Crew:
 
     def linked(self, given: list[tuple[int, Any]], taken: list[tuple[int, Any]]) -> Any:
         """Ways on which arrays go to others (rank, array), again and again, and theirs come."""
-        requests = [self.world.Recv_init(array, rank) for rank, array in taken]
-        return requests + [self.world.Send_init(array, rank) for rank, array in given]
+        requests = [self._between.Recv_init(array, rank) for rank, array in taken]
+        return requests + [self._between.Send_init(array, rank) for rank, array in given]
 
     def start(self, link: Any) -> None:
         """Begin to send what is in the arrays, and to fill others."""

@@ -23,9 +23,7 @@ from karamelo_py.run.tiles import in_use, numbers
 from karamelo_py.run.work import Work
 from karamelo_py.scene.hub import Hub
 
-LEARN_EVERY = (
-    100  # steps from one output to another: then it is seen whether the work is shared well
-)
+LEARN_EVERY = 100  # steps from output to output, after which it is seen how work is shared
 
 
 class Part:

@@ -272,6 +272,7 @@ class SharedTiles(Tiles):
         self.given = {
             rank: _rows(low, high, first[which], steps[which])
             for rank, (which, low, high) in self._passed.items()
+            if len(which)  # where hulls meet there need not be a node of both
         }
         ends = np.append(0, np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1)))
         own = len(ends) - 1 - len(self._from)
