@@ -5,7 +5,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import ceil, isfinite
+from math import ceil, isclose, isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -318,8 +318,15 @@ class Map:
         lines = ("stable_dt", limit, "k--"), ("own_dt", "the program's own", "k:")
         rows = list(pairwise(edges(y)))
         for step, said, style in lines:
-            ends = [(at, up) for j, row in enumerate(rows)
-                    if (at := self.where(step, j)) is not None for up in row]  # fmt: skip
+            ends: list[tuple[float, float]] = []
+            before = 0
+            for j, row in enumerate(rows):
+                if (at := self.where(step, j)) is None:
+                    continue
+                if ends and j > before + 1 and not isclose(at, ends[-1][0], rel_tol=1e-3):
+                    ends.append((nan, nan))  # nobody knows how it goes on between such rows
+                ends += [(at, up) for up in row]
+                before = j
             if ends:
                 handles += axes.plot(
                     *zip(*ends, strict=True), style, linewidth=1.4, label=f"first step = {said}"
