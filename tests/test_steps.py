@@ -49,6 +49,18 @@ def test_a_body_at_rest_steps_at_its_wave_speed(run_interpreted, basis, factor):
     assert float(said[1]) == pytest.approx(own * step, rel=1e-5)
 
 
+def test_a_later_step_of_the_script_is_named_as_it_is_taken(run_interpreted):
+    """While points are at rest, and after a run with the program's own step, which is longer."""
+    lines = [LOG, "run(1)", "dt_factor(1.1)", "run(2)"]
+    result = run_interpreted(block(2, *lines, transfer="FLIP quadratic", ppc=1))
+    step = H / SPEED
+    assert result.log.dt[[0, -1]] == pytest.approx([0.9 * 1.25 * step, 1.1 * step], rel=1e-6)
+    assert f"the step {1.1 * step:.4g} of dt_factor is above the stable limit {step:.4g}" in (
+        result.err
+    )
+    assert "dt_factor(0.9) or less" in result.err
+
+
 @pytest.mark.parametrize(
     "scheme, transfer, ppc, still, share",
     [

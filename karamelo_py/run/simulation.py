@@ -491,7 +491,7 @@ class Simulation(ById):
 
     @property
     def limit_moving(self) -> float:
-        """The stable step once points go from cell to cell: what steps of a script are shares of."""
+        """The stable step of points that go from cell to cell: steps of a script are its shares."""
         clock = self.control.clock[0]
         waves = clock.courant_moving * clock.spacing / clock.rate if clock.rate > 0 else np.inf
         return float(min(waves, clock.heat_limit))
