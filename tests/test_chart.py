@@ -143,7 +143,13 @@ def test_words_along_the_axes(table, capsys):
     assert main([*draw, ",relative error (1)"]) == 0
     text = (table / "chart.svg").read_text(encoding="utf-8")
     assert "relative error (1)" in text and "time of the stepping loop (s)" in text
-    assert main([*draw, "N,err", "-heat", "N,basis"]) == 1
+    assert main([*draw, ' "cells, in all" ,basis of N', "-heat", "N,basis"]) == 0
+    text = (table / "chart.svg").read_text(encoding="utf-8")
+    assert "cells, in all" in text and "basis of N" in text
+    assert main([*draw, "N,err", "-x", "N"]) == 0
+    assert main([*draw, "N,err", "-versus", "basis"]) == 1
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-axes", "N,err"]) == 1
+    assert capsys.readouterr().err.count("expected: -curve, or -accuracy with -o") == 2
     assert main([*draw, "N"]) == 1
     assert "two, such as -axes" in capsys.readouterr().err
 

@@ -245,9 +245,9 @@ def advice(lowered):
 
     def say(script, dt=1.0, limit=1.0, **variables) -> str:
         hub = lowered(script, **variables)
-        clock = SimpleNamespace(courant_moving=1, spacing=limit, rate=1, heat_limit=inf)
+        clock = SimpleNamespace(spacing=limit, rate=1, heat_limit=inf)
         control = SimpleNamespace(clock=[clock])
-        found = savings(hub, SimpleNamespace(dt=dt, limit_moving=limit, control=control))
+        found = savings(hub, SimpleNamespace(dt=dt, limit=limit, control=control))
         return "\n".join(f"{saving.cost} / {saving.instead}" for saving in found)
 
     return say

@@ -1,5 +1,6 @@
 """Time steps: the stable step, fixed steps, exact ends of runs, runs that follow each other."""
 
+import re
 from math import sqrt
 
 import numpy as np
@@ -29,9 +30,35 @@ def test_first_step_follows_the_fastest_point(run_interpreted, d, law, factor):
     assert log.Time[1] == pytest.approx(log.dt[0], rel=1e-9)
 
 
-def test_a_body_at_rest_steps_at_its_wave_speed(run_interpreted):
-    log = run_interpreted(block(2, "dt_factor(0.9)", LOG, "run(3)", ppc=1)).log
-    assert log.dt == pytest.approx(np.full(4, 0.9 * H / SPEED), rel=1e-9)
+@pytest.mark.parametrize("basis", ["linear", "quadratic-spline", "cubic-spline"])
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_a_body_at_rest_steps_at_its_wave_speed(run_interpreted, basis, factor):
+    """A dt_factor is a share of h/c (as Karamelo has it) whatever the basis; so say the warnings.
+
+    The program's own step at rest is 0.9 of 1.25 h/c with quadratic splines, of 1.4 with cubic
+    ones (docs/studies.md): the banner says so.
+    """
+    script = block(2, f"dt_factor({factor})", LOG, "run(3)", ppc=1)
+    result = run_interpreted(script.replace("FLIP, linear", f"FLIP, {basis}"))
+    step = H / SPEED
+    assert result.log.dt == pytest.approx(np.full(4, factor * step), rel=1e-9)
+    warned = f"the step {factor * step:.4g} of dt_factor is above the stable limit {step:.4g}"
+    assert (warned in result.err) == (factor > 1)
+    own = {"linear": 0.9, "quadratic-spline": 0.9 * 1.25, "cubic-spline": 0.9 * 1.4}[basis]
+    said = re.search(r"^  own dt +([\d.e-]+)", result.out, re.M)
+    assert float(said[1]) == pytest.approx(own * step, rel=1e-5)
+
+
+def test_a_later_step_of_the_script_is_named_as_it_is_taken(run_interpreted):
+    """While points are at rest, and after a run with the program's own step, which is longer."""
+    lines = [LOG, "run(1)", "dt_factor(1.1)", "run(2)"]
+    result = run_interpreted(block(2, *lines, transfer="FLIP quadratic", ppc=1))
+    step = H / SPEED
+    assert result.log.dt[[0, -1]] == pytest.approx([0.9 * 1.25 * step, 1.1 * step], rel=1e-6)
+    assert f"the step {1.1 * step:.4g} of dt_factor is above the stable limit {step:.4g}" in (
+        result.err
+    )
+    assert "dt_factor(0.9) or less" in result.err
 
 
 @pytest.mark.parametrize(

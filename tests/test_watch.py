@@ -52,6 +52,7 @@ def test_work_of_gravity_is_added_up(run_interpreted, scheme):
     lines = ["fix(g, body_force, all, 0, -1)", "set_dt(0.002)", "set_output(100)", "run(130)"]
     result = run_interpreted(block(2, TRAVEL, *lines, scheme=scheme, size=(0.2, 0.1)))
     assert "nowhere" not in result.out + result.err
+    assert "is not watched" not in result.out
 
 
 def test_a_step_above_the_limit_is_named(run_interpreted):

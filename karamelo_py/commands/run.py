@@ -44,7 +44,8 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
         Above 0; above 1 a run warns. Without this command the program takes 0.9, and less where a
         body that drifts would gain energy by that: with linear functions in the updated frame,
         FLIP or its kin (share above 0.99), and musl or usf 0.4, or 0.2 with one point a cell. While
-        no point has gone a quarter of a cell since the start that is not asked for.
+        no point has gone a quarter of a cell since the start that is not asked for, and splines
+        take a longer step; a factor is a share of the same stable step at rest as after.
 
     Example
     -------

@@ -23,8 +23,8 @@ from karamelo_py.run.crew import ENDING
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.stable import ruling_limit, words_of_share
-from karamelo_py.run.watch import forget_growth, grown_little, growth
+from karamelo_py.run.stable import ruling_limit, words_of_own_step, words_of_share
+from karamelo_py.run.watch import forget_growth, grown_little, growth, not_watched, unknown_work
 from karamelo_py.scene import boundary
 from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
@@ -418,7 +418,8 @@ class Runner:
                 cache.keep_time(scene, spent)
 
     def _banner(self, simulation: Simulation, going_on: bool) -> None:
-        hub = self.hub
+        hub, why = self.hub, unknown_work(self.hub)
+        own = words_of_own_step(hub, simulation)
         hub.console.banner(
             f"Run, continued from step {simulation.step}" if going_on else "Run",
             {
@@ -428,7 +429,9 @@ class Runner:
                 "bytes per particle": bytes_per_point(simulation),
                 "dt": simulation.dt,
                 "stable dt": simulation.limit,
+                **({"own dt": own} if own else {}),
                 "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
+                **({"energy": not_watched(why)} if why else {}),
                 **simulation.processes,
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,

@@ -48,7 +48,7 @@ def savings(hub: Hub, simulation: Any) -> list[Saving]:
 
 
 def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
-    share, limit = hub.update.dt_factor, simulation.limit_moving
+    share, limit = hub.update.dt_factor, simulation.limit
     if hub.update.fixed_dt is not None:
         dt = simulation.dt
     elif share is not None:

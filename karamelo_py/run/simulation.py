@@ -50,7 +50,7 @@ from karamelo_py.run.lowering import (
     warms_by_friction,
 )
 from karamelo_py.run.motion import Motion, motions
-from karamelo_py.run.stable import moves_already, ruling_limit, share_of_heat, steps_of_waves
+from karamelo_py.run.stable import moves_already, ruling_limit, share_of_heat, step_of_waves
 from karamelo_py.run.state import changing, go_back
 from karamelo_py.run.tiles import Tiles, in_tiles
 from karamelo_py.run.trial import try_parts
@@ -369,14 +369,14 @@ class Simulation(ById):
         """Tell the clock which steps are asked for; whether these are others than before."""
         clock = self.control.clock[0]
         names = "fixed_dt", "heat_factor", "dt_factor", "dt_factor_moving"
-        before = [clock[name] for name in names]
-        (courant, share), moving = steps_of_waves(self.hub, still=clock.path <= STILL)
-        clock.courant, clock.courant_moving = courant, moving[0]
-        asked = self.hub.update.fixed_dt or 0.0, share_of_heat(self.hub), share, moving[1]
-        now = [number / 2**halvings for number in asked]
-        for name, number in zip(names, now, strict=True):
+        courants = "courant", "courant_moving"
+        before = [clock[name] for name in (*courants, *names)]
+        now, moving = (step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False))
+        asked = self.hub.update.fixed_dt or 0.0, share_of_heat(self.hub), now[1], moving[1]
+        numbers = [now[0], moving[0], *(number / 2**halvings for number in asked)]
+        for name, number in zip((*courants, *names), numbers, strict=True):
             clock[name] = number
-        return now != before
+        return numbers != before
 
     def _watch_limit(self) -> None:
         """A step that is above its limit from the start is what the user wants."""
@@ -491,15 +491,14 @@ class Simulation(ById):
 
     @property
     def limit_moving(self) -> float:
-        """The stable step once points go from cell to cell."""
+        """The stable step of points that go from cell to cell: steps of a script are its shares."""
         clock = self.control.clock[0]
         waves = clock.courant_moving * clock.spacing / clock.rate if clock.rate > 0 else np.inf
         return float(min(waves, clock.heat_limit))
 
     def above_limit(self) -> bool:
-        """Whether the step is above the stable limit; that of set_dt, once points have moved."""
-        limit = self.limit_moving if self.control.clock[0].fixed_dt > 0 else self.limit
-        return self.control.values[DT] > limit * (1 + 1e-12)
+        """Whether the step is above the stable limit."""
+        return self.control.values[DT] > self.limit * (1 + 1e-12)
 
     @property
     def dt(self) -> float:

@@ -47,36 +47,36 @@ def keeping_share(hub: Hub) -> float:
     return max(share, DAMPED) if sparse(hub) else USUAL
 
 
-def stable_courant(hub: Hub, *, still: bool) -> float:
-    """The stable step as a share of cell size over wave speed, by scheme, basis and points.
+def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
+    """The stable step over h/c, and the share of it that the program takes of itself.
 
-    `still`: while no point has gone as far as `STILL`.
+    `still`: while no point has gone as far as `STILL`. The stable step is that of scheme, basis and
+    points a cell.
     """
-    scheme, method = hub.update.scheme, hub.update.method
+    scheme, method, update = hub.update.scheme, hub.update.method, hub.update
+    share = keeping_share(hub)
+    # Transfers of moments bear 1.3 h/c with quadratic splines, 1.5 with cubic ones.
+    still &= method.frame.moves and Moment not in getattr(update.transfer, "point_fields", ())
+    if still:
+        # A lone point of linear functions is stable up to 0.8 h/c in space.
+        share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
     two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
     if min(two, one) < 1:
         # Nodes between the corners of cells make the highest frequency higher.
-        return (one if sparse(hub) else two) * (0.7 if method.basis.nodes_per_cell > 1 else 1)
+        nodes = 0.7 if method.basis.nodes_per_cell > 1 else 1
+        return (one if sparse(hub) else two) * nodes, share
     if not method.frame.moves:
-        return getattr(method.basis, "courant_total", 1.0)
-    return getattr(method.basis, "courant_still", 1.0) if still else 1.0
+        return getattr(method.basis, "courant_total", 1.0), share
+    return getattr(method.basis, "courant_still", 1.0) if still else 1.0, share
 
 
-def steps_of_waves(hub: Hub, *, still: bool) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The stable step over h/c and the share of it that is taken: now, and once points move.
-
-    The share is that of the script, or the program's own.
-    """
-    asked = hub.update.dt_factor
-    moving = stable_courant(hub, still=False), keeping_share(hub) if asked is None else asked
-    # Transfers of moments bear 1.3 h/c with quadratic splines, 1.5 with cubic ones.
-    moments = Moment in getattr(hub.update.transfer, "point_fields", ())
-    if not still or moments or not hub.update.method.frame.moves:
-        return moving, moving
-    # A lone point of linear functions is stable up to 0.8 h/c in space.
-    usual = DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL
-    share = max(moving[1], usual) if asked is None else asked
-    return (stable_courant(hub, still=True), share), moving
+def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
+    """The same with the share of the script, which is one of the same step at rest as after."""
+    update = hub.update
+    if update.dt_factor is None and update.fixed_dt is None:
+        return own_step_of_waves(hub, still=still)
+    courant, share = own_step_of_waves(hub, still=False)
+    return courant, update.dt_factor or share
 
 
 def share_of_heat(hub: Hub) -> float:
@@ -90,11 +90,22 @@ def moves_already(simulation: Any) -> bool:
     return 100 * simulation.fastest() * clock.courant * clock.dt_factor > STILL * clock.rate
 
 
-def own_step(hub: Hub, simulation: Any) -> float:
-    """The step that the program would take of itself now, had points moved."""
+def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
+    """The step that the program would take of itself now: at rest, or had points moved."""
     clock = simulation.control.clock[0]
-    waves = clock.courant_moving * clock.spacing / clock.rate if clock.rate > 0 else inf
-    return float(min(keeping_share(hub) * waves, USUAL * clock.heat_limit))
+    courant, share = own_step_of_waves(hub, still=still)
+    limit = courant * clock.spacing / clock.rate if clock.rate > 0 else inf
+    return float(min(share * limit, USUAL * clock.heat_limit))
+
+
+def words_of_own_step(hub: Hub, simulation: Any) -> str:
+    """The step that the program would take of itself now, and how long; empty where it does."""
+    if hub.update.dt_factor is None and hub.update.fixed_dt is None:
+        return ""
+    still = simulation.control.clock[0].path <= STILL
+    step, after = (own_step(hub, simulation, still=s) for s in (still, False))
+    far = f", {after:.6g} once points have gone a quarter of a cell"
+    return f"{step:.6g}" + (far if after < step else "")
 
 
 def own_step_instead(hub: Hub, command: str = "") -> str:
@@ -109,7 +120,7 @@ def words_of_share(hub: Hub) -> str:
     """What the share of the stable step is, and what it means."""
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
     if hub.update.fixed_dt is not None:
-        share = hub.update.fixed_dt / hub.simulation.limit_moving
+        share = hub.update.fixed_dt / hub.simulation.limit
         words = f"{share:.3g} of the stable step"
     elif asked is None:
         clock, conduction = hub.simulation.control.clock[0], "conduction"

@@ -68,6 +68,7 @@ COLUMNS = {
     "points": "points at the beginning",
     "dt": "the first step",
     "stable_dt": "the largest stable step at the beginning",
+    "own_dt": "the first step of the program's own choice, where the script chose another",
     "bytes_per_particle": "bytes of all fields of a point, the mean over points",
     "peak_memory_mib": "largest resident memory of the process, MiB",
     "wall_s": "seconds of the whole process",
@@ -257,7 +258,7 @@ def read_facts(said: str) -> dict[str, float]:
         value = _leading_number(text)
         if value is None:
             continue
-        if name in ("points", "nodes", "dt", "stable dt", "bytes per particle"):
+        if name in ("points", "nodes", "dt", "stable dt", "own dt", "bytes per particle"):
             facts.setdefault(name.replace(" ", "_"), value)
         elif name == "steps" and part:
             seconds += value

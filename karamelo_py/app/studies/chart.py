@@ -1,5 +1,6 @@
 """karamelo-py chart: what accuracy costs, how errors fall, where two variables lead."""
 
+import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -59,7 +60,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "-axes",
         metavar="X,Y",
-        help="what to write along them, such as 'time (s),F (N)'; an empty one stays as it is",
+        help="what to write along them, such as 'time (s),F (N)'; an empty one stays as it is, "
+        "one with commas stands in double quotes",
     )
     parser.add_argument("-log", default="log.mpm", metavar="FILE", help="of -curve: another log")
     parser.add_argument("-where", action="append", default=[], help="rows that fulfil a condition")
@@ -72,8 +74,8 @@ def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     costs = bool(options.cost) or not options.x
     options.cost = options.cost or "seconds"
-    if options.axes and (options.heat or options.versus or options.keeps):
-        raise ScriptError("-axes", expected="a chart of lines: -accuracy, or -curve")
+    if options.axes and (options.versus or options.keeps or not (options.o or options.curve)):
+        raise ScriptError("-axes", expected="-curve, or -accuracy with -o and without -versus")
     if options.versus:
         return side_by_side(options)
     if len(options.tables) > 1:
@@ -100,7 +102,7 @@ def run(options: Any) -> int:
     if not options.x and not axes and not any(line.shown(line.cost).any() for line in family.lines):
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
     first = family.along if options.x else look.label(family.cost)
-    words = along(options, first, family.error_label)
+    words = along(options, *(axes or (first, family.error_label)))
     tell(family, made, costs=costs)
     if out is None:
         return 0
@@ -114,7 +116,7 @@ def run(options: Any) -> int:
             words=words,
         )  # fmt: skip
     elif axes:
-        pictures.heat(family, rows, *axes, out, title)
+        pictures.heat(family, rows, *axes, out, title, words=words)
     else:
         pictures.lines(family, out, convergence=bool(options.x), title=title, words=words)
     print(f"drawn: {out}")
@@ -123,10 +125,15 @@ def run(options: Any) -> int:
 
 def along(options: Any, x: str, y: str) -> tuple[str, str]:
     """What to write along the axes: as the options say, else `x` and `y`."""
-    words = (options.axes or ",").split(",")
+    words = split(options.axes or ",")
     if len(words) != 2:
         raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
-    return words[0].strip() or x, words[1].strip() or y
+    return words[0] or x, words[1] or y
+
+
+def split(text: str) -> list[str]:
+    """Words with commas between them; one in double quotes may have commas of its own."""
+    return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
 
 
 def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
@@ -181,7 +188,7 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     out = out_file(options.o or Path("curves.png"), *SUFFIXES[:-1])
     differing = [name for name in by if len({row[name] for row in rows}) > 1]
     over = options.x or "Time"
-    names = [name.strip() for name in options.names.split(",") if name.strip()]
+    names = [name for name in split(options.names) if name]
 
     def read(column: str) -> list[histories.History]:
         return histories.histories(

@@ -92,8 +92,14 @@ def _footnote(figure: Any, family: Family, convergence: bool, front: Any) -> Non
         figure.supxlabel("; ".join(said), fontsize=8, color="0.35", x=0.02, ha="left")
 
 
-def heat(family: Family, rows: Sequence[Any], x: str, y: str, path: Path, title: str = "") -> None:
-    """A column of the table over two variables, as coloured cells with their numbers."""
+def heat(
+    family: Family, rows: Sequence[Any], x: str, y: str, path: Path, title: str = "", *,
+    words: tuple[str, str],
+) -> None:  # fmt: skip
+    """A column of the table over two variables, as coloured cells with their numbers.
+
+    `words` stand along the axes.
+    """
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm
 
@@ -138,8 +144,8 @@ def heat(family: Family, rows: Sequence[Any], x: str, y: str, path: Path, title:
         axes.set_title(", ".join(said), fontsize=9)
     for axes in all_axes[len(panels) :]:
         axes.set_visible(False)
-    figure.supxlabel(x, fontsize=10)
-    figure.supylabel(y, fontsize=10)
+    figure.supxlabel(words[0], fontsize=10)
+    figure.supylabel(words[1], fontsize=10)
     ticks = look.log_ticks(*norm_ends(norm))
     bar = figure.colorbar(mesh, ax=list(all_axes), label=family.error_label)
     bar.set_ticks(ticks, labels=[tick_text(tick) for tick in ticks])

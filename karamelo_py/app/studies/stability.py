@@ -5,7 +5,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import ceil, isfinite
+from math import ceil, isclose, isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -227,6 +227,7 @@ class Map:
                     "growth": row.get("growth"),
                     "dt": row.get("dt"),
                     "stable_dt": row.get("stable_dt"),
+                    "own_dt": row.get("own_dt"),
                     "limit": row.get("limit", ""),
                     "message": row.get("reason", ""),
                     "folder": row.get("folder", ""),
@@ -234,14 +235,14 @@ class Map:
             )
         return rows
 
-    def limit(self, j: int) -> float | None:
-        """The first variable where the first step is the program's stable step, in row j."""
+    def where(self, step: str, j: int) -> float | None:
+        """The first variable where the first step is the one of this column, in row j."""
         x = [float(v) for v in self.values[self.axes[0]]]
         points = []
         for (i, other), row in sorted(self.found.items()):
-            dt, stable = row.get("dt"), row.get("stable_dt")
-            if other == j and dt and stable and isfinite(dt / stable):
-                points.append((x[i], dt / stable))
+            dt, same = row.get("dt"), row.get(step)
+            if other == j and dt and same and isfinite(dt / same):
+                points.append((x[i], dt / same))
         for (xa, a), (xb, b) in pairwise(points):
             if (a - 1) * (b - 1) <= 0 and a != b:
                 return xa + (1 - a) / (b - a) * (xb - xa)
@@ -312,16 +313,24 @@ class Map:
             Patch(facecolor="none", edgecolor="none", label=f"{k}  {reason}")
             for reason, k in number_of.items()
         ]  # fmt: skip
-        limits = [self.limit(j) for j in range(len(y))]
-        rows = edges(y)
-        own = [(limit, up) for limit, *ends in zip(limits, rows, rows[1:], strict=False)
-               if limit is not None for up in ends]  # fmt: skip
-        if own:
-            at, up = zip(*own, strict=True)
-            names = dict.fromkeys(row["limit"] for row in self.found.values() if row["limit"])
-            said = "first step = the program's limit" + (f"\n({', '.join(names)})" if names else "")
-            line = axes.plot(at, up, "k--", linewidth=1.4, label=said)
-            handles += line
+        names = dict.fromkeys(row["limit"] for row in self.found.values() if row["limit"])
+        limit = "the program's limit" + (f"\n({', '.join(names)})" if names else "")
+        lines = ("stable_dt", limit, "k--"), ("own_dt", "the program's own", "k:")
+        rows = list(pairwise(edges(y)))
+        for step, said, style in lines:
+            ends: list[tuple[float, float]] = []
+            before = 0
+            for j, row in enumerate(rows):
+                if (at := self.where(step, j)) is None:
+                    continue
+                if ends and j > before + 1 and not isclose(at, ends[-1][0], rel_tol=1e-3):
+                    ends.append((nan, nan))  # nobody knows how it goes on between such rows
+                ends += [(at, up) for up in row]
+                before = j
+            if ends:
+                handles += axes.plot(
+                    *zip(*ends, strict=True), style, linewidth=1.4, label=f"first step = {said}"
+                )
         said = "run; others inferred"
         handles.append(Line2D([], [], color="k", marker=".", linestyle="", label=said))
         axes.legend(
