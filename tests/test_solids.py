@@ -20,6 +20,7 @@ from karamelo_py.styles.methods.ulcpdi import ULCPDI
 from karamelo_py.styles.regions.block import Block
 from karamelo_py.styles.regions.cylinder import Cylinder
 from karamelo_py.styles.regions.difference import Difference
+from karamelo_py.styles.regions.intersection import Intersection
 from karamelo_py.styles.regions.sphere import Sphere
 from karamelo_py.styles.regions.union import Union
 
@@ -167,6 +168,16 @@ def test_what_a_region_cuts_has_its_area(shape, ppc):
     assert not hub.warnings
     if shape != "strip":  # which is thinner than a tenth of a box everywhere
         assert solid.volume0.min() >= 0.1 / ppc**2
+
+
+def test_a_part_that_bounds_the_region_may_be_thin():
+    """A strip of a disk, along its middle: exact across, arcs as far as parts of a box tell."""
+    hub = SmallHub(2, -10, 10, 1.0)
+    disk = hub.region("disk", Cylinder, 0, 0, 2.5)
+    strip = hub.region("strip", Block, -5, 5, 0.2, 0.24)
+    solid = hub.solid("s", hub.combine("r", Intersection, disk, strip), points="cut")
+    assert solid.volume0.sum() == pytest.approx(2 * 0.04 * np.sqrt(2.5**2 - 0.22**2), rel=5e-3)
+    assert not hub.warnings
 
 
 @pytest.mark.parametrize("style", [Union, Difference])

@@ -52,15 +52,15 @@ def cut(region: Region, x: np.ndarray, size: float) -> Pieces:
 
 def missed(region: Region, pieces: Pieces, size: float) -> float:
     """How thick a region must be everywhere to be seen; 0 for one that is, as far as is known."""
-    d = region.dimension
-    seen = size / COARSE[d]
-    thin = pieces.rough.sum() > ROUGH * pieces.share.sum()
-    return seen if thin or any(_thinner(part, seen) for part in region.parts) else 0.0
+    seen = size / COARSE[region.dimension]
+    rough = pieces.rough.sum() > ROUGH * pieces.share.sum()
+    return seen if rough or _thin(region, seen, region.hi - region.lo) else 0.0
 
 
-def _thinner(region: Region, seen: float) -> bool:
-    width = (region.hi - region.lo)[: region.dimension].min()
-    return 0 < width < seen * (1 - NOTHING) or any(_thinner(p, seen) for p in region.parts)
+def _thin(region: Region, seen: float, whole: np.ndarray) -> bool:
+    """Whether a part of it is thinner than that, along an axis along which the `whole` is not."""
+    width, limit = region.hi - region.lo, np.minimum(whole, seen) * (1 - NOTHING)
+    return ((width > 0) & (width < limit)).any() or any(_thin(p, seen, whole) for p in region.parts)
 
 
 def _cut(region: Region, x: np.ndarray, size: float) -> Pieces:
