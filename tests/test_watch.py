@@ -211,3 +211,11 @@ def test_a_drift_does_not_hide_what_vibrates(run_script):
     said = run_script(INPUTS / "in.energy_disk", *options).err
     assert "energy comes from nowhere" in said
     assert "noise of a drift" in said
+
+
+def test_points_that_drift_out_are_no_matter_of_the_step(run_interpreted):
+    """A free bar at constant speed: half the step brings it to the same edge."""
+    lines = ["fix(v, initial_velocity_particles, all, 0.2)", "set_output(50)"]
+    scene = DRIFTING.split("fix(v")[0].format(v=0, words="") + "\n".join(lines)
+    said = run_interpreted(scene + "\nrun_time(400, on_trouble=halve)", status=1).err
+    assert "leaves the domain" in said and "Back to step" not in said

@@ -77,7 +77,8 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
         and tries half the step, at most five times, and says so. Log, dumps, curves, and computes
         that remember (errors, drifts) go back to that state, too: what had been written since is
         written again. Files and pictures of one step are overwritten when it comes again, or stay
-        where it does not.
+        where it does not. Points that leave the domain without a gain of energy are no matter of
+        the step: there the run stops (see `boundary`).
 
     Example
     -------

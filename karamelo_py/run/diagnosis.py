@@ -22,6 +22,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead
 from karamelo_py.run.tiles import in_tiles
 from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain, grown_little, has_grown
+from karamelo_py.scene.boundary import leaving
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError
 
@@ -92,6 +93,26 @@ def stop(
     error = ScriptError(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error
+
+
+def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
+    """Whether a step went wrong because points leave the domain, with no more energy than before.
+
+    No smaller step keeps these. Where nobody watches energy, who knows.
+    """
+    moves = hub.update.method.frame.moves
+    if not (moves and leaving(simulation).size and grown_little(simulation)):
+        return False
+    step = simulation.step
+    simulation.restore(snapshot)
+    before, steps = _energy(simulation), step - simulation.step
+    if steps:
+        simulation.advance(steps)
+    gain = _energy(simulation) - before
+    floor = float(simulation.control.clock[0].energy_floor)
+    healthy = gain <= IN_ALL * max(abs(before), floor) and not simulation.above_limit()
+    simulation.advance(1)  # which goes wrong again, for others to look at
+    return healthy
 
 
 def _energy(simulation: Simulation) -> float:

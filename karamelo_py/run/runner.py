@@ -298,6 +298,8 @@ class Runner:
         """Go back to the last good state with half the step, where the script asks for that."""
         if not self.halve or self.halvings == HALVINGS:
             return False
+        if status == STOPPED and diagnosis.only_leave(self.hub, simulation, self.snapshot):
+            return False
         message = message or diagnosis.trouble(self.hub, simulation, status)[0]
         self.halvings += 1
         simulation.restore(self.snapshot)

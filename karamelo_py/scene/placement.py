@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.scene.cut import Pieces, cut, join, missed
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice, chunks, positions
 from karamelo_py.scene.region import Region
@@ -15,8 +16,6 @@ from karamelo_py.script.errors import ScriptError
 MAX_POINTS = 2**31 - 1
 # Beyond this many candidates the points outside the domain are no longer counted, only mentioned.
 _MAX_COUNTED = 20_000_000
-FINE = {1: 64, 2: 16, 3: 8}  # parts of a box along each direction, where a region cuts it
-LEAST = 0.1  # of a box, less of which is no point
 
 
 class Placement(NamedTuple):
@@ -38,6 +37,8 @@ class Placement(NamedTuple):
         ``box``, or the cell type that meshio uses.
     corners : ndarray (n, c, d) or None
         Corners of the initial domains that are no boxes.
+    missed : float
+        Parts of the region thinner than that may be missing, see `cut.missed`.
     """
 
     x0: "np.ndarray | Filled"
@@ -48,6 +49,7 @@ class Placement(NamedTuple):
     outside: float = 0
     shape: str = "box"
     corners: np.ndarray | None = None
+    missed: float = 0
 
 
 class Filled:
@@ -224,7 +226,7 @@ def fill(
     places = pattern.places * h
     x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
     numbers: list[np.ndarray] = []  # which point of the pattern each one is
-    left: list[tuple[np.ndarray, np.ndarray]] = []  # of boxes that are cut, middles and shares
+    left: list[Pieces] = []
     outside = 0.0
     for k in range(len(x0.chunks)):
         x = x0.candidates(k)
@@ -233,7 +235,7 @@ def fill(
         if counted:
             outside += _beyond_closed_sides(x[kept & ~in_domain], lo, hi, domain)
         if rule == "cut":
-            left.append(_cut(region, domain, x, h / ppc))
+            left.append(cut(region, x, h / ppc))
             continue
         kept &= in_domain
         x0.keep(kept)
@@ -243,35 +245,14 @@ def fill(
         outside = math.inf
     placed = placed._replace(x0=x0, outside=outside)
     if left:
-        middles, share = map(np.concatenate, zip(*left, strict=True))
-        half = placed.half_size * share[:, None] ** (1 / dimension)
-        return placed._replace(x0=middles, volume=placed.volume * share, half_size=half)
+        pieces = join(Pieces.all_of(left), h / ppc)
+        half = placed.half_size * pieces.share[:, None] ** (1 / dimension)
+        placed = placed._replace(x0=pieces.middle, volume=placed.volume * pieces.share)
+        return placed._replace(half_size=half, missed=missed(region, pieces, h / ppc))
     if even:
         return placed
     sizes = pattern.sizes[np.concatenate(numbers)] * h if numbers else np.empty((0, dimension))
     return placed._replace(volume=sizes.prod(axis=1), half_size=sizes / 2)
-
-
-def _cut(
-    region: Region, domain: Domain, x: np.ndarray, size: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Of boxes around `x`, (k, d) the middles of what lies in the region, (k,) its share."""
-    d = x.shape[1]
-
-    def inside(x: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        parts = size * _in_order(along, d)
-        y = (x[:, None, :] + parts).reshape(-1, d)
-        return parts, (region.inside(y) & domain.contains(y)).reshape(len(x), len(parts))
-
-    # Boxes with a corner on either side of the edge are looked at closely.
-    _, some = inside(x, np.array([-0.5, 0.0, 0.5]))
-    share = some.all(axis=1).astype(float)
-    cut = np.flatnonzero(some.any(axis=1) & (share < 1))
-    parts, within = inside(x[cut], (np.arange(FINE[d]) + 0.5) / FINE[d] - 0.5)
-    share[cut] = within.mean(axis=1)
-    x[cut] += (within @ parts) / np.maximum(within.sum(axis=1), 1)[:, None]
-    kept = share >= LEAST
-    return x[kept], share[kept]
 
 
 def _beyond_closed_sides(x: np.ndarray, lo: np.ndarray, hi: np.ndarray, domain: Domain) -> int:

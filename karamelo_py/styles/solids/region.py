@@ -9,6 +9,7 @@ from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import fill, lattice_of
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, own_grids
+from karamelo_py.script.errors import ScriptError
 
 
 class RegionSolid(Solid):
@@ -37,9 +38,13 @@ class RegionSolid(Solid):
         domains around the points (ugimp, cpgimp, cpdi) those of 3 are at equal distances, too:
         domains tile the cell. ``cut``: at equal distances, and what the region cuts of the boxes of
         the points at its edge is left out: these have the volume and stand in the middle of what
-        is left, where that is a tenth of a box or more. Round bodies so have their volume and no
-        steps of h/ppc at the rim, which contact would feel. For edge_pressure and edge_traction
-        points are whole boxes: they refuse these.
+        is left; less than a tenth of a box goes to the nearest point beside it. Round bodies so
+        have their volume (to 0.1 %) and no steps of h/ppc at the rim, which contact would feel.
+        Parts of a region (fins, slots) are seen from a tenth of h/ppc on in 2D, a fifth in 3D; the
+        region itself may be thinner along an axis. The domains that ugimp and cpgimp give to cut
+        points are squares or cubes of the right volume, which do not tile the body at its edge;
+        cpdi refuses them. For edge_pressure and edge_traction points are whole boxes: they refuse
+        these.
     GlueToSolid
         A solid that came before, whose velocity field this one shares, in methods where each
         solid has its own.
@@ -82,8 +87,21 @@ class RegionSolid(Solid):
         lattice = lattice_of(region, domain, self.h, own=own_grids(hub))
         if points is None and hub.update.method.regular_points:
             points = "regular"
+        corners = {"corners", "half_edges"} & {*getattr(hub.update.method.basis, "shape", ())}
+        if self.cut and corners:
+            raise ScriptError(
+                "the domains of cpdi tile a body, and those of points that are cut do not",
+                argument="points",
+                hint="points=regular, a solid from a mesh, or another basis",
+            )
         placement = fill(region, domain, lattice, ppc, points)
         self.put(hub, placement, may_be_empty=region.unknown)
+        if placement.missed:
+            hub.warn(
+                f"parts of {self.described()} are thinner than points=cut sees, "
+                f"{placement.missed:.3g}: their mass may be wrong or missing",
+                hint="smaller cells, or more points per cell",
+            )
 
     def described(self) -> str:
         """See `Solid.described`."""
