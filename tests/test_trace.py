@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from listening import Compiled
 from numba import config, njit
 from numba.core import event
 from numba.core.caching import NullCache
@@ -100,19 +101,6 @@ def adder(increment):
 
 
 two_more = adder(2)
-
-
-class Compiled(event.Listener):
-    """The names of the functions that Numba compiles."""
-
-    def __init__(self):
-        self.names = []
-
-    def on_start(self, event):
-        self.names.append(event.data["dispatcher"].py_func.__name__)
-
-    def on_end(self, event):
-        """Nothing more."""
 
 
 def compiled_for(function, *arguments):

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from listening import Compiled
 from numba import config
 from numba.core import event
 from numba.core.caching import NullCache
@@ -129,19 +130,6 @@ def halves(n, x):
 FUNCTIONS = [
     returns_early, counts, waits, nested, carries, chains, guarded, unrolled, long, halves,
 ]  # fmt: skip
-
-
-class Compiled(event.Listener):
-    """The names of the functions that Numba compiles."""
-
-    def __init__(self):
-        self.names = []
-
-    def on_start(self, event):
-        self.names.append(event.data["dispatcher"].py_func.__name__)
-
-    def on_end(self, event):
-        """Nothing more."""
 
 
 def in_a_kernel(function):
