@@ -111,13 +111,8 @@ class Ranks(Leading):
 
     def prepare(self, begun: list[str]) -> None:
         """Make ready for the steps of a run: the hooks of the fixes that are left to act."""
-        import numba
-
-        if self.threads > 1:
-            numba.set_num_threads(self.threads)
         self.begun = begun
-        self._prepare_hooks()
-        self.hub.update.method.begin(self.hub, self.contact)
+        self._make_ready()
 
     def _see_prepared(self) -> None:
         """Have all that follow made ready."""

@@ -1,0 +1,245 @@
+"""The arrays of a scene: what they show, and states that they can be returned to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.compiler import fields
+from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.threads import Serial, Threaded, new_team
+from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Setup
+from karamelo_py.kernels.clock import step_size
+from karamelo_py.kernels.export import impose_stress
+from karamelo_py.kernels.heat import show_heat
+from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.kernels.nodes import SumsToVelocity
+from karamelo_py.kernels.p2g import Force
+from karamelo_py.kernels.passes import sweep
+from karamelo_py.kernels.rows import SUMS
+from karamelo_py.kernels.sweep import Visit, sweep_nodes
+from karamelo_py.points.laws import can, law_kind, with_stress
+from karamelo_py.points.laws.plastic_rate import without_rate
+from karamelo_py.run.by_id import ById
+from karamelo_py.run.lowering import State, chosen, lower, thread_count, warms_by_friction
+from karamelo_py.run.state import changing, go_back
+from karamelo_py.run.tiles import Tiles
+from karamelo_py.run.trial import try_parts
+from karamelo_py.scene.hub import Hub
+
+
+def scene_key(hub: Hub) -> tuple:
+    """What the arrays of a simulation depend on: while it stays the same, so do they."""
+    update = hub.update
+    return (
+        hub.domain,
+        hub.domain.h if hub.domain else None,
+        tuple(hub.solids.values()),
+        update.method,
+        type(update.scheme),
+        update.scheme,
+        update.transfer,
+        type(update.transfer),
+        update.thermal,
+        update.anti_locking,
+        update.boundary,
+        fields.declared(hub.fixes.values(), "point_fields"),
+        fields.declared(hub.fixes.values(), "node_fields"),
+        hub.fields.rate_is_asked_for(),
+        update.method is not None and warms_by_friction(hub),
+        hub.settings.precision,
+        hub.settings.threads,
+    )
+
+
+class Lowered(ById):
+    """The arrays of a scene, and the threads that work on them."""
+
+    def __init__(self, hub: Hub, previous: Lowered | None = None):
+        self.hub = hub
+        self.key = scene_key(hub)
+        state = previous.state() if previous else None
+        self.setup, self.tiles = self._lowered(state)
+        self.control = self.setup.control
+        try_parts(hub, self.setup)
+        self.count = sum(s.count for s in hub.solids.values())
+        self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
+        if state is not None:
+            self.present[: state.count] = state.present
+        self.threads = thread_count(hub, self.count)
+        self._team = new_team(self.threads)
+        self.mode = Threaded(self._team.ctypes.data) if self.threads > 1 else Serial()
+        self.version = 0  # grows when fields change without a step
+        self._measured = -1  # the version whose fastest point is known
+        self._watched = -1  # the version whose balance of energy is followed
+        self.mapped = False  # whether the nodes show a state of this simulation
+
+    @property
+    def contact(self) -> Any:
+        """How solids touch."""
+        return self.setup.contact
+
+    def _lowered(self, state: State | None) -> tuple[Setup, Tiles]:
+        """The arrays of the whole scene, with the state of points that exist."""
+        return lower(self.hub, state)
+
+    def fits(self, hub: Hub) -> bool:
+        """Whether the arrays are still those of the scene."""
+        return self.key == scene_key(hub)
+
+    @property
+    def dt(self) -> float:
+        """The next step."""
+        return float(self.control.values[DT])
+
+    @property
+    def time(self) -> float:
+        """Present time."""
+        return float(self.control.values[TIME])
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken in the whole script."""
+        return int(self.control.values[TIMESTEP])
+
+    @property
+    def point_fields(self) -> tuple[type, ...]:
+        """The declared fields of the points, of all blocks."""
+        return tuple(
+            dict.fromkeys(type(one) for block in self.setup.blocks for one in block.points.fields)
+        )
+
+    def state(self) -> State:
+        """All that a new lowering takes over."""
+        laws = {}
+        for block in self.setup.blocks:
+            state = block.points.state
+            rows = np.zeros((len(state), self.count), state.dtype)
+            rows[:, block.points.id] = state
+            laws[without_rate(law_kind(block.laws))] = rows
+        kept = [kind for kind in self.point_fields if fields.is_kept(kind)]
+        return State(
+            self.count,
+            self.present,
+            self.by_id(lambda points: points.x[self.now]),
+            self.by_id(lambda points: points.v),
+            laws,
+            {kind: self.declared(kind).T for kind in kept},
+            self.setup.contact,
+            float(self.control.clock[0].last_dt),
+            float(self.control.clock[0].path),
+        )
+
+    def set_stress(self, ids: np.ndarray, given: dict[str, np.ndarray]) -> None:
+        """Set components of the Cauchy stress (by name, "11" ...) of the points `ids`."""
+        s = self.setup
+        names = s.kin.symmetric_names
+        chosen = np.zeros(self.count, np.bool_)
+        chosen[ids] = True
+        stress = np.zeros((self.count, len(names)), s.nodes.sums.dtype)
+        for k, name in enumerate(names):
+            if name in given:
+                stress[ids, k] = given[name]
+        flags = np.array([name in given for name in names])
+        for block in s.blocks:
+            if can(elastic_law(block.laws), with_stress):
+                rows = stress[block.points.id]
+                part = chosen[block.points.id]
+                like = s.nodes.sums[0, MASS]
+                impose_stress(s.kin, like, block.points, block.laws, part, flags, rows)
+        self.version += 1
+
+    def remove(self, ids: np.ndarray) -> None:
+        """Take points out of the run; the ids of the others stay."""
+        self.present[ids] = False
+        blocks = tuple(
+            chosen(block, np.flatnonzero(self.present[block.points.id]))
+            for block in self.setup.blocks
+        )
+        self.setup = self.setup._replace(blocks=blocks)
+        self.control.clock[0].drift = np.inf
+        self.version += 1
+        # The rate of the last step stays: the same whether or not a run begins here.
+        self._measured = self.version
+
+    @property
+    def measured(self) -> bool:
+        """Whether the rate of the fastest point is that of the present state."""
+        return self._measured == self.version
+
+    @measured.setter
+    def measured(self, known: bool) -> None:
+        self.version += 1
+        self._measured = self.version if known else -1
+
+    @property
+    def followed(self) -> bool:
+        """Whether the clock tells how the balance of energy has gone up to the present state."""
+        return self._watched == self.version
+
+    @followed.setter
+    def followed(self, known: bool) -> None:
+        self._watched = self.version if known else -1
+
+    @property
+    def bounces(self) -> int:
+        """How often points were reflected at the edge of the domain."""
+        return int(self.total("bounces"))
+
+    def clear_forces(self) -> None:
+        """Points bear no force of fixes, until these say so anew."""
+        for block in self.stepped.blocks:
+            force = field(block.points.fields, Force)
+            if force is not None:
+                force[:] = 0
+
+    def sort(self) -> None:
+        """Sort the points by tile."""
+        self.tiles.sort(self.stepped)
+
+    def sort_if_due(self) -> None:
+        """Sort the points when one may have left its tile's surroundings, or none is sorted yet."""
+        clock = self.control.clock[0]
+        if clock.drift > clock.drift_limit:
+            self.sort()
+
+    def show_on_nodes(self) -> None:
+        """See that the nodes show the present state when no step has been taken yet."""
+        if not self.mapped:
+            s = self.setup
+            self.sort_if_due()
+            dt = step_size(s)
+            visit = Visit((), SUMS.quantities, SUMS.weights)
+            sweep(s, self.mode, visit, dt, False, True, False)
+            sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
+            show_heat(s.heat, s, self.mode)
+            self.mapped = True
+
+    def snapshot(self, before: Mapping[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
+        """Copies of every array that a step changes, and of the published values.
+
+        The copies of the snapshot `before`, which is lost, are used again where they fit.
+        """
+        found = {}
+        for name, array in (*changing(self), ("values", self.control.values)):
+            copy = (before or {}).get(name)
+            if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
+                copy = np.empty_like(array)
+            copy[...] = array
+            found[name] = copy
+        return found
+
+    def restore(self, snapshot: dict[str, np.ndarray]) -> None:
+        """Return to a snapshot."""
+        go_back(self, snapshot)
+        self.version += 1
+
+    def wrong_points(self) -> Iterator[tuple[Any, int]]:
+        """Block and index of the points that the last sweep found wrong, one a tile at most."""
+        for block in self.setup.blocks:
+            tiling = block.tiling
+            for t in range(max(int(tiling.count[0]), 1)):
+                if tiling.report[t, 2] > 0:
+                    yield block, int(tiling.report[t, 2]) - 1

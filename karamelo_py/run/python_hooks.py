@@ -1,0 +1,110 @@
+"""Fixes that act from Python in a step: their hooks, beside the compiled ones."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup
+from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
+from karamelo_py.kernels.hooks import STAGES, CompiledHook
+from karamelo_py.kernels.moments import at_nodes, at_points
+from karamelo_py.output.fields import PIECE
+from karamelo_py.run.hooks import lower_hooks
+from karamelo_py.scene.views import NodesView, PieceView, PointsView
+
+
+def sets_initial_state(fix: Any) -> bool:
+    """Whether all a fix does is a hook in Python before the first step."""
+    hooks = fix.hooks()
+    return set(hooks) == {"initial_integrate"} and not isinstance(
+        hooks["initial_integrate"], CompiledHook
+    )
+
+
+class PythonHooks:
+    """Hooks of a step when some fixes act from Python: theirs, and the compiled ones."""
+
+    def __init__(self, simulation: Any, fixes: list):
+        self.simulation = simulation
+        self.compiled = lower_hooks(simulation.hub, fixes)
+        self.by_stage: dict[int, list[tuple[Any, Callable]]] = {}
+        for fix in fixes:
+            for name, hook in fix.hooks().items():
+                if not isinstance(hook, CompiledHook):
+                    self.by_stage.setdefault(STAGES[name], []).append((fix, hook))
+
+    def act(self, function: Callable, s: Setup, *arguments: Any) -> None:
+        """Call what acts from Python on a setup."""
+        self.simulation.act(lambda whole: function(self, whole, *arguments), s)
+
+
+def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
+    for fix, hook in hooks.by_stage[stage]:
+        hook(NodesView(s, fix.group, stage, before_update=target == ON_VELOCITY))
+
+
+def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
+    # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
+    _on_nodes(hooks, s._replace(nodes=s.heat.nodes), stage, target)
+
+
+def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:
+    for fix, hook in hooks.by_stage[stage]:
+        view = PointsView(hooks.simulation, fix.group, bool(then))
+        hook(view)
+        if view.moved and stage == INITIAL_INTEGRATE:
+            hooks.simulation.sort()
+        elif view.moved:
+            s.control.clock[0].drift = np.inf
+
+
+@at_nodes.on(PythonHooks)
+def _(hooks, stage, target, s):
+    at_nodes(hooks.compiled, stage, target, s)
+    if stage in hooks.by_stage:
+        hooks.act(_on_nodes, s, stage, target)
+
+
+@at_points.on(PythonHooks)
+def _(hooks, stage, then, s):
+    if stage == INITIAL_INTEGRATE and hooks.simulation.taken_up:
+        hooks.simulation.taken_up = False
+        return
+    at_points(hooks.compiled, stage, then, s)
+    if stage == INITIAL_INTEGRATE:
+        hooks.simulation.clear_forces()
+    if stage in hooks.by_stage:
+        hooks.act(_on_points, s, stage, then)
+
+
+@at_heat_nodes.on(PythonHooks)
+def _(hooks, stage, target, s):
+    at_heat_nodes(hooks.compiled, stage, target, s)
+    if stage in hooks.by_stage:
+        hooks.act(_on_heat_nodes, s, stage, target)
+
+
+@at_heated_points.on(PythonHooks)
+def _(hooks, s):
+    at_heated_points(hooks.compiled, s)
+    if SUPPLY_HEAT in hooks.by_stage:
+        hooks.act(_on_points, s, SUPPLY_HEAT, 0)
+
+
+def views_of(simulation: Any, fix: Any) -> Iterator[PointsView]:
+    """The points of a fix, in pieces where it looks at each on its own."""
+    if not fix.point_by_point:
+        yield PointsView(simulation, fix.group, then=False)
+        return
+    chosen = None if fix.group.all else np.zeros(simulation.count, np.bool_)
+    if chosen is not None:
+        chosen[fix.group.ids] = True
+    for block in simulation.stepped.blocks:
+        ids = block.points.id
+        for first in range(0, len(ids), PIECE):
+            rows = np.arange(first, min(first + PIECE, len(ids)))
+            if chosen is not None:
+                rows = rows[chosen[ids[rows]]]
+            if len(rows):
+                yield PieceView(simulation, block, rows)
