@@ -44,6 +44,9 @@ def test_a_body_at_rest_steps_at_its_wave_speed(run_interpreted, basis, factor):
     assert result.log.dt == pytest.approx(np.full(4, factor * step), rel=1e-9)
     warned = f"the step {factor * step:.4g} of dt_factor is above the stable limit {step:.4g}"
     assert (warned in result.err) == (factor > 1)
+    follows = "the run may blow up" if basis == "linear" else "at rest up to {:.4g} is stable"
+    borne = step * {"quadratic-spline": 1.25, "cubic-spline": 1.4}.get(basis, 1)
+    assert (follows.format(borne) in result.err) == (factor > 1)
     own = {"linear": 0.9, "quadratic-spline": 0.9 * 1.25, "cubic-spline": 0.9 * 1.4}[basis]
     said = re.search(r"^  own dt +([\d.e-]+)", result.out, re.M)
     assert float(said[1]) == pytest.approx(own * step, rel=1e-5)

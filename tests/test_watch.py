@@ -213,6 +213,19 @@ def test_a_drift_does_not_hide_what_vibrates(run_script):
     assert "noise of a drift" in said
 
 
+def test_a_drift_that_loads_give_does_not_hide_what_vibrates(run_interpreted):
+    """A bar is pushed to ten times the speed that it vibrates with, and is free from then on:
+    growth is told before it doubles what the bar vibrates by, a two hundredth of all."""
+    push = "fix(g, body_force, all, 0.1/5/sqrt(PI)*exp(0 - ((time - 10)/5)^2))"
+    scene = DRIFTING.replace("{v}*(1 + 0.1*cos", "{v}*(0.1*cos").format(v=0.1, words="")
+    scene = scene.replace("dt_factor(0.9)", push + "\ndt_factor(0.6)").replace("bar, 1", "bar, 2")
+    result = run_interpreted(scene.replace("40, 1)", "60, 1)").replace("170", "350"))
+    (step,) = re.findall(r"step (\d+), time [^:]*: energy comes from nowhere", result.err)
+    drift = 0.5 * 8 * 0.1**2
+    log = result.log
+    assert log.E[list(log.Step).index(int(step))] - drift < 2 * log.E[0] < 0.015 * drift
+
+
 def test_points_that_drift_out_are_no_matter_of_the_step(run_interpreted):
     """A free bar at constant speed: half the step brings it to the same edge."""
     lines = ["fix(v, initial_velocity_particles, all, 0.2)", "set_output(50)"]

@@ -7,7 +7,7 @@ every scene has are declared by their owners (:mod:`karamelo_py.compiler.fields`
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -253,7 +253,7 @@ CLOCK = np.dtype(
         ("largest_mean", np.float64),
         ("largest_energy", np.float64),  # of kinetic, stored and work
         ("largest_own", np.float64),  # the same, without what bodies have that only drift
-        ("of_drift", np.float64),  # kinetic energy of the centres of mass at the start
+        ("of_drift", np.float64),  # kinetic energy of the centres of mass
         ("supplied", np.float64),  # largest work so far, of either sign
         ("energy_floor", np.float64),  # round-off of energies
         ("windows", np.int64),  # in which the balance has grown, one after another
@@ -279,17 +279,21 @@ class Control(NamedTuple):
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
     clock: np.ndarray  # (1,) CLOCK
-    totals: np.ndarray  # (values, LIMBS) sums that come to be published: see kernels.totals
+    totals: np.ndarray  # sums, LIMBS numbers each, see kernels.totals: of the published values,
+    #                     and behind them mass and momentum of each solid, 1 + d
     digits: np.ndarray  # (LIMBS,) scratch
-    answer: np.ndarray  # (16,) rounded totals, and what processes agree on
+    answer: np.ndarray  # rounded totals, and what processes agree on
+    firsts: np.ndarray  # (S,) int64: id of the first point of each solid
     ranks: NamedTuple  # whether there are other processes
 
 
-def new_control(values: np.ndarray) -> Control:
-    """A control of these published values, its clock at zero."""
+def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
+    """A control of these published values, its clock at zero, of solids in `d` dimensions."""
     clock = np.zeros(1, CLOCK).view(np.recarray)
-    totals = np.zeros((len(values), LIMBS), np.int64)
-    return Control(values, clock, totals, np.zeros(LIMBS, np.int64), np.zeros(16), Alone())
+    more = (1 + d) * len(firsts)
+    totals = np.zeros((len(values) + more, LIMBS), np.int64)
+    digits, answer = np.zeros(LIMBS, np.int64), np.zeros(max(16, more))
+    return Control(values, clock, totals, digits, answer, np.array(firsts, np.int64), Alone())
 
 
 class Setup(NamedTuple):

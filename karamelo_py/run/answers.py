@@ -63,7 +63,7 @@ class Answers:
 
     def _totals(self, first: int, count: int) -> None:
         rows = slice(first, first + count)
-        if first > WORK and not self.at_once:
+        if WORK < first < len(self.control.values) and not self.at_once:
             self.due.update(range(first, first + count))
             self.control.answer[:count] = self.control.values[rows]
             return

@@ -34,7 +34,13 @@ from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.motion import Motion
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.stable import elastic_speed, one_a_cell, own_step_instead, sparse
+from karamelo_py.run.stable import (
+    elastic_speed,
+    one_a_cell,
+    own_step_instead,
+    sparse,
+    what_follows,
+)
 from karamelo_py.run.velocities import warn_about_velocities
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -392,9 +398,9 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     """
     _warn_about_groups(hub)
     warn_about_steps(hub, simulation, halves)
-    _warn_about_precision(hub, simulation)
-    warn_about_velocities(hub, simulation)
     scene = Foreseen(hub, simulation, duration)
+    _warn_about_precision(scene)
+    warn_about_velocities(hub, simulation)
     for rule in RULES:
         for failure in rule(scene):
             if failure.name not in hub.update.foreseen:
@@ -406,14 +412,14 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
                 )
 
 
-def _warn_about_precision(hub: Hub, simulation: Simulation) -> None:
+def _warn_about_precision(s: Foreseen) -> None:
     """Say so when single precision cannot hold what a step adds to a position."""
-    if hub.settings.precision != "single":
+    if s.hub.settings.precision != "single":
         return
-    x = max((max(-one.low.min(), one.high.max()) for one in simulation.motions()), default=0.0)
-    step, spacing = simulation.fastest() * simulation.dt, float(np.spacing(np.float32(x)))
+    x = max((max(-one.low.min(), one.high.max()) for one in s.motions), default=0.0)
+    step, spacing = s.simulation.fastest() * s.simulation.dt, float(np.spacing(np.float32(x)))
     if 0 < step < 16 * spacing:
-        hub.warn(
+        s.hub.warn(
             f"a step moves points by {step:.2g} at most, and in single precision positions have "
             f"a spacing of {spacing:.2g}: motion will be lost to rounding",
             hint="precision(double), or a domain around the origin",
@@ -495,7 +501,7 @@ def _warn_about_step(
         words += (
             f" of conduction; beyond {BORNE:g} times that temperatures swing"
             if limit == of_heat
-            else ": the run will most likely blow up, and be stopped then"
+            else what_follows(hub, simulation, asked)
         )
     name = f"{step.command} {step.fixed_dt or step.dt_factor}"
     told = hub.update.foreseen

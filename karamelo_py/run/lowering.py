@@ -181,7 +181,8 @@ def lower(
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
-    control = new_control(hub.values.array)
+    firsts = [solid.first_id for solid in hub.solids.values()]
+    control = new_control(hub.values.array, firsts, kin.dimension)
     clock = control.clock[0]
     clock.last_dt, clock.path = (previous.last_dt, previous.path) if previous else (0.0, 0.0)
     clock.spacing = min(lattice.h for lattice in lattices)

@@ -191,9 +191,6 @@ class Simulation(Lowered):
         if clock.watch_energy:
             # Velocities belong to half a step before, stresses to the share strained before.
             level = 0.5 + getattr(self.hub.update.scheme, "strained_before", 0.0)
-            if anew:
-                centres = (0.5 * one.mass * one.velocity @ one.velocity for one in self.motions())
-                clock.of_drift = sum(centres)
             self.begin_to_look(level, anew)
         clock.watch_heat = int(self.hub.update.thermal and not unknown_heat(self.hub))
         if clock.watch_heat and anew:

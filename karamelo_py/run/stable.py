@@ -15,6 +15,7 @@ from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.hub import Hub
 
 USUAL = 0.9
+LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
 DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
 
 
@@ -96,6 +97,21 @@ def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
     courant, share = own_step_of_waves(hub, still=still)
     limit = courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     return float(min(share * limit, USUAL * clock.heat_limit))
+
+
+def what_follows(hub: Hub, simulation: Any, step: float) -> str:
+    """What is known of a `step` above the stable one of bodies that move."""
+    clock = simulation.control.clock[0]
+    still = clock.path <= STILL
+    borne = own_step_of_waves(hub, still=still)[0] * clock.spacing / clock.rate
+    if step <= borne:
+        return (
+            f" of bodies that go from cell to cell, which gain energy; at rest up to {borne:.4g} "
+            "is stable"
+        )
+    if step <= LOST * borne:
+        return ": the run may blow up, by where points lie in the cells, and be stopped then"
+    return ": the run will most likely blow up, and be stopped then"
 
 
 def words_of_own_step(hub: Hub, simulation: Any) -> str:

@@ -52,6 +52,7 @@ from karamelo_py.points.kinematics.tags import (
     PlaneStrain,
     Space,
     dimension,
+    free_from,
     planar,
 )
 from karamelo_py.points.kinematics.vectors import (

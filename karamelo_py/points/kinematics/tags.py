@@ -59,6 +59,11 @@ def dimension(kin):
 
 
 @point_function()
+def free_from(kin):
+    """First direction in which a body may move as a whole: no radius is one, a constant."""
+
+
+@point_function()
 def planar(kin):
     """The tag whose tensors are plain d x d matrices of the same vectors.
 
@@ -68,4 +73,5 @@ def planar(kin):
 
 for _tag in TAGS:
     dimension.on(_tag)(define("kin", f"return {_tag.dimension}"))
+    free_from.on(_tag)(define("kin", f"return {int(_tag is Axisymmetric)}"))
     planar.on(_tag)(define("kin", "return flat()", flat=KINEMATICS[_tag.dimension]))
