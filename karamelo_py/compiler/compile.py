@@ -91,13 +91,13 @@ def in_each_lane(function: Callable, arguments: tuple) -> Any:
     raise TypeError("only compiled kernels know lanes")
 
 
-def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
+def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Callable]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     The decorated function gives name, parameters and docstring. Implementations are added with
     ``name.on(Class, ...)`` and serve both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and
     inside kernels, where the types are known at compile time and no branch is left. A plug-in adds
-    its own in the same way. ``name.otherwise`` marks what classes without their own get.
+    its own in the same way. With ``otherwise`` what the decorated function does is for all others.
 
     Point functions serve one point or several at once (:mod:`karamelo_py.compiler.lanes`). Those
     that a class names in ``one_by_one``, since they branch, are called for one point after another.
@@ -105,11 +105,11 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
 
     def declare(stub: Callable) -> Callable:
         table: dict[tuple[type, ...], Callable] = {}
-        fallback: list[Callable] = []
+        fallback = stub if otherwise else None
         memo: dict[Any, Callable] = {}  # what was found before, for speed where interpreted
 
         def find(classes: tuple) -> Callable | None:
-            return table.get(classes) or (fallback[0] if fallback else None)
+            return table.get(classes, fallback)
 
         def select(classes: tuple) -> Callable:
             chosen = find(classes)
@@ -148,28 +148,22 @@ def point_function(*, tags: int = 1) -> Callable[[Callable], Callable]:
 
         by_type(dispatch)(choose)
 
-        def added(implementation: Callable) -> Callable:
-            memo.clear()
-            forget()
-            serves(implementation, dispatch)
-            return implementation
-
         def on(*classes: type) -> Callable[[Callable], Callable]:
             def register(implementation: Callable) -> Callable:
                 table[classes] = implementation
-                return added(implementation)
+                memo.clear()
+                forget()
+                serves(implementation, dispatch)
+                return implementation
 
             return register
-
-        def otherwise(implementation: Callable) -> Callable:
-            fallback[:] = [implementation]
-            return added(implementation)
 
         dispatch.tags = tags
         dispatch.find = find
         declare_point_function(dispatch)
         dispatch.on = on
-        dispatch.otherwise = otherwise
+        if fallback is not None:
+            serves(fallback, dispatch)
 
         def defined(*classes: type) -> bool:
             asks(dispatch, classes)

@@ -3,16 +3,14 @@
 A field is a NamedTuple class with one member, its array. The class is what kernels ask for it by,
 and its attributes are all that lowering, sorting, restarts, dumps and `karamelo-py check` need::
 
-    class Dose(NamedTuple):
+    class Dose(Field):
         \"\"\"Radiation that a point has taken up, in gray.\"\"\"
 
-        array: Any
-
-        shape = scalar
         columns = ("dose",)
 
 shape
-    function of the kinematics: the number of components (`scalar`, `vector`, `tensor`, `planar`);
+    function of the kinematics: the number of components (`scalar` by default, `vector`, `tensor`,
+    `planar`);
 kept
     whether it outlives a step (the default): then it is carried from run to run;
 start
@@ -71,6 +69,26 @@ def tensor(kin: Any) -> int:
 def planar(kin: Any) -> int:
     """The components of a plain matrix of two vectors."""
     return kin.dimension**2
+
+
+class Field(NamedTuple):
+    """Numbers of each point or node: the base of fields."""
+
+    array: Any
+
+    shape = scalar
+
+
+class StepField(Field):
+    """One that does not outlive a step."""
+
+    kept = False
+
+
+class SummedField(StepField):
+    """One of nodes, to which points give in a step."""
+
+    summed = True
 
 
 def name_of(kind: type) -> str:

@@ -2,55 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from karamelo_py.compiler.compile import fma, point_function, real
-from karamelo_py.compiler.fields import field, pair, scalar
+from karamelo_py.compiler.fields import StepField, SummedField, field, pair
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry
 from karamelo_py.points.frames import scaled_increment
 from karamelo_py.points.transfers import kept_gradient, straining
 
 
-class VolumeRatio(NamedTuple):
+class VolumeRatio(StepField):
     """Ratio of volumes of the trial increment of a point."""
 
-    array: Any
-
-    shape = scalar
-    kept = False
     start = 1.0
 
 
-class NodalMean(NamedTuple):
+class NodalMean(SummedField):
     """Sum of weight times value, and of weights, at a node; then the mean in place of the first.
 
     Of ratios of volumes, weighted with volumes (F-bar); of temperatures, weighted with conductance.
     """
 
-    array: Any
-
     shape = pair
-    kept = False
-    summed = True
 
 
-class AveragedStress(NamedTuple):
+class AveragedStress(StepField):
     """Mean stress of a point and its surroundings."""
 
-    array: Any
 
-    shape = scalar
-    kept = False
-
-
-class NodalStress(NamedTuple):
+class NodalStress(SummedField):
     """Sum of weight, volume and mean stress, and of weight and volume; then the mean."""
 
-    array: Any
-
-    kept = False
-    summed = True
     shape = NodalMean.shape
 
 

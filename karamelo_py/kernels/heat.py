@@ -1,19 +1,8 @@
-"""Heat that flows between points through the nodes.
+"""Heat that flows between points through the nodes: what they carry, give and take.
 
 A temperature is to a heat capacity what a velocity is to a mass: the nodes of heat are `Nodes` with
-one component, and the loops over nodes and the fixes of velocities serve them, too. A step of
-conduction comes before the momentum update, at the places of the points then:
-
-- heat and heat capacity go from the points to the nodes, which so have a temperature T. Points
-  bring their gradient along: else the mean of the points beside a wall would be taken for the
-  temperature of the wall;
-- points take the gradient of T, and give their heat flow -kappa V grad T, and what fixes supply, to
-  the nodes, which so have a temperature T* after the step;
-- points take the change T* - T (FLIP). What the nodes do not show of the points' temperatures
-  conduction would never level: of that, as much goes in a step as conduction levels of a wave of
-  the grid, z = 4 d kappa dt / (rho cp h^2). The mean at the nodes that it goes to is weighted with
-  conductance, for heat to be kept. Fields that the basis can hold are not smeared by that, and
-  without conduction nothing is.
+one component, and the loops over nodes and the fixes of velocities serve them, too. The steps
+that they take together are those of :mod:`karamelo_py.kernels.conduction`.
 
 Sources: Sulsky, Zhou & Schreyer 1995 for FLIP; Wallstedt & Guilkey 2007 for points that bring their
 gradient along; Tao et al. 2016, "A generalized interpolation material point method for coupled
@@ -22,48 +11,23 @@ thermo-mechanical processes", for heat.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from karamelo_py.compiler.compile import (
     accumulate,
     choose,
     fma,
     of_present,
-    over_blocks,
-    point_function,
     real,
     round_off,
     shared,
 )
-from karamelo_py.compiler.fields import field, load, load_vector, scalar, store, vector
+from karamelo_py.compiler.fields import Field, StepField, field, load, load_vector, store, vector
 from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
-from karamelo_py.kernels.arrays import (
-    MASS,
-    ON_UPDATE,
-    ON_VELOCITY,
-    POST_HEAT_TO_GRID,
-    POST_UPDATE_GRID_HEAT,
-    SUPPLY_HEAT,
-    Buffers,
-    Hooks,
-    Nodes,
-    NoHooks,
-    of_force,
-    with_nodes,
-)
+from karamelo_py.kernels.arrays import MASS, Buffers, Nodes, of_force
 from karamelo_py.kernels.averaging import NodalMean
-from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.g2p import empty, gathered, settled
-from karamelo_py.kernels.node_hooks import node_hooks
-from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
 from karamelo_py.kernels.p2g import load_of, scattered
-from karamelo_py.kernels.passes import read_reports, visit_here
-from karamelo_py.kernels.point_hooks import Warmth, clear_totals, point_hooks, publish_totals
-from karamelo_py.kernels.rows import conduct
-from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
-from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
@@ -78,65 +42,34 @@ from karamelo_py.points.laws import (
 )
 
 
-class Temperature(NamedTuple):
+class Temperature(StepField):
     """Temperature of a point before the step."""
 
-    array: Any
 
-    shape = scalar
-    kept = False
-
-
-class Capacity(NamedTuple):
+class Capacity(StepField):
     """Heat capacity of a point."""
 
-    array: Any
 
-    shape = scalar
-    kept = False
-
-
-class Conductance(NamedTuple):
+class Conductance(StepField):
     """Conductivity times volume of a point."""
 
-    array: Any
 
-    shape = scalar
-    kept = False
-
-
-class Volume(NamedTuple):
+class Volume(StepField):
     """Volume of a point."""
 
-    array: Any
 
-    shape = scalar
-    kept = False
-
-
-class Supply(NamedTuple):
+class Supply(StepField):
     """Heat per time that fixes bring to a point."""
 
-    array: Any
-
-    shape = scalar
-    kept = False
     columns = ("gamma",)
 
 
-class Share(NamedTuple):
+class Share(StepField):
     """Share of the change of the nodes' temperature that a point takes."""
 
-    array: Any
 
-    shape = scalar
-    kept = False
-
-
-class HeatGradient(NamedTuple):
+class HeatGradient(Field):
     """Gradient of temperature at a point."""
-
-    array: Any
 
     shape = vector
 
@@ -323,121 +256,3 @@ def _(task, w, stencil, p, dt, total, totals, fastest):
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     faster = jacobian(law, w.kin, state) * inverse_stretch_squared(w.frame, w.kin, f, dt)
     return real(0, dt) * T, max(fastest, faster)
-
-
-# --- a step of conduction ---------------------------------------------------------------------
-
-
-@point_function()
-def at_heat_nodes(hooks, stage, target, s):
-    """Let the fixes act on the nodes of heat."""
-
-
-@at_heat_nodes.on(NoHooks)
-def _(hooks, stage, target, s):
-    return None
-
-
-@at_heat_nodes.on(Hooks)
-def _(hooks, stage, target, s):
-    # Temperatures are always kept: FLIP, whatever the transfer of velocity.
-    clock = s.control.clock[0]
-    clock.set_low, clock.set_high = np.inf, -np.inf
-    node_hooks(
-        stage, target, Line(), s.grids, s.heat.nodes, s.spans, hooks, s.control, step_size(s), 1.0
-    )
-    agree_on_heat(s.control.ranks, s.control)
-    clock.coldest = min(clock.coldest, clock.set_low)
-    clock.hottest = max(clock.hottest, clock.set_high)
-
-
-def _supply(block, s, hooks):
-    points = block.points
-    fields = points.fields
-    warmth = Warmth(
-        field(fields, Capacity),
-        field(fields, Temperature),
-        field(fields, Volume),
-        field(fields, Supply),
-        field(fields, Share),
-        points.mass,
-        points.x[s.control.clock[0].now],
-    )
-    point_hooks(SUPPLY_HEAT, warmth, s.kin, points.id, hooks, s.control, step_size(s))
-
-
-_supply_blocks = over_blocks(_supply)
-
-
-@point_function()
-def at_heated_points(hooks, s):
-    """Let the fixes supply heat to points, or set their temperature."""
-
-
-@at_heated_points.on(NoHooks)
-def _(hooks, s):
-    return None
-
-
-@at_heated_points.on(Hooks)
-def _(hooks, s):
-    clock = s.control.clock[0]
-    clock.rise = clock.fall = 0.0
-    clear_totals(SUPPLY_HEAT, hooks, s.control)
-    _supply_blocks(s, hooks)
-    publish_totals(SUPPLY_HEAT, hooks, s.control)
-    agree_on_heat(s.control.ranks, s.control)
-    clock.hottest += step_size(s) * clock.rise
-    clock.coldest += step_size(s) * clock.fall
-
-
-@shared
-def visit_for_heat(heat, s, mode, visit, gathers, scatters):
-    """Visit the points for heat: the nodes are those of heat."""
-    here = with_nodes(s, heat.nodes, heat.buffers)
-    visit_here(here, mode, visit, step_size(s), gathers, scatters)
-
-
-@shared
-def map_heat(heat, s, mode, gathers, scatters):
-    """Heat capacity and heat of the nodes from the points now, or temperature from the nodes."""
-    # One loop for both.
-    visit = Visit((Warming(),), (HeatContent(),), OldWeights())
-    visit_for_heat(heat, s, mode, visit, gathers, scatters)
-
-
-@point_function()
-def show_heat(heat, s, mode):
-    """See that the nodes show the temperature before the first step."""
-
-
-@show_heat.otherwise
-def _(heat, s, mode):
-    return None
-
-
-@show_heat.on(Conducting)
-def _(heat, s, mode):
-    map_heat(heat, s, mode, False, True)
-    sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.spans, step_size(s))
-
-
-@conduct.on(Conducting)
-def _(heat, s, mode, hooks):
-    dt = step_size(s)
-    nodes = heat.nodes
-    kin = Line()
-    map_heat(heat, s, mode, False, True)
-    sweep_nodes(mode, SumsToVelocity(), kin, nodes, s.spans, dt)
-    sweep_nodes(mode, TakeMean(), kin, nodes, s.spans, dt)
-    at_heat_nodes(hooks, POST_HEAT_TO_GRID, ON_VELOCITY, s)
-    at_heated_points(hooks, s)
-    flow = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
-    visit_for_heat(heat, s, mode, flow, True, True)
-    sweep_nodes(mode, Update(), kin, nodes, s.spans, dt)
-    at_heat_nodes(hooks, POST_UPDATE_GRID_HEAT, ON_UPDATE, s)
-    map_heat(heat, s, mode, True, False)
-    # What `Warming` reports as a rate is by what factor conduction has become faster.
-    read_reports(s)
-    clock = s.control.clock[0]
-    clock.heat_limit = clock.heat_reference / clock.new_rate

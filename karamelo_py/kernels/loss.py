@@ -22,8 +22,6 @@ move (not with splines), and that usl strains by dv, which may only cost.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 from karamelo_py.compiler.compile import (
     accumulate,
     choose,
@@ -32,7 +30,15 @@ from karamelo_py.compiler.compile import (
     round_off,
     shared,
 )
-from karamelo_py.compiler.fields import field, load, load_vector, scalar, store, triple
+from karamelo_py.compiler.fields import (
+    StepField,
+    SummedField,
+    field,
+    load,
+    load_vector,
+    store,
+    triple,
+)
 from karamelo_py.compiler.tuples import add_scaled, row, scale, subtract
 from karamelo_py.kernels.arrays import MASS, of_change, of_momentum
 from karamelo_py.kernels.visit import law_of, state_of
@@ -59,26 +65,17 @@ from karamelo_py.points.transfers.xpic import Reflected, Series
 ALONE = 0.6
 
 
-class Lost(NamedTuple):
+class Lost(SummedField):
     """Kinetic energy that points bring to a node; what it did not keep, per mass; and its mass.
 
     A fused step brings the energy and mass of the next step while points take back the loss.
     """
 
-    array: Any
-
     shape = triple
-    kept = False
-    summed = True
 
 
-class Rubbed(NamedTuple):
+class Rubbed(StepField):
     """Heat of friction at a node, per mass: of contact between solids and of walls."""
-
-    array: Any
-
-    shape = scalar
-    kept = False
 
 
 @shared

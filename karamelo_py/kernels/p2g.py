@@ -5,7 +5,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import accumulate, of_present, point_function, real, shared
-from karamelo_py.compiler.fields import field, load, load_vector, scalar, vector
+from karamelo_py.compiler.fields import (
+    StepField,
+    SummedField,
+    field,
+    load,
+    load_vector,
+    vector,
+)
 from karamelo_py.compiler.tuples import (
     add_optional,
     leading,
@@ -124,34 +131,21 @@ class SeriesBack(NamedTuple):
         return ((Series, dimension(kin), 2 * dimension(kin)),)
 
 
-class Force(NamedTuple):
+class Force(StepField):
     """Force that fixes put on a point."""
 
-    array: Any
-
     shape = vector
-    kept = False
     columns = ("bx", "by", "bz")
 
 
-class Normal(NamedTuple):
+class Normal(SummedField):
     """Sum of m grad N at a node: it points out of a body, for contact between solids."""
 
-    array: Any
-
     shape = vector
-    kept = False
-    summed = True
 
 
-class SeenMass(NamedTuple):
+class SeenMass(SummedField):
     """Sum of N m^2 at a node: over that of N m it is the mean mass of the points it sees (USL)."""
-
-    array: Any
-
-    shape = scalar
-    kept = False
-    summed = True
 
     @staticmethod
     def needed(basis: Any) -> bool:
@@ -159,23 +153,14 @@ class SeenMass(NamedTuple):
         return basis.steep_edge
 
 
-class Centre(NamedTuple):
+class Centre(SummedField):
     """Sum of mass times position at a node, for the gap between solids."""
 
-    array: Any
-
     shape = vector
-    kept = False
-    summed = True
 
 
-class Led(NamedTuple):
+class Led(SummedField):
     """What rigid points give a node: mass, momentum and the force on them, as in `Nodes.sums`."""
-
-    array: Any
-
-    kept = False
-    summed = True
 
     @staticmethod
     def shape(kin):

@@ -73,14 +73,9 @@ def _lead_velocity(kin, nodes, led, spans):
                     nodes.velocity[n, k] = led[n, of_momentum(kin) + k] / led[n, MASS]
 
 
-@point_function()
+@point_function(otherwise=True)
 def sum_forces(laws, contact, s, points, led):
     """Add up the forces on rigid points, and their torques about the origin."""
-
-
-@sum_forces.otherwise
-def _(laws, contact, s, points, led):
-    return None
 
 
 @entered

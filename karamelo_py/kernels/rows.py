@@ -62,37 +62,22 @@ class Insulated(NamedTuple):
     """No heat flows between points."""
 
 
-@point_function()
+@point_function(otherwise=True)
 def conduct(heat, s, mode, hooks):
     """Let heat flow between points for the length of a step; by default none does."""
 
 
-@conduct.otherwise
-def _(heat, s, mode, hooks):
-    return None
-
-
-@point_function()
+@point_function(otherwise=True)
 def touch(contact, s):
     """Let solids with velocity fields of their own act on each other; by default there are none."""
 
 
-@touch.otherwise
-def _(contact, s):
-    return None
-
-
-@point_function()
+@point_function(otherwise=True)
 def touch_velocity(contact, s, steps):
     """See that the velocity that deforms the points agrees with contact, where it is not v*.
 
     `steps` is 1 when v* of this step is known, and 0 before: what touched in the last step counts.
     """
-
-
-@touch_velocity.otherwise
-def _(contact, s, steps):
-    return None
 
 
 @entered
@@ -110,14 +95,9 @@ def _clear_radial(kin, nodes, grids):
                 clear_first(field(nodes.fields, Normal), n)
 
 
-@point_function()
+@point_function(otherwise=True)
 def hold_axis(kin, s):
     """Let no node on an axis of symmetry leave it; by default there is none."""
-
-
-@hold_axis.otherwise
-def _(kin, s):
-    return None
 
 
 @hold_axis.on(Axisymmetric)
@@ -127,14 +107,9 @@ def _(kin, s):
     _clear_radial(kin, s.nodes, s.grids)
 
 
-@point_function()
+@point_function(otherwise=True)
 def sum_series(transfer, s, mode):
     """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
-
-
-@sum_series.otherwise
-def _(transfer, s, mode):
-    return None
 
 
 @sum_series.on(XPIC)
@@ -149,14 +124,9 @@ def _(transfer, s, mode):
     hold_axis(s.kin, s)
 
 
-@point_function()
+@point_function(otherwise=True)
 def average_volumes(averaging, s, mode, dt):
     """Average the change of volume of the strain to come at the nodes; by default it is not."""
-
-
-@average_volumes.otherwise
-def _(averaging, s, mode, dt):
-    return None
 
 
 @average_volumes.on(FBar)
@@ -165,14 +135,9 @@ def _(averaging, s, mode, dt):
     sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.spans, dt)
 
 
-@point_function()
+@point_function(otherwise=True)
 def average_stress(averaging, s, mode):
     """Put the averaged mean stress in the place of the points' own; by default each has its own."""
-
-
-@average_stress.otherwise
-def _(averaging, s, mode):
-    return None
 
 
 @average_stress.on(FBar)

@@ -217,13 +217,9 @@ def _scatter(quantities, w, stencil, loads):
         scattered_all(quantities, w, stencil, k, loads)
 
 
-@point_function(tags=2)
+@point_function(tags=2, otherwise=True)
 def gather_nodes(width, stencil, tasks, w, totals):
     """The totals of the tasks over all nodes of the stencil."""
-
-
-@gather_nodes.otherwise
-def _(width, stencil, tasks, w, totals):
     return _gather(tasks, w, stencil, totals)
 
 
@@ -236,13 +232,9 @@ def _(width, stencil, tasks, w, totals):
     return _gather(tasks, w, stencil, totals)
 
 
-@point_function(tags=2)
+@point_function(tags=2, otherwise=True)
 def scatter_nodes(width, stencil, quantities, w, loads):
     """Give all nodes of the stencil their parts."""
-
-
-@scatter_nodes.otherwise
-def _(width, stencil, quantities, w, loads):
     _scatter(quantities, w, stencil, loads)
 
 

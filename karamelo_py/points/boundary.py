@@ -1,18 +1,15 @@
 """The edge of a grid that reflects points (boundary reflect); other grids let them go."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import choose, point_function, real, shared
-from karamelo_py.compiler.fields import vector
+from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.compiler.tuples import multiply_each
 from karamelo_py.points.grid import Grid, in_cells, pick
 
 
-class Bounces(NamedTuple):
+class Bounces(Field):
     """How often the edge of the domain has reflected a point, in each direction."""
-
-    array: Any
 
     shape = vector
 
@@ -24,13 +21,9 @@ class ReflectingGrid(Grid):
     point_fields = (Bounces,)
 
 
-@point_function()
+@point_function(otherwise=True)
 def reflected(grid, kin, y, v, moment):
     """Place, velocity and its moment after the edge, and 1 for each direction it was met in."""
-
-
-@reflected.otherwise
-def _(grid, kin, y, v, moment):
     return y, v, moment, ()
 
 

@@ -8,7 +8,7 @@ needs the deformation gradient F of the points.
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
-from karamelo_py.compiler.fields import tensor
+from karamelo_py.compiler.fields import Field, tensor
 from karamelo_py.compiler.powers import power
 from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
 from karamelo_py.points.kinematics import (
@@ -33,10 +33,8 @@ class Updated(NamedTuple):
     moves = True
 
 
-class DeformationGradient(NamedTuple):
+class DeformationGradient(Field):
     """F, of laws whose state does not hold it."""
-
-    array: Any
 
     shape = tensor
 

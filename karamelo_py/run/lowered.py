@@ -12,8 +12,8 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Setup
 from karamelo_py.kernels.clock import step_size
+from karamelo_py.kernels.conduction import show_heat
 from karamelo_py.kernels.export import impose_stress
-from karamelo_py.kernels.heat import show_heat
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force

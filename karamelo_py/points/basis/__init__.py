@@ -73,23 +73,15 @@ def affine_weight(basis, kin, grid, stencil, k):
     """N_I D^-1 (X_I - x) of the affine transfers, with D = sum_I N_I (X_I - x)(X_I - x)^T."""
 
 
-@point_function()
+@point_function(otherwise=True)
 def mapped_again(basis, grid, moment):
     """The part of a point's moment of velocity that MUSL maps to the nodes the second time."""
-
-
-@mapped_again.otherwise
-def _(basis, grid, moment):
     return moment
 
 
-@point_function()
+@point_function(otherwise=True)
 def first_node(basis, like):
     """What is added to a position in cells, so that its whole part tells which nodes are seen."""
-
-
-@first_node.otherwise
-def _(basis, like):
     return real(0, like)
 
 
@@ -110,71 +102,43 @@ def blank(basis, kin, x):
     return (*x, *((x[0] - x[0],) * shape_size(type(basis), len(x))))
 
 
-@point_function()
+@point_function(otherwise=True)
 def deformed(basis, kin, place, dl):
     """`place` after the increment dl = dt grad v: its shape changes, not its position."""
-
-
-@deformed.otherwise
-def _(basis, kin, place, dl):
     return place
 
 
-@point_function()
+@point_function(otherwise=True)
 def extent(basis, kin, grid, place):
     """How far from the point the corners of its domain reach, in cells; 0 where none are kept."""
-
-
-@extent.otherwise
-def _(basis, kin, grid, place):
     return grid.h - grid.h
 
 
-@point_function()
+@point_function(otherwise=True)
 def carried(basis, kin):
     """How many corners of the domain go with the velocity of the grid; constant at compile time."""
-
-
-@carried.otherwise
-def _(basis, kin):
     return 0
 
 
-@point_function()
+@point_function(otherwise=True)
 def placed(basis, kin):
     """How many corners a place keeps by their positions, right behind the point's own."""
-
-
-@placed.otherwise
-def _(basis, kin):
     return 0
 
 
-@point_function()
+@point_function(otherwise=True)
 def carriers(basis, kin):
     """How many nodes carry one corner."""
-
-
-@carriers.otherwise
-def _(basis, kin):
     return 0
 
 
-@point_function()
+@point_function(otherwise=True)
 def carrier(basis, kin, grid, stencil, corner, j):
     """(node number, weight) of the j-th node that carries a corner."""
-
-
-@carrier.otherwise
-def _(basis, kin, grid, stencil, corner, j):
     return grid.first, grid.h
 
 
-@point_function()
+@point_function(otherwise=True)
 def carry(basis, kin, place, old, corner, displacement):
     """`place` with the displacement of one corner of the domain; `old` is the place before all."""
-
-
-@carry.otherwise
-def _(basis, kin, place, old, corner, displacement):
     return place

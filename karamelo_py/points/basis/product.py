@@ -63,13 +63,9 @@ def along(basis, kin, grid, place, direction):
     """The nodes that a point sees in one direction: an :class:`Along`, perhaps with more."""
 
 
-@point_function()
+@point_function(otherwise=True)
 def spacing(basis, like):
     """Distance of neighbouring nodes, in cells."""
-
-
-@spacing.otherwise
-def _(basis, like):
     return real(1, like)
 
 

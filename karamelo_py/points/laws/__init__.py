@@ -131,24 +131,16 @@ def energy_density(law, kin, state):
     """Stored energy per reference volume."""
 
 
-@point_function()
+@point_function(otherwise=True)
 def constrained_velocity(law, own, given):
     """Velocity of a point after a step: what the grid gives, or of rigid bodies their own."""
-
-
-@constrained_velocity.otherwise
-def _(law, own, given):
     return given
 
 
 @number
-@point_function()
+@point_function(otherwise=True)
 def dissipated_energy(law, kin, state):
     """Energy that is gone, per reference volume; left out by laws that dissipate nothing."""
-
-
-@dissipated_energy.otherwise
-def _(law, kin, state):
     return specific_volume(law) - specific_volume(law)
 
 
@@ -165,53 +157,33 @@ def damage_initiation(law, kin, state):
 
 
 @number
-@point_function()
+@point_function(otherwise=True)
 def temperature(law, kin, state):
     """Temperature; 0 of laws without."""
-
-
-@temperature.otherwise
-def _(law, kin, state):
     return specific_volume(law) - specific_volume(law)
 
 
-@point_function()
+@point_function(otherwise=True)
 def with_temperature(law, kin, state, T):
     """The state at the temperature `T`, which laws without a temperature pass over."""
-
-
-@with_temperature.otherwise
-def _(law, kin, state, T):
     return state
 
 
-@point_function()
+@point_function(otherwise=True)
 def heat_capacity(law, like):
     """Heat per mass and kelvin; 0 of laws without temperature."""
-
-
-@heat_capacity.otherwise
-def _(law, like):
     return real(0, like)
 
 
-@point_function()
+@point_function(otherwise=True)
 def warmed(law, kin, state, heat):
     """The state with `heat` more of internal energy, per reference volume, where there is any."""
-
-
-@warmed.otherwise
-def _(law, kin, state, heat):
     return state
 
 
-@point_function()
+@point_function(otherwise=True)
 def conductivity(law, like):
     """Heat flux per gradient of temperature; 0 of laws without temperature."""
-
-
-@conductivity.otherwise
-def _(law, like):
     return real(0, like)
 
 
@@ -231,11 +203,7 @@ def with_stress(law, kin, state, stress):
     """The state whose Cauchy stress is `stress` (initial_stress); left out by laws without."""
 
 
-@point_function()
+@point_function(otherwise=True)
 def specific_volume(law):
     """Reference volume per mass."""
-
-
-@specific_volume.otherwise
-def _(law):
     return law.specific_volume

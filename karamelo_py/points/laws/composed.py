@@ -100,9 +100,11 @@ def sound(law, j, m):
     return sqrt(K * specific_volume(law.eos) * j)
 
 
-@point_function()
+@point_function(otherwise=True)
 def viscous_after(viscosity, law, j, m, rate):
     """Viscous pressure (q,) at a rate of volume change, or ()."""
+    density = real(1, j) / (specific_volume(law.eos) * j)
+    return viscous_pressure(viscosity, rate, density, sound(law, j, m))
 
 
 @viscous_after.on(Absent)
@@ -110,15 +112,10 @@ def _(viscosity, law, j, m, rate):
     return ()
 
 
-@viscous_after.otherwise
-def _(viscosity, law, j, m, rate):
-    density = real(1, j) / (specific_volume(law.eos) * j)
-    return viscous_pressure(viscosity, rate, density, sound(law, j, m))
-
-
-@point_function()
+@point_function(otherwise=True)
 def slowed_by_viscosity(viscosity, law, j, m, squared, density):
     """The square of the speed of waves that the time step has to resolve."""
+    return damped(squared, viscous_speed(viscosity, m.viscous, density, sound(law, j, m)))
 
 
 @slowed_by_viscosity.on(Absent)
@@ -126,17 +123,13 @@ def _(viscosity, law, j, m, squared, density):
     return squared
 
 
-@slowed_by_viscosity.otherwise
-def _(viscosity, law, j, m, squared, density):
-    return damped(squared, viscous_speed(viscosity, m.viscous, density, sound(law, j, m)))
-
-
 # ---- damage -------------------------------------------------------------------------------------
 
 
-@point_function()
+@point_function(otherwise=True)
 def borne_share(damage, memory, like):
     """The share of a stress or energy that the damaged material bears, 1 - D."""
+    return integrity(damage, memory)
 
 
 @borne_share.on(Absent)
@@ -144,23 +137,9 @@ def _(damage, memory, like):
     return real(1, like)
 
 
-@borne_share.otherwise
-def _(damage, memory, like):
-    return integrity(damage, memory)
-
-
-@point_function()
+@point_function(otherwise=True)
 def broken_further(damage, law, kin, m, strain, s, j, dt):
     """Memory of the damage after an increment of plastic strain; () where nothing breaks."""
-
-
-@broken_further.on(Absent)
-def _(damage, law, kin, m, strain, s, j, dt):
-    return ()
-
-
-@broken_further.otherwise
-def _(damage, law, kin, m, strain, s, j, dt):
     p = intact_pressure(law, j, m)
     q = von_mises(kin, s)
     bound = q + real(1e-3, p) * abs(p)
@@ -169,19 +148,20 @@ def _(damage, law, kin, m, strain, s, j, dt):
     return damage_after(damage, m.damage, strain, triaxiality, m.heat, dt)
 
 
-@point_function()
+@broken_further.on(Absent)
+def _(damage, law, kin, m, strain, s, j, dt):
+    return ()
+
+
+@point_function(otherwise=True)
 def released(damage, law, kin, j, s, m, broken):
     """Stored energy that an increment of damage sets free."""
+    shear = j * shear_energy(law.strength, kin, s)
+    tension = intact_pressure(law, j, m) < 0
+    energy = shear + choose(tension, compression_energy(law.eos, j, m.energy), real(0, j))
+    return (integrity(damage, m.damage) - integrity(damage, broken)) * energy
 
 
 @released.on(Absent)
 def _(damage, law, kin, j, s, m, broken):
     return j - j
-
-
-@released.otherwise
-def _(damage, law, kin, j, s, m, broken):
-    shear = j * shear_energy(law.strength, kin, s)
-    tension = intact_pressure(law, j, m) < 0
-    energy = shear + choose(tension, compression_energy(law.eos, j, m.energy), real(0, j))
-    return (integrity(damage, m.damage) - integrity(damage, broken)) * energy

@@ -26,36 +26,24 @@ def chained(parts: list) -> NamedTuple:
     return reduce(lambda rest, part: Further(part, rest), reversed(parts), Absent())
 
 
-@point_function()
+@point_function(otherwise=True)
 def initial_part(part, like):
     """The memory of a point without a past."""
-
-
-@initial_part.otherwise
-def _(part, like):
     return ()
 
 
-@point_function()
+@point_function(otherwise=True)
 def part_after(part, memory, law, kin, j, s, memories, dt):
     """The memory after a step dt to the volume ratio j and the deviatoric stress s.
 
     `memories` are those of the other parts of the `law`.
     """
-
-
-@part_after.otherwise
-def _(part, memory, law, kin, j, s, memories, dt):
     return memory
 
 
-@point_function()
+@point_function(otherwise=True)
 def part_pressure(part, memory):
     """(p,), the pressure that the part adds, or ()."""
-
-
-@part_pressure.otherwise
-def _(part, memory):
     return ()
 
 

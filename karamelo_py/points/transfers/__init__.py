@@ -19,17 +19,13 @@ inverts_spread
 What else is not defined for a class is that of PIC: nothing is kept, v alone is mapped.
 """
 
-from typing import Any, NamedTuple
-
 from karamelo_py.compiler.compile import point_function, real
-from karamelo_py.compiler.fields import planar
+from karamelo_py.compiler.fields import Field, planar
 from karamelo_py.compiler.tuples import add_scaled
 
 
-class Moment(NamedTuple):
+class Moment(Field):
     """The tensor that points keep beside their velocity: its moment B or its gradient L."""
-
-    array: Any
 
     shape = planar
 
@@ -60,91 +56,55 @@ def take_nodal_velocity(transfer: type) -> None:
         return v_pic
 
 
-@point_function()
+@point_function(otherwise=True)
 def displacing_velocity(transfer, v, v_pic, j):
     """The velocity that moves the point; `v` is its own after the step, `j` its `known_volume`."""
-
-
-@displacing_velocity.otherwise
-def _(transfer, v, v_pic, j):
     return v_pic
 
 
-@point_function()
+@point_function(otherwise=True)
 def known_volume(transfer, law, kin, state):
     """det F of a point for transfers that ask for it; else nothing."""
-
-
-@known_volume.otherwise
-def _(transfer, law, kin, state):
     return ()
 
 
-@point_function()
+@point_function(otherwise=True)
 def add_momentum(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
     """total + the momentum that a point gives to the k-th node of its stencil."""
-
-
-@add_momentum.otherwise
-def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
     return add_scaled(total, weight * mass, v)
 
 
-@point_function()
+@point_function(otherwise=True)
 def zero_moment(transfer, kin, like):
     """What a point at rest keeps, as a tuple: empty for transfers that keep nothing."""
-
-
-@zero_moment.otherwise
-def _(transfer, kin, like):
     return ()
 
 
-@point_function()
+@point_function(otherwise=True)
 def add_moment(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
     """moment + the part of the k-th node in it."""
-
-
-@add_moment.otherwise
-def _(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
     return moment
 
 
-@point_function()
+@point_function(otherwise=True)
 def gradient_weight(transfer, basis, kin, grid, stencil, k, gradient):
     """What stands for the gradient of the k-th node in strains and forces: `gradient` itself."""
-
-
-@gradient_weight.otherwise
-def _(transfer, basis, kin, grid, stencil, k, gradient):
     return gradient
 
 
-@point_function(tags=2)
+@point_function(tags=2, otherwise=True)
 def straining(transfer, kin, gradient):
     """What a gather of velocity and gradient sums up for the strain: `gradient`, or nothing."""
-
-
-@straining.otherwise
-def _(transfer, kin, gradient):
     return gradient
 
 
-@point_function(tags=2)
+@point_function(tags=2, otherwise=True)
 def kept_gradient(transfer, kin, moment, gradient):
     """The gradient of velocity, from what the point keeps and what `straining` let be gathered."""
-
-
-@kept_gradient.otherwise
-def _(transfer, kin, moment, gradient):
     return gradient
 
 
-@point_function()
+@point_function(otherwise=True)
 def terms(transfer):
     """Number of terms of the series that XPIC sums on the nodes; 1 is none beyond the first."""
-
-
-@terms.otherwise
-def _(transfer):
     return 1

@@ -4,28 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.fields import vector
+from karamelo_py.compiler.fields import StepField, SummedField, vector
 from karamelo_py.language.kinds import In
 from karamelo_py.points.laws import can
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.transfers import terms, updated_velocity
 
 
-class TermOfSeries(NamedTuple):
+class TermOfSeries(StepField):
     """Term of the series at a point."""
 
-    array: Any
-
     shape = vector
-    kept = False
 
 
-class Reflected(NamedTuple):
+class Reflected(StepField):
     """Energy per mass that XPIC has taken of a point so far; velocity not in the series yet."""
-
-    array: Any
-
-    kept = False
 
     @staticmethod
     def shape(kin: Any) -> int:
@@ -38,13 +31,8 @@ class Reflected(NamedTuple):
         return can(law, taken_heat)
 
 
-class Series(NamedTuple):
+class Series(SummedField):
     """Term of the series at a node, and the sum for the next."""
-
-    array: Any
-
-    kept = False
-    summed = True
 
     @staticmethod
     def shape(kin: Any) -> int:

@@ -9,13 +9,9 @@ it, so that it enters once. What it remembers is its memory, a flat tuple.
 from karamelo_py.compiler.compile import point_function
 
 
-@point_function()
+@point_function(otherwise=True)
 def initial_damage(damage, like):
     """The memory of an intact point, or () where nothing breaks."""
-
-
-@initial_damage.otherwise
-def _(damage, like):
     return ()
 
 

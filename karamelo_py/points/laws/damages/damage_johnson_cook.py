@@ -90,13 +90,9 @@ column(JohnsonCookDamage, "damage", damage)
 column(JohnsonCookDamage, "damage_init", damage_initiation)
 
 
-@point_function()
+@point_function(otherwise=True)
 def warmed(heat, damage, one):
     """1 + d5 T*, and 1 without a temperature."""
-
-
-@warmed.otherwise
-def _(heat, damage, one):
     return one
 
 

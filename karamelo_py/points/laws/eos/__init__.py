@@ -10,46 +10,30 @@ What it remembers of the past is its memory, a flat tuple, nothing for most. It 
 from karamelo_py.compiler.compile import point_function
 
 
-@point_function()
+@point_function(otherwise=True)
 def initial_energy(eos, like):
     """The memory of a point without a past, in the number type of `like`."""
-
-
-@initial_energy.otherwise
-def _(eos, like):
     return ()
 
 
-@point_function()
+@point_function(otherwise=True)
 def compressed(eos, memory, before, j, heating):
     """The memory after the volume ratio went from `before` to j, and heating by work.
 
     `heating` is per reference volume: plastic and viscous work.
     """
-
-
-@compressed.otherwise
-def _(eos, memory, before, j, heating):
     return memory
 
 
-@point_function()
+@point_function(otherwise=True)
 def taken_heat(eos, memory, heat):
     """(heat,) that internal energy in the memory takes of `heat`; () where there is none."""
-
-
-@taken_heat.otherwise
-def _(eos, memory, heat):
     return ()
 
 
-@point_function()
+@point_function(otherwise=True)
 def stored_heat(eos, loss):
     """How much of the dissipated energy is in the memory and so in `compression_energy`."""
-
-
-@stored_heat.otherwise
-def _(eos, loss):
     return loss - loss
 
 
@@ -73,11 +57,7 @@ def ratio_at_pressure(eos, p, heat):
     """The volume ratio at which the pressure is p, or is nearest to it."""
 
 
-@point_function()
+@point_function(otherwise=True)
 def at_pressure(eos, j, memory, p, heat):
     """Volume ratio and memory of a point with the pressure p (fix initial_stress)."""
-
-
-@at_pressure.otherwise
-def _(eos, j, memory, p, heat):
     return ratio_at_pressure(eos, p, heat), memory

@@ -110,13 +110,9 @@ def cold_pressure(eos, j):
     return choose(closed < 0, eos.modulus * closed / j, curve)
 
 
-@point_function()
+@point_function(otherwise=True)
 def heated(heat, p, Tr, factor):
     """p + factor (T - Tr) above the temperature Tr, p without a temperature."""
-
-
-@heated.otherwise
-def _(heat, p, Tr, factor):
     return p
 
 

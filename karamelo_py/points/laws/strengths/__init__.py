@@ -49,27 +49,19 @@ def remembers(strength: type, **numbers: float | str) -> None:
         equivalent_plastic_strain.on(strength)(define("strength, memory", "return memory[0]"))
 
 
-@point_function()
+@point_function(otherwise=True)
 def initial_memory(strength, like):
     """The memory of a point without a past, in the number type of `like`."""
-
-
-@initial_memory.otherwise
-def _(strength, like):
     return ()
 
 
-@point_function()
+@point_function(otherwise=True)
 def respond(strength, law, kin, s, strain, j, memories, dt):
     """Deviatoric stress, memory, and work per volume that is not stored, after a step dt.
 
     `s` is the old deviatoric stress, turned with the point already; `strain`, the increment, is not
     deviatoric; `memories` are those of all parts of the `law`.
     """
-
-
-@respond.otherwise
-def _(strength, law, kin, s, strain, j, memories, dt):
     return shear_response(strength, kin, s, strain, memories.strength, memories.heat, dt)
 
 
@@ -86,23 +78,15 @@ def pressure_response(strength, kin, s, p, K, strain):
     """
 
 
-@point_function()
+@point_function(otherwise=True)
 def initial_loss(strength, like):
     """(0,) for a strength that dissipates energy, or ()."""
-
-
-@initial_loss.otherwise
-def _(strength, like):
     return ()
 
 
-@point_function()
+@point_function(otherwise=True)
 def elastic_ratio(strength, memory, j):
     """The part of the volume ratio j that is elastic: what makes pressure."""
-
-
-@elastic_ratio.otherwise
-def _(strength, memory, j):
     return j
 
 
@@ -111,51 +95,31 @@ def with_elastic_ratio(strength, memory, j, elastic):
     """The memory with which `elastic_ratio` of j is `elastic`."""
 
 
-@point_function()
+@point_function(otherwise=True)
 def shear_modulus(strength):
     """Stiffness against a further change of shape, for the speed of waves."""
-
-
-@shear_modulus.otherwise
-def _(strength):
     return strength.G
 
 
-@point_function()
+@point_function(otherwise=True)
 def damped_speed_squared(strength, squared, density):
     """The square of the speed of waves, with what a viscous strength takes of the stable step."""
-
-
-@damped_speed_squared.otherwise
-def _(strength, squared, density):
     return squared
 
 
-@point_function()
+@point_function(otherwise=True)
 def shear_strain(strength, kin, s):
     """Elastic part of the deviatoric strain, as a symmetric tensor."""
-
-
-@shear_strain.otherwise
-def _(strength, kin, s):
     return scale(real(0.5, strength.G) / strength.G, s)
 
 
-@point_function()
+@point_function(otherwise=True)
 def shear_energy(strength, kin, s):
     """Energy stored by elastic shear, per present volume."""
-
-
-@shear_energy.otherwise
-def _(strength, kin, s):
     return real(0.25, strength.G) / strength.G * contract(kin, s, s)
 
 
-@point_function()
+@point_function(otherwise=True)
 def equivalent_plastic_strain(strength, memory):
     """Sum of sqrt(2/3 d:d) of the plastic strain increments d."""
-
-
-@equivalent_plastic_strain.otherwise
-def _(strength, memory):
     return real(0, strength[0])

@@ -47,13 +47,9 @@ def lowest_pressure(strength, strain):
     return tension_bound(strength, -cohesion / friction if friction > 0 else real(-inf, strain))
 
 
-@point_function()
+@point_function(otherwise=True)
 def tension_bound(strength, lowest):
     """The lowest pressure, of a strength whose yield surface ends at `lowest`."""
-
-
-@tension_bound.otherwise
-def _(strength, lowest):
     return lowest
 
 

@@ -24,13 +24,9 @@ def flow_stress(strength, memory, increment, heat, dt):
     """
 
 
-@point_function()
+@point_function(otherwise=True)
 def hardened(strength, memory, increment, dt):
     """The memory after a step, which may be without plastic strain."""
-
-
-@hardened.otherwise
-def _(strength, memory, increment, dt):
     return (memory[0] + increment,)
 
 

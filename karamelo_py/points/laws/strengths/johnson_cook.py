@@ -110,13 +110,9 @@ def power_law(factor, exponent, strain):
     return value, value * (exponent / base)
 
 
-@point_function(tags=2)
+@point_function(tags=2, otherwise=True)
 def softened(softening, heat, like):
     """The factor of the temperature: 1 where there is none."""
-
-
-@softened.otherwise
-def _(softening, heat, like):
     return real(1, like)
 
 

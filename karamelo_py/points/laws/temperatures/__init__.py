@@ -16,43 +16,27 @@ class Warm(NamedTuple):
     T: float
 
 
-@point_function()
+@point_function(otherwise=True)
 def initial_heat(temperature, like):
     """Warm(T) at the start, or ()."""
-
-
-@initial_heat.otherwise
-def _(temperature, like):
     return ()
 
 
-@point_function()
+@point_function(otherwise=True)
 def heated(temperature, heat, work):
     """`heat` after plastic work per mass."""
-
-
-@heated.otherwise
-def _(temperature, heat, work):
     return heat
 
 
-@point_function()
+@point_function(otherwise=True)
 def thermal_pressure(temperature, heat):
     """(p,), the pressure of the temperature, or ()."""
-
-
-@thermal_pressure.otherwise
-def _(temperature, heat):
     return ()
 
 
-@point_function()
+@point_function(otherwise=True)
 def temperature_or(heat, otherwise):
     """The temperature, or `otherwise` where the law has none."""
-
-
-@temperature_or.otherwise
-def _(heat, otherwise):
     return otherwise
 
 
@@ -61,13 +45,9 @@ def _(heat, otherwise):
     return heat.T
 
 
-@point_function()
+@point_function(otherwise=True)
 def heat_from(like, numbers):
     """The flat tuple `numbers` as `like` is: Warm(T), or ()."""
-
-
-@heat_from.otherwise
-def _(like, numbers):
     return ()
 
 

@@ -9,13 +9,9 @@ from math import sqrt
 from karamelo_py.compiler.compile import point_function, shared
 
 
-@point_function()
+@point_function(otherwise=True)
 def initial_viscous_pressure(viscosity, like):
     """The viscous pressure at rest, or () where there is none."""
-
-
-@initial_viscous_pressure.otherwise
-def _(viscosity, like):
     return ()
 
 

@@ -1,21 +1,18 @@
 """fix irradiate: a field that points have because of the fix, and its column."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
-from karamelo_py.compiler.fields import scalar
+from karamelo_py.compiler.fields import Field
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.modify import Fix, PointsView
 
 
-class Dose(NamedTuple):
+class Dose(Field):
     """Radiation that a point has taken up."""
 
-    array: Any
-
-    shape = scalar
     columns = ("dose",)
 
 

@@ -1,0 +1,163 @@
+"""A step of conduction.
+
+It comes before the momentum update, at the places of the points then:
+
+- heat and heat capacity go from the points to the nodes, which so have a temperature T. Points
+  bring their gradient along: else the mean of the points beside a wall would be taken for the
+  temperature of the wall;
+- points take the gradient of T, and give their heat flow -kappa V grad T, and what fixes supply, to
+  the nodes, which so have a temperature T* after the step;
+- points take the change T* - T (FLIP). What the nodes do not show of the points' temperatures
+  conduction would never level: of that, as much goes in a step as conduction levels of a wave of
+  the grid, z = 4 d kappa dt / (rho cp h^2). The mean at the nodes that it goes to is weighted with
+  conductance, for heat to be kept. Fields that the basis can hold are not smeared by that, and
+  without conduction nothing is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from karamelo_py.compiler.compile import over_blocks, point_function, shared
+from karamelo_py.compiler.fields import field
+from karamelo_py.kernels.arrays import (
+    ON_UPDATE,
+    ON_VELOCITY,
+    POST_HEAT_TO_GRID,
+    POST_UPDATE_GRID_HEAT,
+    SUPPLY_HEAT,
+    Hooks,
+    NoHooks,
+    with_nodes,
+)
+from karamelo_py.kernels.clock import step_size
+from karamelo_py.kernels.heat import (
+    Capacity,
+    Conducting,
+    HeatContent,
+    HeatFlow,
+    Share,
+    Supply,
+    Temperature,
+    TemperatureGradient,
+    Volume,
+    Warming,
+)
+from karamelo_py.kernels.node_hooks import node_hooks
+from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
+from karamelo_py.kernels.passes import read_reports, visit_here
+from karamelo_py.kernels.point_hooks import Warmth, clear_totals, point_hooks, publish_totals
+from karamelo_py.kernels.rows import conduct
+from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
+from karamelo_py.kernels.totals import agree_on_heat
+from karamelo_py.points.kinematics import Line
+
+
+@point_function()
+def at_heat_nodes(hooks, stage, target, s):
+    """Let the fixes act on the nodes of heat."""
+
+
+@at_heat_nodes.on(NoHooks)
+def _(hooks, stage, target, s):
+    return None
+
+
+@at_heat_nodes.on(Hooks)
+def _(hooks, stage, target, s):
+    # Temperatures are always kept: FLIP, whatever the transfer of velocity.
+    clock = s.control.clock[0]
+    clock.set_low, clock.set_high = np.inf, -np.inf
+    node_hooks(
+        stage, target, Line(), s.grids, s.heat.nodes, s.spans, hooks, s.control, step_size(s), 1.0
+    )
+    agree_on_heat(s.control.ranks, s.control)
+    clock.coldest = min(clock.coldest, clock.set_low)
+    clock.hottest = max(clock.hottest, clock.set_high)
+
+
+def _supply(block, s, hooks):
+    points = block.points
+    fields = points.fields
+    warmth = Warmth(
+        field(fields, Capacity),
+        field(fields, Temperature),
+        field(fields, Volume),
+        field(fields, Supply),
+        field(fields, Share),
+        points.mass,
+        points.x[s.control.clock[0].now],
+    )
+    point_hooks(SUPPLY_HEAT, warmth, s.kin, points.id, hooks, s.control, step_size(s))
+
+
+_supply_blocks = over_blocks(_supply)
+
+
+@point_function()
+def at_heated_points(hooks, s):
+    """Let the fixes supply heat to points, or set their temperature."""
+
+
+@at_heated_points.on(NoHooks)
+def _(hooks, s):
+    return None
+
+
+@at_heated_points.on(Hooks)
+def _(hooks, s):
+    clock = s.control.clock[0]
+    clock.rise = clock.fall = 0.0
+    clear_totals(SUPPLY_HEAT, hooks, s.control)
+    _supply_blocks(s, hooks)
+    publish_totals(SUPPLY_HEAT, hooks, s.control)
+    agree_on_heat(s.control.ranks, s.control)
+    clock.hottest += step_size(s) * clock.rise
+    clock.coldest += step_size(s) * clock.fall
+
+
+@shared
+def visit_for_heat(heat, s, mode, visit, gathers, scatters):
+    """Visit the points for heat: the nodes are those of heat."""
+    here = with_nodes(s, heat.nodes, heat.buffers)
+    visit_here(here, mode, visit, step_size(s), gathers, scatters)
+
+
+@shared
+def map_heat(heat, s, mode, gathers, scatters):
+    """Heat capacity and heat of the nodes from the points now, or temperature from the nodes."""
+    # One loop for both.
+    visit = Visit((Warming(),), (HeatContent(),), OldWeights())
+    visit_for_heat(heat, s, mode, visit, gathers, scatters)
+
+
+@point_function(otherwise=True)
+def show_heat(heat, s, mode):
+    """See that the nodes show the temperature before the first step."""
+
+
+@show_heat.on(Conducting)
+def _(heat, s, mode):
+    map_heat(heat, s, mode, False, True)
+    sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.spans, step_size(s))
+
+
+@conduct.on(Conducting)
+def _(heat, s, mode, hooks):
+    dt = step_size(s)
+    nodes = heat.nodes
+    kin = Line()
+    map_heat(heat, s, mode, False, True)
+    sweep_nodes(mode, SumsToVelocity(), kin, nodes, s.spans, dt)
+    sweep_nodes(mode, TakeMean(), kin, nodes, s.spans, dt)
+    at_heat_nodes(hooks, POST_HEAT_TO_GRID, ON_VELOCITY, s)
+    at_heated_points(hooks, s)
+    flow = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
+    visit_for_heat(heat, s, mode, flow, True, True)
+    sweep_nodes(mode, Update(), kin, nodes, s.spans, dt)
+    at_heat_nodes(hooks, POST_UPDATE_GRID_HEAT, ON_UPDATE, s)
+    map_heat(heat, s, mode, True, False)
+    # What `Warming` reports as a rate is by what factor conduction has become faster.
+    read_reports(s)
+    clock = s.control.clock[0]
+    clock.heat_limit = clock.heat_reference / clock.new_rate
