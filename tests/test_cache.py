@@ -19,7 +19,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
-from karamelo_py.run.runner import Runner
+from karamelo_py.run.spending import Spent
 from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -58,9 +58,9 @@ FILES = {
             first: float
             second: float
 
-        @point_function()
+        @point_function(otherwise=True)
         def area(shape):
-            pass
+            return -1.0
 
         @point_function()
         def price(shape):
@@ -74,10 +74,6 @@ FILES = {
             if price.defined(shape.instance_class):
                 return lambda shape: price(shape)
             return lambda shape: 0.0
-
-        @area.otherwise
-        def _(shape):
-            return -1.0
 
         @kernel
         def one(shape, pair):
@@ -437,7 +433,7 @@ def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
     out = io.StringIO()
     hub = Hub(Console(out))
     hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
-    wait = Runner(hub)._telling_of_compilation
+    wait = Spent(hub).telling_of_compilation
     monkeypatch.setattr(os, "cpu_count", lambda: 4)
     monkeypatch.setattr(os, "getloadavg", lambda: (2.0, 0, 0), raising=False)
     with wait():
@@ -468,7 +464,7 @@ def test_a_folder_that_cannot_be_used_is_warned_of_in_a_run(tmp_path, monkeypatc
     err = io.StringIO()
     hub = Hub(Console(io.StringIO(), err))
     hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
-    with Runner(hub)._telling_of_compilation():
+    with Spent(hub).telling_of_compilation():
         assert fresh()(Tag()) == 42
         assert fresh()(Tag()) == 42
     assert err.getvalue().count("warning") == 1

@@ -342,12 +342,9 @@ def test_constants_are_what_the_compiler_makes_of_them(dtype):
 
 
 def test_another_implementation_is_seen():
-    @point_function()
+    @point_function(otherwise=True)
     def late(tag, x):
         """What comes later."""
-
-    @late.otherwise
-    def _(tag, x):
         return x
 
     def caller(tag, x):

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from math import inf, isfinite, isnan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler import cache
 from karamelo_py.kernels.step import DONE, STOPPED
-from karamelo_py.output.console import duration
 from karamelo_py.run import diagnosis, foresight, restart
 from karamelo_py.run.crew import ENDING
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.spending import Spent
 from karamelo_py.run.stable import ruling_limit, words_of_own_step, words_of_share
 from karamelo_py.run.watch import forget_growth, grown_little, growth, not_watched, unknown_work
 from karamelo_py.scene import boundary
@@ -35,28 +32,9 @@ HALVINGS = 5  # at most, in a run
 RETURNS = 2  # at most, to one state from where energy grows: what two halves do not mend stays
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
 
-ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
-
 
 class Interrupted(Exception):
     """The user pressed Ctrl-C, or another signal (its number) came; everything is written."""
-
-
-def _kind_of_scene(hub: Hub) -> str:
-    """What the loops of a scene depend on, roughly: for how long they take to compile."""
-    parts = {type(material).__name__ for material in hub.materials.values()}
-    parts |= {type(fix).__name__ for fix in hub.fixes.values()}
-    parts |= {str(hub.settings.precision), f"threads={hub.settings.threads}"}
-    return f"{hub.domain.dimension}D {hub.update.words} {' '.join(sorted(parts))}"
-
-
-def _about(seconds: float) -> str:
-    """How long one processor takes for so many seconds of work; longer where others want it."""
-    wanted = 1 + (os.getloadavg()[0] if hasattr(os, "getloadavg") else 0)
-    longest = seconds * max(1.0, wanted / (os.cpu_count() or 1))
-    if longest < 1.5 * seconds:
-        return f"about {duration(seconds)}"
-    return f"{duration(seconds)} to {duration(longest)}, as others use the processors"
 
 
 class Runner:
@@ -86,8 +64,7 @@ class Runner:
         self.snapshot: dict[str, np.ndarray] = {}  # of the last good state
         self.kept = -1  # its step
         self.place = hub.place
-        self.spent = {"compilation": 0.0, "steps": 0.0, "output": 0.0}
-        self.processor = {"compilation": 0.0, "steps": 0.0}  # seconds of all threads
+        self.spent = Spent(hub)
         self.interrupted = 0  # the signal
 
     def run(self) -> None:
@@ -114,7 +91,7 @@ class Runner:
             if hub.simulation.follows:
                 hub.simulation.follow()
             else:
-                with self._telling_of_compilation(), blamed(hub), hub.simulation.leading():
+                with self.spent.telling_of_compilation(), blamed(hub), hub.simulation.leading():
                     self._run(hub.simulation)
         finally:
             hub.running = None
@@ -183,13 +160,13 @@ class Runner:
         simulation.compile()
         began = simulation.step
         self._banner(simulation, going_on)
-        with self._timed("output"):
+        with self.spent.counted("output"):
             hub.output.begin(within=going_on)
         hub.console.begin_run(simulation.step, 0.0)
         try:
             with self._interruptible():
                 self._loop(simulation, first_step, first_time)
-            with self._timed("output"):
+            with self.spent.counted("output"):
                 hub.console.end_run()
                 if self.interrupted:
                     # Before the last state of this run is written, which a longer one has not.
@@ -232,7 +209,7 @@ class Runner:
         )
 
     def _loop(self, simulation: Simulation, first_step: int, first_time: float) -> None:
-        hub, output = self.hub, self.hub.output
+        hub, output, spent = self.hub, self.hub.output, self.spent
         last_step = first_step + self.steps if self.steps is not None else inf
         chunk = 1
         if not self.snapshot:
@@ -253,13 +230,10 @@ class Runner:
             due = step != self.kept and (step % CHUNK == 0 or step == first_step + 1)
             if due and grown_little(simulation):
                 self._keep(simulation)
-            begun, compiled = time.perf_counter(), self.spent["compilation"]
-            worked = time.process_time() - self.processor["compilation"]
-            status = simulation.advance(int(target) - step)
-            elapsed = time.perf_counter() - begun - (self.spent["compilation"] - compiled)
-            self.spent["steps"] += elapsed
-            worked = time.process_time() - self.processor["compilation"] - worked
-            self.processor["steps"] += worked
+            compiled, before = (spent.on[name][0] for name in ("compilation", "steps"))
+            with spent.counted("steps"):
+                status = simulation.advance(int(target) - step)
+            elapsed = spent.on["steps"][0] - before
             if status != DONE:
                 if status == STOPPED and boundary.delete_leaving(hub, simulation, self.snapshot):
                     self._keep(simulation)
@@ -277,7 +251,7 @@ class Runner:
                 hub.warn(found[0], hint=found[1])
                 simulation.told_of_growth = True
             boundary.tell_of_bounces(hub, simulation)
-            if compiled < self.spent["compilation"]:
+            if compiled < spent.on["compilation"][0]:
                 # A rate that counts compilation would promise hours.
                 hub.console.end_run()
                 hub.console.begin_run(
@@ -285,7 +259,7 @@ class Runner:
                 )
             taken = max(simulation.step - step, 1)
             chunk = int(min(CHUNK, max(1, PATIENCE * taken / max(elapsed, 1e-9))))
-            with self._timed("output"):
+            with self.spent.counted("output"):
                 if simulation.step < last_step and simulation.time < self.end_time:
                     output.write()
                 hub.console.progress(
@@ -342,13 +316,6 @@ class Runner:
     # --- around the loop ----------------------------------------------------------------------
 
     @contextmanager
-    def _timed(self, name: str) -> Iterator[None]:
-        begun, compiled = time.perf_counter(), self.spent["compilation"]
-        yield
-        compilation = self.spent["compilation"] - compiled
-        self.spent[name] += time.perf_counter() - begun - compilation
-
-    @contextmanager
     def _interruptible(self) -> Iterator[None]:
         """Ctrl-C ends the run after the present chunk; a second one at once.
 
@@ -376,49 +343,6 @@ class Runner:
             for number in heeded:
                 signal.signal(number, before[number])
 
-    @contextmanager
-    def _telling_of_compilation(self) -> Iterator[None]:
-        """Say so when kernels are compiled, how long it may take, and count the time."""
-        from numba.core import event
-
-        runner, scene = self, _kind_of_scene(self.hub)
-        expected = cache.time_for(scene)
-
-        class Listener(event.Listener):
-            depth = 0
-            begun = worked = 0.0
-            said = False
-
-            def on_start(self, _: Any) -> None:
-                self.depth += 1
-                if self.depth == 1:
-                    self.begun, self.worked = time.perf_counter(), time.process_time()
-                    if not self.said:
-                        self.said = True
-                        about = f": {_about(expected)}" if expected else ""
-                        runner.hub.console.say(
-                            f"Compiling the loops of this kind of scene, once{about}"
-                            " (the next run starts at once) ..."
-                        )
-
-            def on_end(self, _: Any) -> None:
-                self.depth -= 1
-                if self.depth == 0:
-                    runner.spent["compilation"] += time.perf_counter() - self.begun
-                    runner.processor["compilation"] += time.process_time() - self.worked
-
-        listener = Listener()
-        event.register("numba:compile", listener)
-        try:
-            with cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER)):
-                yield
-        finally:
-            event.unregister("numba:compile", listener)
-            spent = self.processor["compilation"]
-            # Where most was in the cache already, the time says nothing about the whole.
-            if spent > 0.5 * (expected or 0.0):
-                cache.keep_time(scene, spent)
-
     def _banner(self, simulation: Simulation, going_on: bool) -> None:
         hub, why = self.hub, unknown_work(self.hub)
         own = words_of_own_step(hub, simulation)
@@ -443,16 +367,17 @@ class Runner:
 
     def _summary(self, simulation: Simulation, first_step: int, wall: float) -> None:
         steps = simulation.step - first_step
-        rate = steps * simulation.count / self.spent["steps"] if self.spent["steps"] > 0 else 0.0
-        stages = list(self.spent.items())
-        stages.append(("rest", max(wall - sum(self.spent.values()), 0.0)))
+        stages = [(name, float(passed)) for name, (passed, _) in self.spent.on.items()]
+        stages.append(("rest", max(wall - sum(seconds for _, seconds in stages), 0.0)))
+        in_steps, worked = self.spent.on["steps"]
+        rate = steps * simulation.count / in_steps if in_steps > 0 else 0.0
         self.hub.console.summary(
             {
                 "wall time": f"{wall:.3g} s",
                 "steps": steps,
                 "time": simulation.time,
                 "particle-steps/s": f"{rate:.3g}",
-                "processor time": f"{self.processor['steps']:.3g} s in steps, of all threads",
+                "processor time": f"{worked:.3g} s in steps, of all threads",
                 **boundary.counted(self.hub, simulation),
             },
             [(name, seconds) for name, seconds in stages if seconds > 0],
