@@ -70,6 +70,25 @@ DUMPS = (
 )
 
 
+NODES = (
+    "dump(g, all, grid, 5, g.*.txt, x, vx, fy, mass, vol, rigid, bx, by, ntypex, mask, T)",
+    "dump(o, all, grid/hdf5, 5, o.h5, y, vy_update, vol, occupied=true)",
+    "dump(v, all, grid/vtk, 5, v.*.vtu, vol, by, occupied=true)",
+    "region(left, block, INF, 0.6, INF, INF)",
+    "group(left, nodes, region, left, all)",
+    "fix(n, force_nodes, left, 3, -1)",
+    "fix(f, force_particles, all, 2, 1)",
+)
+
+
+@pytest.mark.parametrize("method", ["ulmpm", "tlmpm", "ulmpm/contacts"])
+def test_nodes_in_pieces(state_interpreted, tmp_path, method):
+    """Also what points bring to nodes for a dump alone, and before the first step."""
+    script = block(2, *NODES, *MOVING, "run(11)", size=(0.3, 0.2))
+    script = script.replace("method(ulmpm,", f"method({method},")
+    assert shared(state_interpreted, tmp_path, script, ranks=3)
+
+
 def test_dumps_in_pieces(state_interpreted, tmp_path):
     """16 ids after another, with points that are not there any more: the bytes of all at once."""
     script = block(

@@ -143,18 +143,29 @@ class ById:
 
     def x0_of(self, ids: np.ndarray) -> np.ndarray:
         """(n, d) positions of some points before the first step, without those of the others."""
+        found = np.empty((len(ids), self.kin.dimension))
         order = np.argsort(ids)
-        sought, found = ids[order], np.empty((len(ids), self.kin.dimension))
-        for solid in self.hub.solids.values():
-            for begin in range(0, solid.count, PIECE):
-                first = solid.first_id + begin
-                end = first + min(PIECE, solid.count - begin)
-                own = slice(*np.searchsorted(sought, (first, end)))
-                if own.start < own.stop:
-                    low, high = sought[own.start] - first, sought[own.stop - 1] - first
-                    x0 = solid.places[begin + low : begin + high + 1]
-                    found[order[own]] = x0[sought[own] - first - low]
+        for solid, rows, own in self._own(ids[order]):
+            for begin in range(0, len(own), PIECE):
+                some = own[begin : begin + PIECE]
+                x0 = solid.places[some[0] : some[-1] + 1]
+                found[order[rows][begin : begin + PIECE]] = x0[some - some[0]]
         return found
+
+    def volume0_of(self, ids: np.ndarray) -> np.ndarray:
+        """(n,) volumes of some points before the first step."""
+        found = np.empty(len(ids))
+        order = np.argsort(ids)
+        for solid, rows, own in self._own(ids[order]):
+            found[order[rows]] = solid.volume0[own]
+        return found
+
+    def _own(self, ids: np.ndarray) -> Iterator[tuple[Any, slice, np.ndarray]]:
+        """Solids with some of these points (ascending): which of them, and their numbers there."""
+        for solid in self.hub.solids.values():
+            rows = slice(*np.searchsorted(ids, (solid.first_id, solid.first_id + solid.count)))
+            if rows.start < rows.stop:
+                yield solid, rows, ids[rows] - solid.first_id
 
     @property
     def volume0(self) -> np.ndarray:

@@ -8,7 +8,7 @@ first gathers into the arrays of a whole scene, and hands out anew where somethi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import Block, Setup, arrays_of
 from karamelo_py.kernels.totals import WORK
+from karamelo_py.output.node_columns import NodeRows
 from karamelo_py.run.answers import reads_totals
 from karamelo_py.run.by_id import ById, Piece
 from karamelo_py.run.gathering import join, lined_up, spread
@@ -212,6 +213,36 @@ class Ranks(Leading):
     def give_piece(self, first: int, end: int) -> list | None:
         """Own points with ids from `first` to before `end`, for the first process those of all."""
         return self.crew.gathered(self.part.piece(first, end, last=end == self.count))
+
+    def node_pieces(self, names: Iterable[str]) -> Iterator[NodeRows]:
+        """All nodes, so many at a time: not even the first needs the memory of all."""
+        if self._shown or not self._leading:
+            yield from super().node_pieces(names)
+            return
+        self.show_on_nodes()
+        self._all_do("bring", tuple(names))
+        kinds = list(of_nodes(self._whole))
+        for first, end in self.node_ranges():
+            arrays = {n: np.zeros((end - first, *a.shape[1:]), a.dtype) for n, a in kinds}
+            sums = {name: np.zeros((end - first, 2)) for name in self._brought}
+            for own, rows, used, given in self._together("give_nodes", first, end):
+                for array, found in zip(arrays.values(), rows, strict=True):
+                    array[own - first] = found
+                for name, of in given.items():
+                    sums[name][used - first] += of
+            yield self._rows(first, end, arrays, sums)
+        self._all_do("bring", ())
+
+    map_to_nodes = by_all(Simulation.map_to_nodes)
+    occupied_nodes = by_all(Simulation.occupied_nodes)
+
+    def counted(self) -> np.ndarray:
+        """The numbers of the nodes in use, of each at one process."""
+        return self.part.counted() if self._stepping else super().counted()
+
+    def give_nodes(self, first: int, end: int) -> list | None:
+        """Own nodes with numbers from `first` to before `end`, for the first those of all."""
+        return self.crew.gathered(self.part.node_rows(first, end, self._brought))
 
     # --- steps ------------------------------------------------------------------------------------
 
