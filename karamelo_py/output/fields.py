@@ -173,6 +173,26 @@ class Fields:
         """Dissipated energy of a particle group."""
         return self._simulation.total("dissipated", group)
 
+    def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
+        """Sums (k,) over the points of a part's group, rounded once: of processes and of one alike.
+
+        Parameters
+        ----------
+        part
+            A compute or fix, as it stands in the scene.
+        name
+            Of its method that is called with fields of some of the points after others, and the
+            `arguments`, and returns terms (k, n).
+        """
+        return self._simulation.added_up(part, name, *arguments)
+
+    def each(self, part: Any, name: str) -> list:
+        """What a method of a part says of fields of some points of its group after others.
+
+        Which points are together, and in what order they come, depends on processes and steps.
+        """
+        return self._simulation.each(part, name)
+
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
         own = [*sorted(self.columns_of_laws()), *self.declared_columns()]
@@ -216,7 +236,7 @@ class Fields:
     def _particle(self, name: str) -> np.ndarray:
         simulation = self._simulation
         if name == "id":
-            return np.arange(1, simulation.count + 1) + simulation.first
+            return simulation.ids + 1
         if name == "type":
             return simulation.solid_of + 1
         if name in AXES:

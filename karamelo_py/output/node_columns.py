@@ -45,7 +45,6 @@ class NodeRows(NamedTuple):
     first: int
     end: int
     kin: Any
-    basis: Any
     arrays: dict[str, np.ndarray]
     brought: dict[str, np.ndarray]
     loaded: dict[str, int]
@@ -123,7 +122,7 @@ def kind_of_node(axis: int, nodes: NodeFields) -> np.ndarray:
     Splines: -2 and -1 at the lower edge and beside it, 2 and 1 at the upper one, 0 within.
     Bernstein: 1 in the middle of a cell. Else 0.
     """
-    basis = nodes.rows.basis
+    basis = nodes.hub.update.method.basis
     splines = type(basis).__name__ in ("QuadraticSpline", "CubicSpline")
     found = np.zeros(len(nodes.ids))
     for lattice, own in nodes.lattices() if axis < nodes.hub.domain.dimension else ():

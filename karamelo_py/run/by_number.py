@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 import numpy as np
 
@@ -38,8 +37,7 @@ class ByNumber:
 
     def _rows(self, first: int, end: int, arrays: dict, sums: dict) -> NodeRows:
         sums = {name: of.sum(axis=1) for name, of in sums.items()}
-        s: Any = self.stepped
-        return NodeRows(first, end, s.kin, s.basis, arrays, sums, self._loaded)
+        return NodeRows(first, end, self.kin, arrays, sums, self._loaded)
 
     def node_ranges(self) -> Iterator[tuple[int, int]]:
         """The numbers of pieces, from and to, one after another."""

@@ -307,6 +307,33 @@ class Ranks(Leading):
         """The same, by the ID of the group."""
         return super().total(name, None if ID is None else self.hub.groups[ID])
 
+    def added_up(self, part: Any, name: str, *arguments: Any) -> np.ndarray:
+        """Sums over the points of a part's group of what its method `name` says."""
+        if self._at_hand:
+            return super().added_up(part, name, *arguments)
+        return self._all_do("ask", "added_up", *self._named(part), name, *arguments)
+
+    def each(self, part: Any, name: str) -> list:
+        """What a method of a part says of some points of its group after others."""
+        if self._at_hand:
+            found = super().each(part, name)
+            return self.crew.gathered(found) if self._stepping else found
+        found = self._all_do("ask", "each", *self._named(part), name)
+        return [one for of_rank in found for one in of_rank]
+
+    def ask(self, what: str, family: str, ID: str, *arguments: Any) -> Any:
+        """Call `added_up` or `each` with a part of the scene."""
+        return getattr(self, what)(self._catalogues[family][ID], *arguments)
+
+    def _named(self, part: Any) -> tuple[str, str]:
+        """What a part is called at other processes."""
+        found = (kind for kind, all in self._catalogues.items() if all.get(part.id) is part)
+        return next(found), part.id
+
+    @property
+    def _catalogues(self) -> dict[str, Any]:
+        return {catalogue.kind: catalogue for catalogue in self.hub.catalogues}
+
     def of_all(self, numbers: np.ndarray) -> np.ndarray:
         """Sums over all processes, where each looks at its part."""
         return self.crew.added(numbers) if self._stepping else numbers

@@ -32,15 +32,14 @@ class GridVtk(OfNodes, VtkDump):
     dump grid, dump vtk
     """
 
-    _there = np.empty(0, np.int64)  # numbers of the nodes that are written
-
-    def connect(self, vtu: Vtu, ids: np.ndarray) -> None:
+    def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
         """Keep the numbers of nodes that are written, where others are not."""
         if self.occupied:
-            self._there = np.concatenate([self._there, ids]) if vtu.counts[0] > len(ids) else ids
+            kept.append(ids)
 
-    def complete(self, vtu: Vtu) -> None:
+    def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
         """Add lines, squares or cubes between the nodes that are written."""
+        there = np.concatenate(kept) if kept else np.empty(0, np.int64)
         d = self.hub.domain.dimension
         for lattice in self.hub.lattices:
             last = [count - 2 for count in lattice.shape[:d]]
@@ -49,8 +48,6 @@ class GridVtk(OfNodes, VtkDump):
             for index in boxes([0] * d, last, 2**d):
                 nodes = (lattice.first + index @ steps)[:, None] + corners
                 if self.occupied:
-                    rows = np.searchsorted(self._there, nodes)
-                    rows[rows == len(self._there)] = 0
-                    nodes = rows[(self._there[rows] == nodes).all(axis=1)]
+                    rows = np.searchsorted(there[:-1], nodes)
+                    nodes = rows[(there[rows] == nodes).all(axis=1)] if len(there) else nodes[:0]
                 vtu.add_cells(KINDS[d], nodes)
-        self._there = self._there[:0]

@@ -60,22 +60,22 @@ class VtkDump(TableDump):
         path = self.path()
         with whole(path) as file:
             names = [name for name in self.columns if name not in POSITIONS]
-            vtu = Vtu(["id", "type", *names], path.parent)
+            vtu, kept = Vtu(["id", "type", *names], path.parent), []
             for table in self.tables():
                 columns = dict(zip(self.columns, table.columns, strict=True))
                 x = np.column_stack([columns.pop(name) for name in POSITIONS])
                 vtu.add_points(x, [table.ids, table.types, *columns.values()])
-                self.connect(vtu, table.ids)
-            self.complete(vtu)
+                self.connect(vtu, table.ids, kept)
+            self.complete(vtu, kept)
             vtu.write(file)
         self._series.append((self.hub.update.time, path.name))
         with whole(self.index) as file:
             file.write(_collection(self._series))
 
-    def connect(self, vtu: Vtu, ids: np.ndarray) -> None:
-        """Add what is drawn of the last points."""
+    def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
+        """Add what is drawn of the last points, or keep what is needed for it."""
 
-    def complete(self, vtu: Vtu) -> None:
+    def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
         """Add what is drawn between all points."""
 
 
@@ -100,7 +100,7 @@ class Vtk(OfPoints, VtkDump):
     dump particle, dump grid/vtk
     """
 
-    def connect(self, vtu: Vtu, ids: np.ndarray) -> None:
+    def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
         """See `VtkDump.connect`."""
         last = vtu.counts[0]
         vtu.add_cells("vertex", np.arange(last - len(ids), last)[:, None])
