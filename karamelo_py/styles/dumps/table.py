@@ -78,6 +78,12 @@ class TableDump(Dump):
         """All rows in the order of their ids, in pieces whose columns fit into memory."""
         raise NotImplementedError
 
+    def table(self) -> Table:
+        """All rows."""
+        ids, types, columns = zip(*self.tables(), strict=True)
+        joined = (np.concatenate(same) for same in zip(*columns, strict=True))
+        return Table(np.concatenate(ids), np.concatenate(types), list(joined))
+
 
 class OfPoints:
     """Rows are the material points.
