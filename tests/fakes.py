@@ -39,6 +39,7 @@ class FakeFields:
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         self.nodes = {name: nodes[:, i] for i, name in enumerate("xyz")}
         self.nodes["mass"] = np.where(nodes[:, 0] > 0, 1.0, 0.0)
+        self.nodes["id"] = np.arange(len(nodes))
         self.nodes["type"] = np.ones(len(nodes), np.int64)
         self.node_count = len(nodes)
         hub.lattices = [Lattice(dimension, hub.domain.lo, hub.domain.hi, hub.domain.h)]
@@ -63,10 +64,18 @@ class FakeFields:
         return self.points[name].copy()
 
     def node_names(self):
-        return [name for name in self.nodes if name != "type"]
+        return [name for name in self.nodes if name not in ("id", "type")]
 
     def node(self, name):
         return self.nodes[name].copy()
+
+    def node_pieces(self, names):
+        yield self
+
+    @property
+    def occupied_nodes(self):
+        there = np.flatnonzero(self.nodes["mass"] > 0)
+        return len(there), int(there[-1])
 
 
 class FakeHub:

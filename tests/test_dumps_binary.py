@@ -12,6 +12,7 @@ import pytest
 from fakes import FakeHub
 from PIL import Image
 
+from karamelo_py.output.vtu import Vtu
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.grid_hdf5 import GridHdf5
 from karamelo_py.styles.dumps.grid_vtk import GridVtk
@@ -185,6 +186,30 @@ def test_vtk_opens_both(plane):
         reader.Update()
         assert reader.GetErrorCode() == 0
         assert reader.GetOutput().GetNumberOfCells() == count
+
+
+@pytest.mark.parametrize("count", [8192, 8193])
+def test_vtk_in_pieces(tmp_path, count):
+    """8192 doubles are two whole blocks; VTK and meshio read what was written."""
+    x = np.random.default_rng(1).uniform(size=(count, 3))
+    for pieces in (1, 3):
+        vtu = Vtu(["id"], tmp_path)
+        for ids in np.array_split(np.arange(count), pieces):
+            vtu.add_points(x[ids], [ids])
+            vtu.add_cells("vertex", ids[:, None])
+        with (tmp_path / f"{pieces}.vtu").open("wb") as file:
+            vtu.write(file)
+    assert (tmp_path / "1.vtu").read_bytes() == (tmp_path / "3.vtu").read_bytes()
+    mesh = meshio.read(tmp_path / "3.vtu")
+    np.testing.assert_array_equal(mesh.points, x)
+    np.testing.assert_array_equal(mesh.cells[0].data[:, 0], mesh.point_data["id"])
+    xml = pytest.importorskip("vtkmodules.vtkIOXML", exc_type=ImportError)
+    reader = xml.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(tmp_path / "3.vtu"))
+    reader.Update()
+    found = reader.GetOutput()
+    assert found.GetPoint(count - 1) == tuple(x[-1]) and found.GetNumberOfCells() == count
+    assert found.GetPointData().GetArray("id").GetTuple1(count - 1) == count - 1
 
 
 @pytest.mark.parametrize("name", ["p.vtu", "p.*.vtk", "p"])

@@ -137,6 +137,31 @@ def test_bench(tmp_path):
         assert 0 <= row["imbalance"] < 1
 
 
+NOBODY = """
+from karamelo_py.run import ranks, tiles
+tiles.DIRECT_UP_TO = 0
+def gathers(*_, **__):
+    raise MemoryError("of the whole scene")
+ranks.Ranks.gather = gathers
+"""
+
+
+@needs_mpi
+def test_nobody_has_the_whole(tmp_path):
+    """Dumps of points and nodes, sums, largest values and values at a point."""
+    (tmp_path / "sitecustomize.py").write_text(NOBODY, encoding="utf-8")
+    lines = (
+        "compute(p, linear_momentum, all)", "compute(m, max_position, all)",
+        "compute(e, error, all, ux, 0.1*time)", "compute(at, probe, all, s11, x=0.4)",
+        "dump(v, all, vtk, 10, v.*.vtu, seq)", "dump(g, all, grid, 10, g.*.txt, vx, mass, vol)",
+    )  # fmt: skip
+    log = "log_modify(custom, step, E, p_x, m_x, e, at)"
+    path = moving(tmp_path, *lines, *FILES[:3], log, "set_output(5)", "run(12)")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    status, _, err = by_ranks(tmp_path / "run", path, 2, PYTHONPATH=folders)
+    assert status == 0, err
+
+
 # --- one end for all ----------------------------------------------------------------------------
 
 

@@ -70,6 +70,25 @@ DUMPS = (
 )
 
 
+NODES = (
+    "dump(g, all, grid, 5, g.*.txt, x, vx, fy, mass, vol, rigid, bx, by, ntypex, mask, T)",
+    "dump(o, all, grid/hdf5, 5, o.h5, y, vy_update, vol, occupied=true)",
+    "dump(v, all, grid/vtk, 5, v.*.vtu, vol, by, occupied=true)",
+    "region(left, block, INF, 0.6, INF, INF)",
+    "group(left, nodes, region, left, all)",
+    "fix(n, force_nodes, left, 3, -1)",
+    "fix(f, force_particles, all, 2, 1)",
+)
+
+
+@pytest.mark.parametrize("method", ["ulmpm", "tlmpm", "ulmpm/contacts"])
+def test_nodes_in_pieces(state_interpreted, tmp_path, method):
+    """Also what points bring to nodes for a dump alone, and before the first step."""
+    script = block(2, *NODES, *MOVING, "run(11)", size=(0.3, 0.2))
+    script = script.replace("method(ulmpm,", f"method({method},")
+    assert shared(state_interpreted, tmp_path, script, ranks=3)
+
+
 def test_dumps_in_pieces(state_interpreted, tmp_path):
     """16 ids after another, with points that are not there any more: the bytes of all at once."""
     script = block(
@@ -79,6 +98,46 @@ def test_dumps_in_pieces(state_interpreted, tmp_path):
     assert shared(state_interpreted, tmp_path, script)
     with h5py.File(tmp_path / "parts" / "h.h5") as file:
         assert np.isnan(file["x"][-1]).any() and len(file["id"]) > 32
+
+
+COMPUTES = """\
+region(left, block, INF, 0.55, INF, INF)
+group(left, particles, region, left, all)
+compute(P, linear_momentum, all)
+compute(L, angular_momentum, left, 0.3, 0.2)
+compute(V, average_velocity, left)
+compute(s, average_stress, left)
+compute(T, average_temperature, all)
+compute(c, center_of_mass, left)
+compute(q, position_quantile, all, 0.37)
+compute(m, max_position, left)
+compute(e, max_plastic_strain, all)
+compute(e1, error, left, velocity, 0.9, x0*time, L1)
+compute(e2, error, all, stress, 0, 0, y, L2, relative)
+compute(em, error, all, ux, 0.9*time, max)
+compute(r, reference, all, ../curve.csv, vx, relative)
+compute(rm, reference, left, ../curve.csv, vx, max)
+compute(p, probe, left, s11, volume)
+compute(p3, probe, left, vx, point=3)
+compute(at, probe, all, vy, x=0.52, y=0.41)
+fix(F, force_particles, left, 3, -1)
+fix(check, check_solution, left, 0.1*time*x0, 0)
+pull = external_force(left, x)
+log_modify(custom, step, P_x, P_drift, L_z, L_drift, V_x, s_11, s_12, T, c_x, c_y, q_x, q_y, m_x, &
+           m_y, e_Epmax, e1, e1_max, e2, e2_history, em, em_history, r, r_curve, rm, p_s11, &
+           p_volume, p3, at, check_s, check_z, pull, xcm(left, y))
+set_output(3)
+"""
+
+
+def test_computes_by_shares(state_interpreted, tmp_path):
+    """Sums without rounding, largest values, and values at a point."""
+    (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
+    script = block(2, COMPUTES.replace("&\n", ""), MOVING[0], *MOVING[3:], "run(10)",
+                   transfer="APIC", size=(0.3, 0.2))  # fmt: skip
+    assert shared(state_interpreted, tmp_path, script, ranks=3)
+    log = (tmp_path / "parts" / "log.mpm").read_text(encoding="utf-8")
+    assert "nan" not in log and len(log.split()) > 100
 
 
 @pytest.mark.parametrize("shape", [(7,), (8, 8), (4, 4, 4), (5, 3), (3, 7, 2)])

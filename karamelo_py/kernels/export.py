@@ -73,15 +73,23 @@ def impose_stress(kin, like, points, laws, chosen, given, stress):
 
 
 @loop
-def export_to_nodes(basis, kin, grids, grid_of, where, values, out):
-    """Add sum N value of the points to ``out`` (nodes,); ``values`` (n,)."""
+def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
+    """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) of at most 2^36 units.
+
+    The first column takes whole units, the second what is left in units 2^36 times smaller: sums of
+    both are exact for up to 2^17 points at a node, in whatever order points come.
+    """
     grids = at_hand(grids)
+    whole, fine = 1.5 * 2.0**52 * unit, 1.5 * 2.0**16 * unit
     for p in range(values.size):
         grid = record(grids, index(grid_of[p]))
         stencil = locate(basis, kin, grid, place_at(basis, kin, where, p))
         for k in range(support(basis, kin)):
             part = entry(basis, kin, grid, stencil, k)
-            out[index(part[0])] += part[1] * values[p]
+            n, value = index(part[0]), part[1] * values[p]
+            units = (value + whole) - whole
+            out[n, 0] += units
+            out[n, 1] += ((value - units) + fine) - fine
 
 
 @loop

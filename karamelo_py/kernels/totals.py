@@ -142,6 +142,13 @@ def add_all(totals, row, terms):
         add_to(totals, row, terms[q])
 
 
+@entered
+def add_rows(totals, rows, terms):
+    """Add each of the `terms` to the total in its row, without rounding."""
+    for q in range(terms.size):
+        add_to(totals, rows[q], terms[q])
+
+
 @point_function()
 def collect(ranks, control, first, count):
     """Put the values of `count` totals, from row `first` on, into `control.answer`."""

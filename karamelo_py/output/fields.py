@@ -1,13 +1,13 @@
 """Fields of points and nodes for output, in the order of their ids."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.kernels.arrays import MASS, of_force
+from karamelo_py.kernels.arrays import MASS
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.export import (
     ENERGY,
@@ -21,7 +21,7 @@ from karamelo_py.kernels.export import (
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.node_columns import NODE_COLUMNS
+from karamelo_py.output.node_columns import ABSENT_AT_NODES, BROUGHT, NODE_NAMES, NodeFields
 from karamelo_py.points.boundary import Bounces, ReflectingGrid
 from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
@@ -41,22 +41,11 @@ PARTICLE_NAMES = (
     + ["seq", "volume", "mass", "damage", "damage_init", "bx", "by", "bz", "ep", "epdot"]
     + ["T", "ienergy", "gamma"]
 )
-NODE_NAMES = (
-    ["id", "type"]
-    + list(AXES)
-    + ["v" + axis for axis in AXES]
-    + ["v" + axis + "_update" for axis in AXES]
-    + ["f" + axis for axis in AXES]
-    + ["mass", "vol", "mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez"]
-)
-
 
 # Columns of Karamelo that are zero here: nothing keeps them apart, or only some materials do.
 ABSENT_AT_POINTS = (
     "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
 )  # fmt: skip
-
-ABSENT_AT_NODES = ("T",)
 
 
 class Fields:
@@ -184,6 +173,26 @@ class Fields:
         """Dissipated energy of a particle group."""
         return self._simulation.total("dissipated", group)
 
+    def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
+        """Sums (k,) over the points of a part's group, rounded once: of processes and of one alike.
+
+        Parameters
+        ----------
+        part
+            A compute or fix, as it stands in the scene.
+        name
+            Of its method that is called with fields of some of the points after others, and the
+            `arguments`, and returns terms (k, n).
+        """
+        return self._simulation.added_up(part, name, *arguments)
+
+    def each(self, part: Any, name: str) -> list:
+        """What a method of a part says of fields of some points of its group after others.
+
+        Which points are together, and in what order they come, depends on processes and steps.
+        """
+        return self._simulation.each(part, name)
+
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
         own = [*sorted(self.columns_of_laws()), *self.declared_columns()]
@@ -227,7 +236,7 @@ class Fields:
     def _particle(self, name: str) -> np.ndarray:
         simulation = self._simulation
         if name == "id":
-            return np.arange(1, simulation.count + 1) + simulation.first
+            return simulation.ids + 1
         if name == "type":
             return simulation.solid_of + 1
         if name in AXES:
@@ -255,38 +264,20 @@ class Fields:
                 return _column(array, k)
         return np.zeros(simulation.count)
 
+    def node_pieces(self, names: Sequence[str]) -> Iterator[NodeFields]:
+        """Fields of all nodes, of which `names` are asked for, so many nodes at a time."""
+        for rows in self._simulation.node_pieces([name for name in names if name in BROUGHT]):
+            yield NodeFields(self.hub, rows)
+
+    @property
+    def occupied_nodes(self) -> tuple[int, int]:
+        """How many nodes have mass, and the last of them."""
+        self._simulation.show_on_nodes()
+        return self._simulation.occupied_nodes()
+
     def node(self, name: str) -> np.ndarray:
         """A field of all nodes, (n,); nodes without mass are at rest."""
-        self._simulation.show_on_nodes()
-        nodes = self._simulation.setup.nodes
-        d = self.hub.domain.dimension
-        mass = nodes.sums[:, MASS].astype(float)
-        if name == "id":
-            return np.arange(self.node_count)
-        if name == "type":
-            counts = [lattice.node_count for lattice in self.hub.lattices]
-            return np.repeat(np.arange(1, 1 + len(counts)), counts)
-        if name in AXES:
-            axis = AXES.index(name)
-            return np.concatenate([lattice.positions()[:, axis] for lattice in self.hub.lattices])
-        if name == "mass":
-            return mass
-        if name == "T" and self.hub.update.thermal:
-            heat = self._simulation.setup.heat.nodes
-            return np.where(heat.sums[:, MASS] > 0, heat.velocity[:, 0], 0.0)
-        if name in ABSENT_AT_NODES:
-            return np.zeros(self.node_count)
-        if name in NODE_COLUMNS:
-            return NODE_COLUMNS[name](self.hub, self._simulation)
-        axis = AXES.index(name[1])
-        if axis >= d:
-            return np.zeros(self.node_count)
-        field = {
-            "v": nodes.velocity[:, axis],
-            "u": nodes.update[:, axis],
-            "f": nodes.sums[:, of_force(self._simulation.setup.kin) + axis],
-        }["u" if name.endswith("_update") else name[0]]
-        return np.where(mass > 0, field, 0.0)
+        return np.concatenate([piece.node(name) for piece in self.node_pieces([name])])
 
     @property
     def _exported(self) -> np.ndarray:

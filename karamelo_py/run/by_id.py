@@ -11,8 +11,8 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import Block, Control, Setup
-from karamelo_py.kernels.totals import LIMBS, add_all, rounded
-from karamelo_py.output.fields import PIECE, SUMMED
+from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
+from karamelo_py.output.fields import PIECE, SUMMED, Fields
 from karamelo_py.run.lowering import chosen
 from karamelo_py.scene.hub import Hub
 
@@ -39,6 +39,11 @@ class ById:
     def kin(self) -> NamedTuple:
         """The kinematics."""
         return self.stepped.kin
+
+    @property
+    def ids(self) -> np.ndarray:
+        """(N,) the numbers of the points."""
+        return self.first + np.arange(self.count)
 
     @property
     def now(self) -> int:
@@ -106,16 +111,63 @@ class ById:
     def total(self, name: str, group: Any = None) -> float:
         """What all points, or those of a group, have together of `SUMMED`; without rounding."""
         limbs = np.zeros((1, LIMBS), np.int64)
-        chosen = None
-        if group is not None and not group.all:
-            chosen = np.zeros(self.count, np.bool_)
-            chosen[group.ids] = True
+        among = self._among(group)
         for block in self.stepped.blocks:
             values = SUMMED[name](self.stepped, block)
             if values is not None:
-                rows = slice(None) if chosen is None else chosen[block.points.id]
+                rows = slice(None) if among is None else among[block.points.id]
                 add_all(limbs, 0, values[rows])
         return rounded(self.of_all(limbs)[0])
+
+    def _among(self, group: Any) -> np.ndarray | None:
+        """(N,) whether points are of a group, by id; None where it has all."""
+        if group is None or group.all:
+            return None
+        among = np.zeros(self.count, np.bool_)
+        among[group.ids] = True
+        return among
+
+    def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
+        """The points of a group that are at hand, so many at a time: a block, and rows of it."""
+        among = self._among(group)
+        for block in self.stepped.blocks:
+            ids = block.points.id
+            for first in range(0, len(ids), PIECE):
+                rows = np.arange(first, min(first + PIECE, len(ids)))
+                if among is not None:
+                    rows = rows[among[ids[rows]]]
+                if len(rows):
+                    yield block, rows
+
+    def some(self, group: Any) -> Iterator[Some]:
+        """The points of a group that are at hand, so many at a time, and at last none."""
+        for block, rows in self.rows_of(group):
+            yield Some(self, block, rows)
+        yield Some(self, self.stepped.blocks[0], np.empty(0, np.int64))
+
+    def added_up(self, part: Any, name: str, *arguments: Any) -> np.ndarray:
+        """Sums over the points of a part's group of what its method `name` says; no rounding.
+
+        The method is called with `Fields` of some of the points, and the `arguments`. It returns
+        rows of terms (k, n), or the number of sums, to which of them (n,) a term goes, and terms.
+        """
+        limbs = np.empty((0, LIMBS), np.int64)
+        for some in self.some(part.group):
+            found = getattr(part, name)(Fields(self.hub, some), *arguments)
+            count, rows, terms = found if isinstance(found, tuple) else (len(found), None, found)
+            if not len(limbs):
+                limbs = np.zeros((count, LIMBS), np.int64)
+            if rows is not None:
+                add_rows(limbs, rows, terms)
+                continue
+            for k in range(count):
+                add_all(limbs, k, np.ascontiguousarray(terms[k], float))
+        return np.array([rounded(total) for total in self.of_all(limbs)])
+
+    def each(self, part: Any, name: str) -> list:
+        """What a method of a part says of some points of its group after others, where it does."""
+        found = (getattr(part, name)(Fields(self.hub, some)) for some in self.some(part.group))
+        return [one for one in found if one is not None]
 
     def counts(self) -> list[int]:
         """How many points each block has."""
@@ -143,18 +195,29 @@ class ById:
 
     def x0_of(self, ids: np.ndarray) -> np.ndarray:
         """(n, d) positions of some points before the first step, without those of the others."""
+        found = np.empty((len(ids), self.kin.dimension))
         order = np.argsort(ids)
-        sought, found = ids[order], np.empty((len(ids), self.kin.dimension))
-        for solid in self.hub.solids.values():
-            for begin in range(0, solid.count, PIECE):
-                first = solid.first_id + begin
-                end = first + min(PIECE, solid.count - begin)
-                own = slice(*np.searchsorted(sought, (first, end)))
-                if own.start < own.stop:
-                    low, high = sought[own.start] - first, sought[own.stop - 1] - first
-                    x0 = solid.places[begin + low : begin + high + 1]
-                    found[order[own]] = x0[sought[own] - first - low]
+        for solid, rows, own in self._own(ids[order]):
+            for begin in range(0, len(own), PIECE):
+                some = own[begin : begin + PIECE]
+                x0 = solid.places[some[0] : some[-1] + 1]
+                found[order[rows][begin : begin + PIECE]] = x0[some - some[0]]
         return found
+
+    def volume0_of(self, ids: np.ndarray) -> np.ndarray:
+        """(n,) volumes of some points before the first step."""
+        found = np.empty(len(ids))
+        order = np.argsort(ids)
+        for solid, rows, own in self._own(ids[order]):
+            found[order[rows]] = solid.volume0[own]
+        return found
+
+    def _own(self, ids: np.ndarray) -> Iterator[tuple[Any, slice, np.ndarray]]:
+        """Solids with some of these points (ascending): which of them, and their numbers there."""
+        for solid in self.hub.solids.values():
+            rows = slice(*np.searchsorted(ids, (solid.first_id, solid.first_id + solid.count)))
+            if rows.start < rows.stop:
+                yield solid, rows, ids[rows] - solid.first_id
 
     @property
     def volume0(self) -> np.ndarray:
@@ -194,6 +257,60 @@ class Piece(ById):
         self.control = s.control
         self.first, self.count = first, end - first
         self.present = whole.present[first:end]
+
+
+class Some(ById):
+    """Some points of a block, in the order in which they are stored."""
+
+    kin: Any = None
+    ids: Any = None
+
+    def __init__(self, whole: ById, block: Block, rows: np.ndarray):
+        self.hub, self.control, self.kin = whole.hub, whole.control, whole.kin
+        self._stepped, self._block, self._rows = whole.stepped, block, rows
+        self.ids, self.count = block.points.id[rows], len(rows)
+        self.present = np.ones(self.count, np.bool_)
+
+    @cached_property
+    def setup(self) -> Setup:
+        """Arrays with copies of these points, which are numbered from 0."""
+        block = chosen(self._block, self._rows)
+        points = block.points._replace(id=np.arange(self.count))
+        return self._stepped._replace(blocks=(block._replace(points=points),))
+
+    def _taken(self, array: np.ndarray) -> np.ndarray:
+        return np.take(array, self._rows, axis=-1).T
+
+    @property
+    def x(self) -> np.ndarray:
+        """(n, d) present positions."""
+        return self._taken(self._block.points.x[self.now][: self.kin.dimension])
+
+    @property
+    def v(self) -> np.ndarray:
+        """(n, d) velocities."""
+        return self._taken(self._block.points.v)
+
+    @property
+    def mass(self) -> np.ndarray:
+        """(n,) masses."""
+        return self._taken(self._block.points.mass)
+
+    @property
+    def x0(self) -> np.ndarray:
+        """(n, d) positions before the first step."""
+        return self.x0_of(self.ids)
+
+    @property
+    def volume0(self) -> np.ndarray:
+        """(n,) volumes before the first step."""
+        return self.volume0_of(self.ids)
+
+    @property
+    def solid_of(self) -> np.ndarray:
+        """(n,) the number of the solid of each point, from 0."""
+        firsts = [solid.first_id for solid in self.hub.solids.values()]
+        return np.searchsorted(firsts, self.ids, side="right") - 1
 
 
 class Ordered:

@@ -29,7 +29,7 @@ def by_all(method: Callable) -> Callable:
 
     @wraps(method)
     def act(self: Leading, *arguments: Any) -> Any:
-        if self._stepping or self._shown or not self._leading:
+        if self._at_hand:
             return method(self, *arguments)
         return self._all_do(method.__name__, *arguments)
 
@@ -49,6 +49,11 @@ class Leading(Simulation):
         self._joint = False  # all processes do the same, and wait for each other
         self._prepared = False
         super().__init__(hub, previous)
+
+    @property
+    def _at_hand(self) -> bool:
+        """Whether the points that are asked about are at hand: own ones in steps, or all."""
+        return self._stepping or self._shown or not self._leading
 
     def _settle(self) -> None:
         """See that all processes have the state that the run has ended with."""

@@ -23,6 +23,7 @@ from karamelo_py.kernels.sweep import Visit, sweep_nodes
 from karamelo_py.points.laws import can, law_kind, with_stress
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.by_id import ById
+from karamelo_py.run.by_number import ByNumber
 from karamelo_py.run.lowering import State, chosen, lower, thread_count, warms_by_friction
 from karamelo_py.run.state import changing, go_back
 from karamelo_py.run.tiles import Tiles
@@ -54,7 +55,7 @@ def scene_key(hub: Hub) -> tuple:
     )
 
 
-class Lowered(ById):
+class Lowered(ById, ByNumber):
     """The arrays of a scene, and the threads that work on them."""
 
     def __init__(self, hub: Hub, previous: Lowered | None = None):
@@ -208,14 +209,18 @@ class Lowered(ById):
     def show_on_nodes(self) -> None:
         """See that the nodes show the present state when no step has been taken yet."""
         if not self.mapped:
-            s = self.setup
-            self.sort_if_due()
-            dt = step_size(s)
-            visit = Visit((), SUMS.quantities, SUMS.weights)
-            sweep(s, self.mode, visit, dt, False, True, False)
-            sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
-            show_heat(s.heat, s, self.mode)
+            self.map_to_nodes()
             self.mapped = True
+
+    def map_to_nodes(self) -> None:
+        """Let the nodes show the present state."""
+        self.sort_if_due()
+        s = self.stepped
+        dt = step_size(s)
+        visit = Visit((), SUMS.quantities, SUMS.weights)
+        sweep(s, self.mode, visit, dt, False, True, False)
+        sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
+        show_heat(s.heat, s, self.mode)
 
     def snapshot(self, before: Mapping[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
         """Copies of every array that a step changes, and of the published values.

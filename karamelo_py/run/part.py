@@ -140,6 +140,17 @@ class Part:
             "memory": [array[own] for array in self.memory()],
         }
 
+    def node_rows(self, first: int, end: int, sums: dict[str, np.ndarray]) -> tuple:
+        """The nodes from `first` to before `end`: what of them others do not show, and `sums`."""
+        if first == 0:
+            self._counted, self._in_use = self.counted(), numbers(self.setup.spans)
+        own, used = (
+            nodes[slice(*np.searchsorted(nodes, (first, end)))]
+            for nodes in (self._counted, self._in_use)
+        )
+        rows = [array[own] for _, array in of_nodes(self.setup)]
+        return own, rows, used, {name: of[used] for name, of in sums.items()}
+
     def piece(self, first: int, end: int, *, last: bool) -> list[list[np.ndarray]]:
         """The points with ids from `first` to before `end`, block by block; the `last` piece."""
         if first == 0:

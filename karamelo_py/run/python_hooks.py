@@ -9,7 +9,6 @@ from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HE
 from karamelo_py.kernels.conduction import at_heat_nodes, at_heated_points
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.moments import at_nodes, at_points
-from karamelo_py.output.fields import PIECE
 from karamelo_py.run.hooks import lower_hooks
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
 
@@ -97,14 +96,5 @@ def views_of(simulation: Any, fix: Any) -> Iterator[PointsView]:
     if not fix.point_by_point:
         yield PointsView(simulation, fix.group, then=False)
         return
-    chosen = None if fix.group.all else np.zeros(simulation.count, np.bool_)
-    if chosen is not None:
-        chosen[fix.group.ids] = True
-    for block in simulation.stepped.blocks:
-        ids = block.points.id
-        for first in range(0, len(ids), PIECE):
-            rows = np.arange(first, min(first + PIECE, len(ids)))
-            if chosen is not None:
-                rows = rows[chosen[ids[rows]]]
-            if len(rows):
-                yield PieceView(simulation, block, rows)
+    for block, rows in simulation.rows_of(fix.group):
+        yield PieceView(simulation, block, rows)

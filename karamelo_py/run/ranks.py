@@ -8,7 +8,7 @@ first gathers into the arrays of a whole scene, and hands out anew where somethi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import Block, Setup, arrays_of
 from karamelo_py.kernels.totals import WORK
+from karamelo_py.output.node_columns import NodeRows
 from karamelo_py.run.answers import reads_totals
 from karamelo_py.run.by_id import ById, Piece
 from karamelo_py.run.gathering import join, lined_up, spread
@@ -213,6 +214,36 @@ class Ranks(Leading):
         """Own points with ids from `first` to before `end`, for the first process those of all."""
         return self.crew.gathered(self.part.piece(first, end, last=end == self.count))
 
+    def node_pieces(self, names: Iterable[str]) -> Iterator[NodeRows]:
+        """All nodes, so many at a time: not even the first needs the memory of all."""
+        if self._shown or not self._leading:
+            yield from super().node_pieces(names)
+            return
+        self.show_on_nodes()
+        self._all_do("bring", tuple(names))
+        kinds = list(of_nodes(self._whole))
+        for first, end in self.node_ranges():
+            arrays = {n: np.zeros((end - first, *a.shape[1:]), a.dtype) for n, a in kinds}
+            sums = {name: np.zeros((end - first, 2)) for name in self._brought}
+            for own, rows, used, given in self._together("give_nodes", first, end):
+                for array, found in zip(arrays.values(), rows, strict=True):
+                    array[own - first] = found
+                for name, of in given.items():
+                    sums[name][used - first] += of
+            yield self._rows(first, end, arrays, sums)
+        self._all_do("bring", ())
+
+    map_to_nodes = by_all(Simulation.map_to_nodes)
+    occupied_nodes = by_all(Simulation.occupied_nodes)
+
+    def counted(self) -> np.ndarray:
+        """The numbers of the nodes in use, of each at one process."""
+        return self.part.counted() if self._stepping else super().counted()
+
+    def give_nodes(self, first: int, end: int) -> list | None:
+        """Own nodes with numbers from `first` to before `end`, for the first those of all."""
+        return self.crew.gathered(self.part.node_rows(first, end, self._brought))
+
     # --- steps ------------------------------------------------------------------------------------
 
     def _all_do(self, name: str, *arguments: Any) -> Any:
@@ -275,6 +306,33 @@ class Ranks(Leading):
     def total_of(self, name: str, ID: str | None) -> float:
         """The same, by the ID of the group."""
         return super().total(name, None if ID is None else self.hub.groups[ID])
+
+    def added_up(self, part: Any, name: str, *arguments: Any) -> np.ndarray:
+        """Sums over the points of a part's group of what its method `name` says."""
+        if self._at_hand:
+            return super().added_up(part, name, *arguments)
+        return self._all_do("ask", "added_up", *self._named(part), name, *arguments)
+
+    def each(self, part: Any, name: str) -> list:
+        """What a method of a part says of some points of its group after others."""
+        if self._at_hand:
+            found = super().each(part, name)
+            return self.crew.gathered(found) if self._stepping else found
+        found = self._all_do("ask", "each", *self._named(part), name)
+        return [one for of_rank in found for one in of_rank]
+
+    def ask(self, what: str, family: str, ID: str, *arguments: Any) -> Any:
+        """Call `added_up` or `each` with a part of the scene."""
+        return getattr(self, what)(self._catalogues[family][ID], *arguments)
+
+    def _named(self, part: Any) -> tuple[str, str]:
+        """What a part is called at other processes."""
+        found = (kind for kind, all in self._catalogues.items() if all.get(part.id) is part)
+        return next(found), part.id
+
+    @property
+    def _catalogues(self) -> dict[str, Any]:
+        return {catalogue.kind: catalogue for catalogue in self.hub.catalogues}
 
     def of_all(self, numbers: np.ndarray) -> np.ndarray:
         """Sums over all processes, where each looks at its part."""

@@ -89,14 +89,15 @@ class Lattice:
         """Number of nodes."""
         return math.prod(self.shape)
 
-    def positions(self) -> np.ndarray:
-        """Positions of all nodes, (n, 3); node (i, j, k) has the number (i ny + j) nz + k."""
-        positions = np.empty((*self.shape, 3))
-        for axis, count in enumerate(self.shape):
-            along = [1, 1, 1]
-            along[axis] = count
-            positions[..., axis] = (self.lo[axis] + np.arange(count) * self.spacing).reshape(along)
-        return positions.reshape(-1, 3)
+    def places(self, numbers: np.ndarray) -> np.ndarray:
+        """Places (n, 3) of nodes; that at (i, j, k) has the number `first` + (i ny + j) nz + k."""
+        return np.stack(np.unravel_index(numbers - self.first, self.shape), axis=1)
+
+    def positions(self, numbers: np.ndarray | None = None) -> np.ndarray:
+        """Positions of nodes, (n, 3); of all where no numbers are given."""
+        if numbers is None:
+            numbers = self.first + np.arange(self.node_count)
+        return self.lo + self.places(numbers) * self.spacing
 
     def between(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Nodes in a box, some thousand at a time: their numbers (m,) and positions (m, dimension).

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -46,24 +47,24 @@ class AngularMomentum(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        fields = self.hub.fields
-        ids = fields.members(self.group)
+        *total, scale = self.hub.fields.added_up(self)
+        self.publish_components(np.array(total))
+        self.publish("drift", self._drift(np.array(total), scale))
+
+    def terms(self, points: Fields) -> np.ndarray:
+        """Angular momenta of points, and what they are without their direction."""
         d = self.hub.domain.dimension
-        mass = fields.mass[ids]
-        arm = np.zeros((len(ids), 3))
-        v = np.zeros((len(ids), 3))
-        arm[:, :d] = fields.position[ids]
-        v[:, :d] = fields.velocity[ids]
-        total = mass @ np.cross(arm - self.centre, v)
-        moment = fields.velocity_moment
+        arm, v = np.zeros((2, points.count, 3))
+        arm[:, :d], v[:, :d] = points.position, points.velocity
+        arm -= self.centre
+        angular = np.cross(arm, v)
+        moment = points.velocity_moment
         if moment is not None and d > 1:
             # B_ij = sum N v_i (X - x)_j: the part of v x arm within a point's surroundings.
-            b = np.zeros((len(ids), 3, 3))
-            b[:, :d, :d] = moment[ids].reshape(-1, d, d)
-            within = np.stack(
+            b = np.zeros((points.count, 3, 3))
+            b[:, :d, :d] = moment.reshape(-1, d, d)
+            angular += np.stack(
                 [b[:, 2, 1] - b[:, 1, 2], b[:, 0, 2] - b[:, 2, 0], b[:, 1, 0] - b[:, 0, 1]], axis=1
             )
-            total = total + mass @ within
-        self.publish_components(total)
-        scale = mass @ (np.linalg.norm(arm - self.centre, axis=1) * np.linalg.norm(v, axis=1))
-        self.publish("drift", self._drift(total, float(scale)))
+        scale = np.linalg.norm(arm, axis=1) * np.linalg.norm(v, axis=1)
+        return points.mass * np.vstack([angular.T, scale])

@@ -1,8 +1,6 @@
 """compute average_stress."""
 
-import numpy as np
-
-from karamelo_py.output.fields import COMPONENTS
+from karamelo_py.output.fields import COMPONENTS, Fields
 from karamelo_py.scene.modify import Compute
 
 
@@ -28,10 +26,11 @@ class AverageStress(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        fields = self.hub.fields
-        chosen = np.isin(fields.particle("id") - 1, fields.members(self.group))
-        volume = fields.particle("volume")[chosen]
-        total = volume.sum()
-        for component in COMPONENTS:
-            stress = fields.particle("s" + component)[chosen]
-            self.publish(component, float(volume @ stress) / total if total > 0 else 0.0)
+        volume, *total = self.hub.fields.added_up(self)
+        for component, of_all in zip(COMPONENTS, total, strict=True):
+            self.publish(component, of_all / volume if volume > 0 else 0.0)
+
+    def terms(self, points: Fields) -> list:
+        """Volumes of points, and these times their stress."""
+        volume = points.particle("volume")
+        return [volume, *(volume * points.particle("s" + c) for c in COMPONENTS)]

@@ -1,7 +1,9 @@
 """compute average_temperature."""
 
+import numpy as np
+
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.modify import Compute
-from karamelo_py.styles.computes.columns import of_group
 
 
 class AverageTemperature(Compute):
@@ -23,5 +25,9 @@ class AverageTemperature(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        values = of_group(self.hub, self.group, "T")
-        self.publish("", float(values.sum() / max(len(values), 1)))
+        count, total = self.hub.fields.added_up(self)
+        self.publish("", total / max(count, 1))
+
+    def terms(self, points: Fields) -> list[np.ndarray]:
+        """One, and the temperature, of each point."""
+        return [np.ones(points.count), points.particle("T")]

@@ -1,5 +1,8 @@
 """compute average_velocity."""
 
+import numpy as np
+
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.modify import Compute
 
 
@@ -16,6 +19,10 @@ class AverageVelocity(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        velocity = self.hub.fields.velocity[self.hub.fields.members(self.group)]
+        count, *total = self.hub.fields.added_up(self)
         # Without points, 0, as the sums of other computes.
-        self.publish_components(velocity.sum(axis=0) / max(len(velocity), 1))
+        self.publish_components(np.array(total) / max(count, 1))
+
+    def terms(self, points: Fields) -> list[np.ndarray]:
+        """One, and the velocity, of each point."""
+        return [np.ones(points.count), *points.velocity.T]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -38,11 +39,15 @@ class CenterOfMass(Compute):
         """Measure and publish."""
         fields = self.hub.fields
         if isinstance(self.group, ParticleGroup):
-            members = fields.members(self.group)
-            mass, x = fields.mass[members].astype(float), fields.position[members]
+            total, *moments = fields.added_up(self)
         else:
             members = self.group.members
             mass = fields.node("mass")[members]
             x = np.column_stack([fields.node(axis)[members] for axis in "xyz"])
-        total = mass.sum()
-        self.publish_components(mass @ x / total if total > 0 else np.zeros(3))
+            total, moments = mass.sum(), mass @ x
+        self.publish_components(np.array(moments) / total if total > 0 else np.zeros(3))
+
+    def terms(self, points: Fields) -> list[np.ndarray]:
+        """Masses of points, and these times where they are."""
+        mass = points.mass.astype(float)
+        return [mass, *(mass * points.position.T)]

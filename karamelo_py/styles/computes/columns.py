@@ -11,9 +11,8 @@ import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.output.fields import AXES, COMPONENTS
+from karamelo_py.output.fields import AXES, COMPONENTS, Fields
 from karamelo_py.scene.domain import require_domain
-from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
 
@@ -22,16 +21,11 @@ TENSORS = {"stress": "s", "strain": "e"}
 DISPLACEMENTS = ("ux", "uy", "uz")
 
 
-def of_group(hub: Scene, group: ParticleGroup, name: str) -> np.ndarray:
-    """A column of the points of a group that there still are, (n,)."""
-    fields = hub.fields
+def column(points: Fields, name: str) -> np.ndarray:
+    """A column of points, (n,), displacements too."""
     if name in DISPLACEMENTS:
-        return of_group(hub, group, name[1]) - of_group(hub, group, name[1] + "0")
-    values, ids = fields.particle(name), fields.members(group)
-    if len(values) == fields.count:
-        return values[ids]
-    there = fields.members(ParticleGroup(hub, everything=True))  # `particle` leaves out the others
-    return values[np.searchsorted(there, ids)]
+        return points.particle(name[1]) - points.particle(name[1] + "0")
+    return points.particle(name)
 
 
 class Field:
@@ -110,19 +104,27 @@ class Norm:
         self.history = 0.0
         self.largest = 0.0
 
-    def now(self, difference: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
-        """The norm of sizes of differences, (n,), with positive weights, (n,)."""
-        return self._scaled(*(self._norm(size, weight) for size in (difference, exact)))
+    def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        """What is to be added up of sizes (2, n) of differences and exact values, and weights."""
+        return np.vstack([weight * sizes ** (2 if self.kind == "L2" else 1), weight])
 
-    def follow(
-        self, time: float, difference: np.ndarray, exact: np.ndarray, weight: np.ndarray
-    ) -> float:
+    def moment(self, sums: np.ndarray, largest: list[np.ndarray]) -> np.ndarray:
+        """The norms (2,) of differences and exact values from sums, and the largest of some."""
+        if self.kind == "max":
+            return np.max([np.zeros(2), *largest], axis=0)
+        mean = sums[:2] / sums[2] if sums[2] else np.zeros(2)
+        return mean if self.kind == "L1" else np.sqrt(mean)
+
+    def now(self, moment: np.ndarray) -> float:
+        """The norm of differences as it is asked for, from both norms (2,)."""
+        return self._scaled(*moment)
+
+    def follow(self, time: float, moment: np.ndarray) -> float:
         """As `now`; `history` and `largest` take the moment in, once."""
-        now = self.now(difference, exact, weight)
+        now = self.now(moment)
         if self._time is None or time > self._time:
             # The first state stands for itself until there is a second one.
             span = time - self._time if self._time is not None else 0.0
-            moment = np.array([self._norm(size, weight) for size in (difference, exact)])
             power = {"L1": 1, "L2": 2, "max": inf}[self.kind]
             if power == inf:
                 self._sums = np.maximum(self._sums, moment)
@@ -137,19 +139,30 @@ class Norm:
             self._time = time
         return now
 
-    def _norm(self, size: np.ndarray, weight: np.ndarray) -> float:
-        if not len(size):
-            return 0.0
-        if self.kind == "max":
-            return float(size.max())
-        if self.kind == "L1":
-            return float(weight @ size / weight.sum())
-        return float(np.sqrt(weight @ size**2 / weight.sum()))
-
     def _scaled(self, difference: float, exact: float) -> float:
         if not self.relative or difference == 0:
             return float(difference)
         return float(difference / exact) if exact else inf
+
+
+class Compared:
+    """Mixed into computes that compare points: says `sizes(points)`, and has a `norm`."""
+
+    def measured(self) -> tuple[np.ndarray, np.ndarray]:
+        """Norms (2,) of differences and exact values now, and other sums."""
+        sums = self.hub.fields.added_up(self)
+        largest = self.hub.fields.each(self, "largest") if self.norm.kind == "max" else []
+        return self.norm.moment(sums, largest), sums[3:]
+
+    def terms(self, points: Fields) -> np.ndarray:
+        """What is to be added up of points."""
+        sizes, weight, *rest = self.sizes(points)
+        return np.vstack([self.norm.terms(sizes, weight), *rest])
+
+    def largest(self, points: Fields) -> np.ndarray | None:
+        """The largest difference and exact value of points."""
+        sizes = self.sizes(points)[0]
+        return sizes.max(axis=1) if sizes.size else None
 
 
 def table(path: Path) -> dict[str, np.ndarray]:

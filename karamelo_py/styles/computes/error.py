@@ -4,15 +4,16 @@ from typing import Literal
 
 import numpy as np
 
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.computes.columns import Field, Norm, of_group, refuse_absent
+from karamelo_py.styles.computes.columns import Compared, Field, Norm, column, refuse_absent
 
 
-class Error(Compute):
+class Error(Compared, Compute):
     """Measure the difference between a field of points and an exact solution.
 
     Parameters
@@ -75,17 +76,16 @@ class Error(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        fields = self.hub.fields
-        ids = fields.members(self.group)
-        x, x0 = fields.position[ids], fields.reference_position[ids]
-        difference, size = np.zeros(len(ids)), np.zeros(len(ids))
-        for column, weight, formula in self.parts:
-            exact = formula.evaluate_points(self.hub.values, x, x0)
-            difference += weight * (of_group(self.hub, self.group, column) - exact) ** 2
-            size += weight * exact**2
-        volume = fields.reference_volume[ids]
-        time = self.hub.update.time
-        now = self.norm.follow(time, np.sqrt(difference), np.sqrt(size), volume)
+        now = self.norm.follow(self.hub.update.time, self.measured()[0])
         self.publish("", now)
         self.publish("max", self.norm.largest)
         self.publish("history", self.norm.history)
+
+    def sizes(self, points: Fields) -> tuple[np.ndarray, np.ndarray]:
+        """Sizes (2, n) of the differences and of the exact values at points, and their weights."""
+        x, x0 = points.position, points.reference_position
+        squares = np.zeros((2, points.count))
+        for name, weight, formula in self.parts:
+            exact = formula.evaluate_points(self.hub.values, x, x0)
+            squares += weight * np.stack([column(points, name) - exact, exact]) ** 2
+        return np.sqrt(squares), points.reference_volume

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -35,10 +36,11 @@ class LinearMomentum(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        fields = self.hub.fields
-        ids = fields.members(self.group)
-        mass, velocity = fields.mass[ids], fields.velocity[ids]
-        total = mass @ velocity
-        self.publish_components(total)
-        scale = float(mass @ np.linalg.norm(velocity, axis=1))
-        self.publish("drift", self._drift(total, scale))
+        *total, scale = self.hub.fields.added_up(self)
+        self.publish_components(np.array(total))
+        self.publish("drift", self._drift(np.array(total), scale))
+
+    def terms(self, points: Fields) -> np.ndarray:
+        """Momenta of points, and what they are without their direction."""
+        mass, v = points.mass.astype(float), points.velocity.astype(float)
+        return mass * np.vstack([v.T, np.linalg.norm(v, axis=1)])

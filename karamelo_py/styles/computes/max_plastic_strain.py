@@ -1,7 +1,9 @@
 """compute max_plastic_strain."""
 
+import numpy as np
+
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.modify import Compute
-from karamelo_py.styles.computes.columns import of_group
 
 
 class MaxPlasticStrain(Compute):
@@ -23,6 +25,10 @@ class MaxPlasticStrain(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        for published, field in (("Epmax", "ep"), ("Tmax", "T")):
-            values = of_group(self.hub, self.group, field)
-            self.publish(published, float(values.max(initial=0)))
+        found = np.max(self.hub.fields.each(self, "largest"), axis=0)
+        for published, value in zip(self.published, found, strict=True):
+            self.publish(published, float(value))
+
+    def largest(self, points: Fields) -> list[float]:
+        """The largest strain and temperature of points."""
+        return [points.particle(name).max(initial=0) for name in ("ep", "T")]

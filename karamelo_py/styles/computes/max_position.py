@@ -1,5 +1,8 @@
 """compute max_position."""
 
+import numpy as np
+
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.modify import Compute
 
 
@@ -16,6 +19,10 @@ class MaxPosition(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        position = self.hub.fields.position[self.hub.fields.members(self.group)]
+        found = self.hub.fields.each(self, "largest")
         # Without points, 0, as the sums of other computes.
-        self.publish_components(position.max(axis=0) if len(position) else position.sum(axis=0))
+        self.publish_components(np.max(found, axis=0) if found else np.zeros(3))
+
+    def largest(self, points: Fields) -> np.ndarray | None:
+        """The largest coordinates of points."""
+        return points.position.max(axis=0) if points.count else None

@@ -5,9 +5,13 @@ from typing import Annotated
 import numpy as np
 
 from karamelo_py.language.signature import In
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
+
+BITS = 8  # of a coordinate that are looked at together
+SIGN = np.uint64(1 << 63)
 
 
 class PositionQuantile(Compute):
@@ -43,17 +47,43 @@ class PositionQuantile(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        fields = self.hub.fields
-        ids = fields.members(self.group)
-        mass, position = fields.mass[ids].astype(float), fields.position[ids]
-        if not len(ids):
-            self.publish_components(np.zeros(position.shape[1]))
-            return
-        quantiles = []
-        for column in position.T:
-            order = np.argsort(column, kind="stable")
-            below = np.cumsum(mass[order])
-            # Shares such as 0.1 of ten equal points must not fail by rounding.
-            reached = below >= self.share * below[-1] * (1 - 1e-12)
-            quantiles.append(column[order[np.argmax(reached)]])
-        self.publish_components(np.array(quantiles))
+        d = self.hub.domain.dimension
+        # Of the bits of the coordinates, eight at a time: which come first is known so far.
+        first, below = [0] * d, np.zeros(d)
+        for shift in range(64 - BITS, -1, -BITS):
+            mass = self.hub.fields.added_up(self, "masses", shift, first).reshape(d, -1)
+            if shift == 64 - BITS:
+                # Shares such as 0.1 of ten equal points must not fail by rounding.
+                wanted = self.share * mass.sum(axis=1) * (1 - 1e-12)
+            for axis, of_bits in enumerate(mass):
+                there = np.flatnonzero(of_bits)
+                if not len(there):  # no points
+                    self.publish_components(np.zeros(d))
+                    return
+                up_to = below[axis] + np.cumsum(of_bits[there])
+                own = there[min(np.count_nonzero(up_to < wanted[axis]), len(there) - 1)]
+                below[axis] += of_bits[:own].sum()
+                first[axis] = first[axis] << BITS | int(own)
+        self.publish_components(_numbers(np.array(first, np.uint64)))
+
+    def masses(self, points: Fields, shift: int, first: list[int]) -> tuple:
+        """Masses of points whose coordinates begin with these bits, by the next ones."""
+        found = []
+        for axis, begin in enumerate(first):
+            bits = _bits(points.position[:, axis].astype(float)) >> np.uint64(shift)
+            rows = np.flatnonzero(bits >> np.uint64(BITS) == begin)
+            own = (bits[rows] & np.uint64(2**BITS - 1)).astype(np.int64)
+            found.append((own + axis * 2**BITS, points.mass[rows].astype(float)))
+        rows, terms = (np.concatenate(same) for same in zip(*found, strict=True))
+        return len(first) * 2**BITS, rows, terms
+
+
+def _bits(numbers: np.ndarray) -> np.ndarray:
+    """Whole numbers in the order of floating-point ones."""
+    bits = (numbers + 0.0).view(np.uint64)  # no zero with a sign
+    return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
+
+
+def _numbers(bits: np.ndarray) -> np.ndarray:
+    """The numbers that have these bits."""
+    return np.where(bits >> np.uint64(63) > 0, bits ^ SIGN, ~bits).view(float)

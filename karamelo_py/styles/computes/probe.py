@@ -5,6 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from karamelo_py.language.signature import Positive
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -45,7 +46,7 @@ class Probe(Compute):
         y: float | None = None,
         z: float | None = None,
     ):
-        super().__init__(hub, group)
+        super().__init__(hub, group if point is None else ParticleGroup(hub, everything=True))
         self.columns = (column, *columns)
         known = hub.fields.particle_names()
         for k, name in enumerate(self.columns):
@@ -64,20 +65,32 @@ class Probe(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        fields = self.hub.fields
-        present = fields.particle("id")
-        if self.point is not None:
-            chosen = present == self.point
+        if self.point is None and not self.at_place:
+            volume, *total = self.hub.fields.added_up(self)
+            values = np.array(total) / volume if volume > 0 else np.full(len(total), np.nan)
         else:
-            chosen = np.isin(present, fields.members(self.group) + 1)
-        if self.at_place and chosen.any():
+            found = self.hub.fields.each(self, "nearest")
+            values = min(found)[2:] if found else np.full(len(self.columns), np.nan)
+        for end, value in zip(self.published, values, strict=True):
+            self.publish(end, value)
+
+    def terms(self, points: Fields) -> list[np.ndarray]:
+        """Volumes of points, and these times their columns."""
+        volume = points.particle("volume")
+        return [volume, *(volume * points.particle(name) for name in self.columns)]
+
+    def nearest(self, points: Fields) -> list[float] | None:
+        """Distance, id and columns of the point that is asked for, or of the nearest of these."""
+        ids = points.particle("id")
+        if self.point is not None:
+            distance = np.where(ids == self.point, 0.0, np.inf)
+        else:
             distance = sum(
-                (fields.particle(name) - c) ** 2
+                (points.particle(name) - c) ** 2
                 for name, c in zip("xyz", self.place_xyz, strict=True)
                 if c is not None
             )
-            chosen = np.array([np.flatnonzero(chosen)[distance[chosen].argmin()]])
-        weight = fields.particle("volume")[chosen]
-        for name, end in zip(self.columns, self.published, strict=True):
-            values = fields.particle(name)[chosen]
-            self.publish(end, np.average(values, weights=weight) if len(weight) else np.nan)
+        if not len(ids) or not np.isfinite(least := distance.min()):
+            return None
+        at = min(np.flatnonzero(distance == least), key=ids.__getitem__)
+        return [least, *(float(points.particle(name)[at]) for name in ("id", *self.columns))]

@@ -6,12 +6,13 @@ import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument, TableFile
+from karamelo_py.output.fields import Fields
 from karamelo_py.output.quantity import Quantity
 from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
 from karamelo_py.script.errors import ScriptError, nearest, unknown
-from karamelo_py.styles.computes.columns import Norm, of_group, refuse_absent, table
+from karamelo_py.styles.computes.columns import Compared, Norm, column, refuse_absent, table
 
 
 class GroupOrValue:
@@ -28,7 +29,7 @@ class GroupOrValue:
         return Quantity.from_script(hub, argument)
 
 
-class Reference(Compute):
+class Reference(Compared, Compute):
     """Measure the difference between a value or a field of points and a curve in a file.
 
     Parameters
@@ -112,22 +113,32 @@ class Reference(Compute):
     def refresh(self) -> None:
         """Measure and publish."""
         if self.points:
-            volume = self.hub.fields.reference_volume[self.hub.fields.members(self.group)]
-            at = of_group(self.hub, self.group, self.along)
-            value = of_group(self.hub, self.group, self.column)
-        else:
-            at = np.array([self.hub.update.time])
-            value, volume = np.array([float(self.subject.read())]), np.ones(1)
-        within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
-        exact = np.interp(at[within], *self.curve)
-        difference = value[within] - exact
-        sizes = np.abs(difference), np.abs(exact), volume[within]
-        if self.points:
-            now = self.norm.now(*sizes)
+            moment, (total, count) = self.measured()
+            now = self.norm.now(moment)
             self.publish("", now)
             self.publish("now", now)
-        elif within.all():
-            self.norm.follow(self.hub.update.time, *sizes)
+            self.publish("curve", total / count if count else 0.0)
+            return
+        time = self.hub.update.time
+        within, exact = self._exact(np.array([time]))
+        if within.any():
+            difference = float(self.subject.read()) - exact[0]
+            sizes = np.abs([[difference], exact])
+            self.norm.follow(
+                time, self.norm.moment(self.norm.terms(sizes, np.ones(1))[:, 0], [sizes[:, 0]])
+            )
             self.publish("", self.norm.history)
-            self.publish("now", float(difference[0]))
-        self.publish("curve", float(exact.mean()) if len(exact) else 0.0)
+            self.publish("now", difference)
+        self.publish("curve", exact[0] if within.any() else 0.0)
+
+    def sizes(self, points: Fields) -> tuple[np.ndarray, ...]:
+        """Sizes (2, n) of differences and of the curve at points, weights; the curve, and one."""
+        within, exact = self._exact(column(points, self.along))
+        difference = column(points, self.column)[within] - exact
+        sizes = np.abs([difference, exact])
+        return sizes, points.reference_volume[within], exact, np.ones(len(exact))
+
+    def _exact(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which of these places the curve has, and its values there."""
+        within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
+        return within, np.interp(at[within], *self.curve)

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from karamelo_py.output.vtu import Vtu
+from karamelo_py.scene.lattice import boxes
 from karamelo_py.styles.dumps.table import OfNodes
 from karamelo_py.styles.dumps.vtk import VtkDump
 
@@ -30,20 +32,22 @@ class GridVtk(OfNodes, VtkDump):
     dump grid, dump vtk
     """
 
-    def cells(self, ids: np.ndarray) -> list[tuple[str, np.ndarray]]:
-        """Lines, squares or cubes between the nodes that are written."""
-        row_of = np.full(self.hub.fields.node_count, -1)
-        row_of[ids] = np.arange(len(ids))
-        cells = []
+    def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
+        """Keep the numbers of nodes that are written, where others are not."""
+        if self.occupied:
+            kept.append(ids)
+
+    def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
+        """Add lines, squares or cubes between the nodes that are written."""
+        there = np.concatenate(kept) if kept else np.empty(0, np.int64)
+        d = self.hub.domain.dimension
         for lattice in self.hub.lattices:
-            d = lattice.dimension
-            number = lattice.first + np.arange(lattice.node_count).reshape(lattice.shape)
-            corners = [
-                number[
-                    tuple(slice(c, n - 1 + c if k < d else n) for k, (c, n) in enumerate(axes))
-                ].ravel()
-                for axes in (zip(corner, lattice.shape, strict=True) for corner in CORNERS[: 2**d])
-            ]
-            rows = row_of[np.column_stack(corners)]
-            cells.append(rows[(rows >= 0).all(axis=1)])
-        return [(KINDS[self.hub.domain.dimension], np.concatenate(cells))]
+            last = [count - 2 for count in lattice.shape[:d]]
+            steps = np.append(np.cumprod(lattice.shape[:0:-1])[::-1], 1)[:d]
+            corners = np.array(CORNERS[: 2**d])[:, :d] @ steps
+            for index in boxes([0] * d, last, 2**d):
+                nodes = (lattice.first + index @ steps)[:, None] + corners
+                if self.occupied:
+                    rows = np.searchsorted(there[:-1], nodes)
+                    nodes = rows[(there[rows] == nodes).all(axis=1)] if len(there) else nodes[:0]
+                vtu.add_cells(KINDS[d], nodes)

@@ -80,10 +80,7 @@ class TableDump(Dump):
 
     def table(self) -> Table:
         """All rows."""
-        parts = list(self.tables())
-        if len(parts) == 1:
-            return parts[0]
-        ids, types, columns = zip(*parts, strict=True)
+        ids, types, columns = zip(*self.tables(), strict=True)
         joined = (np.concatenate(same) for same in zip(*columns, strict=True))
         return Table(np.concatenate(ids), np.concatenate(types), list(joined))
 
@@ -161,15 +158,16 @@ class OfNodes:
 
     def extent(self) -> tuple[int, int]:
         """Number of the nodes that are written, and the last of them."""
-        rows = np.arange(self.hub.fields.node_count)[self._rows()]
-        return len(rows), int(rows.max(initial=-1))
+        fields = self.hub.fields
+        return (
+            fields.occupied_nodes if self.occupied else (fields.node_count, fields.node_count - 1)
+        )
 
     def tables(self) -> Iterator[Table]:
-        """Number and grid of each node, and its columns, of all nodes at once."""
-        node, rows = self.hub.fields.node, self._rows()
-        ids = np.arange(self.hub.fields.node_count)[rows]
-        yield Table(ids, node("type")[rows], [node(name)[rows] for name in self.columns])
-
-    def _rows(self) -> np.ndarray | slice:
-        """Which nodes are written."""
-        return np.flatnonzero(self.hub.fields.node("mass") > 0) if self.occupied else slice(None)
+        """Number and grid of each node, and its columns."""
+        for nodes in self.hub.fields.node_pieces(self.columns):
+            rows = np.flatnonzero(nodes.node("mass") > 0) if self.occupied else slice(None)
+            yield Table(
+                *(nodes.node(name)[rows] for name in ("id", "type")),
+                [nodes.node(name)[rows] for name in self.columns],
+            )

@@ -1,7 +1,6 @@
 """dump vtk: the material points as a series of files for ParaView."""
 
 from pathlib import Path
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from karamelo_py.language.signature import OutputFile
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import Every
+from karamelo_py.output.vtu import Vtu
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.table import POSITIONS, OfPoints, TableDump
@@ -55,24 +55,28 @@ class VtkDump(TableDump):
         stem = str(self.file)[: -len(".vtu")].replace("*", "", 1).rstrip("._-")
         return self.hub.folder / f"{stem}.pvd"
 
-    def cells(self, ids: np.ndarray) -> list[tuple[str, np.ndarray]]:
-        """Kind and rows of what is drawn between the rows."""
-        return [("vertex", np.arange(len(ids))[:, None])]
-
     def write(self) -> None:
         """Write one snapshot, then the list of all."""
-        import meshio
-
-        ids, types, found = self.table()
-        columns: dict[str, Any] = dict(zip(self.columns, found, strict=True))
-        x = np.column_stack([columns.pop(name) for name in POSITIONS])
-        mesh = meshio.Mesh(x, self.cells(ids), {"id": ids, "type": types, **columns})
         path = self.path()
         with whole(path) as file:
-            mesh.write(file.name, file_format="vtu")
+            names = [name for name in self.columns if name not in POSITIONS]
+            vtu, kept = Vtu(["id", "type", *names], path.parent), []
+            for table in self.tables():
+                columns = dict(zip(self.columns, table.columns, strict=True))
+                x = np.column_stack([columns.pop(name) for name in POSITIONS])
+                vtu.add_points(x, [table.ids, table.types, *columns.values()])
+                self.connect(vtu, table.ids, kept)
+            self.complete(vtu, kept)
+            vtu.write(file)
         self._series.append((self.hub.update.time, path.name))
         with whole(self.index) as file:
             file.write(_collection(self._series))
+
+    def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
+        """Add what is drawn of the last points, or keep what is needed for it."""
+
+    def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
+        """Add what is drawn between all points."""
 
 
 def _collection(series: list[tuple[float, str]]) -> bytes:
@@ -95,3 +99,8 @@ class Vtk(OfPoints, VtkDump):
     --------
     dump particle, dump grid/vtk
     """
+
+    def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
+        """See `VtkDump.connect`."""
+        last = vtu.counts[0]
+        vtu.add_cells("vertex", np.arange(last - len(ids), last)[:, None])

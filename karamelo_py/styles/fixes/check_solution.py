@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -39,26 +40,25 @@ class CheckSolution(Fix):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        fields = self.hub.fields
-        ids = fields.members(self.group)
-        x, x0 = fields.position[ids], fields.reference_position[ids]
-        volume = fields.reference_volume[ids]
-        error = np.zeros(len(ids))
-        size = np.zeros(len(ids))
-        for k, formula in enumerate(self.formulas):
-            if formula is not None:
-                exact = evaluated(formula, self.hub, x, x0)
-                error += (x[:, k] - x0[:, k] - exact) ** 2
-                size += exact**2
-        if not len(ids):
+        now, size, volume = self.hub.fields.added_up(self)
+        if not volume:
             return
-        now = float(volume @ error)
-        self.publish("s", np.sqrt(now / volume.sum()))
+        self.publish("s", np.sqrt(now / volume))
         if self._step == self.hub.update.step:
             return
         self._step = self.hub.update.step
         values, dt = self.hub.values, self.hub.update.dt
         self.publish("x", values.get(f"{self.id}_x") + dt * now)
-        self.publish("y", values.get(f"{self.id}_y") + dt * float(volume @ size))
+        self.publish("y", values.get(f"{self.id}_y") + dt * size)
         total = values.get(f"{self.id}_y")
         self.publish("z", np.sqrt(values.get(f"{self.id}_x") / total) if total > 0 else 0.0)
+
+    def terms(self, points: Fields) -> np.ndarray:
+        """Squares of the error and of the displacement at points times their volume, and this."""
+        x, x0 = points.position, points.reference_position
+        squares = np.zeros((2, points.count))
+        for k, formula in enumerate(self.formulas):
+            if formula is not None:
+                exact = evaluated(formula, self.hub, x, x0)
+                squares += np.stack([x[:, k] - x0[:, k] - exact, exact]) ** 2
+        return points.reference_volume * np.vstack([squares, np.ones(points.count)])

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from karamelo_py.output.fields import Fields
 from karamelo_py.scene.group import Group
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, node_hook, point_hook
@@ -69,6 +70,8 @@ class PointForce(Fix):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        fields = self.hub.fields
-        chosen = np.isin(fields.particle("id") - 1, fields.members(self.group))
-        self.publish_components([fields.particle("b" + axis)[chosen].sum() for axis in "xyz"])
+        self.publish_components(self.hub.fields.added_up(self))
+
+    def terms(self, points: Fields) -> list[np.ndarray]:
+        """Components of the forces on points."""
+        return [points.particle("b" + axis) for axis in "xyz"]

@@ -1,0 +1,113 @@
+"""Unstructured grids in the XML format of VTK, written so many rows at a time.
+
+An array stands in the file behind the one before it, while rows come with all columns: until the
+last is there, compressed blocks wait in files without a name beside it (VTK File Formats, 2015).
+"""
+
+import sys
+import tempfile
+import zlib
+from base64 import b64encode
+from collections.abc import Iterable
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+KINDS = {"vertex": 1, "line": 3, "quad": 9, "hexahedron": 12}
+TYPES = {np.dtype(np.float64): "Float64", np.dtype(np.int64): "Int64"}
+BLOCK = 1 << 15  # bytes that are compressed together
+COMPRESSION = 4  # a third of the time of level 6 for few more bytes
+IN_MEMORY = 1 << 16  # bytes of an array that wait there
+PIECE = 3 << 16  # bytes that are encoded together: without an end between them
+
+
+class Column:
+    """The rows of one array, as they come."""
+
+    def __init__(self, name: str, folder: Path):
+        self.name = name
+        self._kind = ""
+        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY, dir=folder)  # noqa: SIM115
+        self._sizes: list[int] = []
+        self._rest = b""
+        self._last = 0
+
+    def add(self, rows: np.ndarray) -> None:
+        """Add rows (n,) or (n, components)."""
+        components = f' NumberOfComponents="{rows.shape[1]}"' if rows.ndim == 2 else ""
+        self._kind = f'type="{TYPES[rows.dtype]}" Name="{self.name}"{components}'
+        self._rest += rows.tobytes()
+        whole = len(self._rest) // BLOCK * BLOCK
+        for begin in range(0, whole, BLOCK):
+            self._pack(self._rest[begin : begin + BLOCK])
+        self._rest = self._rest[whole:]
+
+    def _pack(self, block: bytes) -> None:
+        packed = zlib.compress(block, COMPRESSION)
+        self._sizes.append(len(packed))
+        self._last = len(block)
+        self._file.write(packed)
+
+    def write(self, out: BinaryIO) -> None:
+        """Write the array, which is forgotten then."""
+        if self._rest:
+            self._pack(self._rest)
+        head = [len(self._sizes), BLOCK, self._last % BLOCK, *self._sizes]
+        out.write(f'<DataArray {self._kind} format="binary">'.encode())
+        out.write(b64encode(np.array(head, np.uint32).tobytes()))
+        self._file.seek(0)
+        while piece := self._file.read(PIECE):
+            out.write(b64encode(piece))
+        out.write(b"</DataArray>")
+        self._file.close()
+
+
+class Vtu:
+    """A file of points with columns, and of cells between them.
+
+    Parameters
+    ----------
+    names
+        Of the columns.
+    folder
+        Where there is room for as much as the file takes.
+    """
+
+    def __init__(self, names: Iterable[str], folder: Path):
+        self.points = Column("Points", folder)
+        self.columns = [Column(name, folder) for name in names]
+        self.cells = [Column(name, folder) for name in ("connectivity", "offsets", "types")]
+        self.counts = [0, 0]
+
+    def add_points(self, x: np.ndarray, columns: Iterable[np.ndarray]) -> None:
+        """Add points at `x` (n, 3), with a row (n,) of each column."""
+        self.points.add(np.ascontiguousarray(x, float))
+        for column, rows in zip(self.columns, columns, strict=True):
+            column.add(rows)
+        self.counts[0] += len(x)
+
+    def add_cells(self, kind: str, corners: np.ndarray) -> None:
+        """Add cells of a kind between points (n, corners)."""
+        count, each = corners.shape
+        ends = each * np.arange(self.counts[1] + 1, self.counts[1] + count + 1, dtype=np.int64)
+        arrays = corners.ravel(), ends, np.full(count, KINDS[kind], np.int64)
+        for column, rows in zip(self.cells, arrays, strict=True):
+            column.add(rows)
+        self.counts[1] += count
+
+    def write(self, out: BinaryIO) -> None:
+        """Write the whole file."""
+        points, cells = self.counts
+        out.write(
+            f'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="0.1" '
+            f'byte_order="{sys.byteorder.capitalize()}Endian" compressor="vtkZLibDataCompressor">'
+            f'<UnstructuredGrid><Piece NumberOfPoints="{points}" NumberOfCells="{cells}">'.encode()
+        )
+        groups = {"Points": [self.points], "Cells": self.cells, "PointData": self.columns}
+        for name, arrays in groups.items():
+            out.write(f"<{name}>".encode())
+            for array in arrays:
+                array.write(out)
+            out.write(f"</{name}>".encode())
+        out.write(b"</Piece></UnstructuredGrid></VTKFile>\n")
