@@ -203,7 +203,7 @@ def test_tiles_are_cut_by_work(monkeypatch, costs, tiles_of_first):
         SimpleNamespace(rank=0, size=2), method.lattices(hub), method.basis, 128, False,
         one_place=False,
     )  # fmt: skip
-    two.share_out(work_of(two.points_in(blocks), np.array(costs)))
+    two.share_out(work_of(two.loads(blocks), np.array(costs)))
     assert np.count_nonzero(two.owner[:8] == 0) == tiles_of_first
 
 
@@ -253,7 +253,7 @@ def test_a_load_by_a_reaction(state_interpreted, tmp_path):
 
 
 def test_costs_are_measured(monkeypatch):
-    """Ten steps of 3 points at 100 ns, 10 at 50 ns and 4 tiles at 10 ns, and a pause."""
+    """Ten steps of 3 points at 100 ns, 10 at 50 ns and 4 nodes at 10 ns, and a pause."""
     now = 0
     monkeypatch.setattr("time.perf_counter_ns", lambda: now)
     work = Work(2)

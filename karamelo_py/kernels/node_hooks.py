@@ -38,6 +38,7 @@ from karamelo_py.points.kinematics import dimension
 _call_node_function = caller_of(NODE_FUNCTION)
 
 COUNT, ACT, RUB = 0, 1, 2  # what is done with the members of a hook
+END = np.iinfo(np.int64).max  # behind the last of them
 
 
 @subkernel
@@ -171,22 +172,33 @@ def _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count):
 
 
 @subkernel
+def _node(hooks, h, m):
+    """The number of a member of the group; where that is of all nodes, `m` itself."""
+    if hooks.table[h].begin < 0:
+        return m
+    return hooks.members[m] if m < hooks.table[h].end else END
+
+
+@subkernel
 def _choose_nodes(nodes, spans, hooks, h, span, member):
-    """The next members with mass, up to a block: how many, and where to go on."""
-    begin = hooks.table[h].begin
-    ranges = spans[0, 0] if begin < 0 else 1
+    """The next members in use with mass, up to a block: how many, and where to go on."""
+    of_all = hooks.table[h].begin < 0
+    member = max(member, hooks.table[h].begin)
     count = 0
-    while span < ranges:
-        low = spans[1 + span, 0] if begin < 0 else begin
-        high = spans[1 + span, 1] if begin < 0 else hooks.table[h].end
-        for m in range(max(low, member), high):
-            n = m if begin < 0 else hooks.members[m]
-            if nodes.sums[n, MASS] > 0:
+    # Members ascend as spans do: a wall may have many more nodes than a body reaches.
+    while span < spans[0, 0]:
+        low, high = spans[1 + span, 0], spans[1 + span, 1]
+        member = max(member, low) if of_all else member
+        n = _node(hooks, h, member)
+        while n < high:
+            member += 1
+            if n >= low and nodes.sums[n, MASS] > 0:
                 hooks.chosen[count] = n
                 count += 1
                 if count == BLOCK:
-                    return count, span, m + 1
-        span, member = span + 1, NONE
+                    return count, span, member
+            n = _node(hooks, h, member)
+        span += 1
     return count, span, member
 
 

@@ -99,7 +99,7 @@ class _Builder:
         if fix.group.all:
             return -1, -1
         if hook.on_nodes:
-            members = fix.nodes
+            members = np.unique(fix.nodes)
         else:
             members = np.zeros(self.points, np.int64)
             members[fix.group.ids] = 1

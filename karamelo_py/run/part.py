@@ -9,7 +9,7 @@ from karamelo_py.run.answers import Answers
 from karamelo_py.run.by_id import Ordered
 from karamelo_py.run.crew import Crew
 from karamelo_py.run.handing import by_tile, join_tilings, share_of, stripped
-from karamelo_py.run.shares import SharedTiles, occupied, work_of
+from karamelo_py.run.shares import SharedTiles, nodes_of, occupied, work_of
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.state import (
     changing,
@@ -34,7 +34,7 @@ class Part:
     setup, tiles, hub
         As of a simulation; of the points there are those in own tiles.
     work
-        What points and tiles cost here.
+        What points and nodes cost here.
     answers
         What kernels ask for.
     """
@@ -172,13 +172,13 @@ class Part:
         """Take note of the steps so far; what comes before the next is not counted."""
         blocks = self.setup.blocks
         counts = [block.points.mass.size for block in blocks]
-        counts.append(sum(int(block.tiling.count[0]) for block in blocks))
+        counts.append(sum(int(nodes_of(block.tiling).sum()) for block in blocks))
         self.work.done(counts, self.step - self._counted_at)
         self._counted_at = self.step
         self.work.pause()
 
     def learn(self) -> np.ndarray:
-        """What points and tiles cost."""
+        """What points and nodes cost."""
         self._learned_at = self.step
         self.work.learn(self.crew)
         return self.work.costs
@@ -187,7 +187,7 @@ class Part:
         """Hand over tiles as they are where that is due: points may never be sorted again."""
         s, tiles = self.setup, self.tiles
         due = abs(self.step - self._learned_at) >= LEARN_EVERY and not tiles.direct
-        if not due or not tiles.balance(work_of(tiles.points_in(s.blocks), self.learn())):
+        if not due or not tiles.balance(work_of(tiles.loads(s.blocks), self.learn())):
             return
         self.tell_what_touched()
         own = [tiles.owner[occupied(block.tiling)[0]] for block in s.blocks]

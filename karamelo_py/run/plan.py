@@ -107,7 +107,7 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
         )
 
     of_all = [tiles_of(_Pretended(rank, ranks)) for rank in range(ranks)]
-    of_all[0].share_out(of_all[0].points_in(s.blocks).sum(axis=0))
+    of_all[0].share_out(of_all[0].loads(s.blocks)[:-1].sum(axis=0))
     parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
     boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
     for tiles in of_all:

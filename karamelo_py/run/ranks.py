@@ -154,7 +154,7 @@ class Ranks(Leading):
     def _cut(self) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
         """Share the tiles of the whole out: where they are cut; nodes, and what these remember."""
         tiles = self.part.tiles
-        tiles.share_out(work_of(tiles.points_in(self._whole.blocks), self.part.work.costs))
+        tiles.share_out(work_of(tiles.loads(self._whole.blocks), self.part.work.costs))
         nodes = numbers(self._whole.spans)
         return tiles.cuts, nodes, [one[nodes] for one in self.part.memory()]
 

@@ -6,7 +6,7 @@ by each of them, from the same boxes in the same order.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -120,12 +120,13 @@ class SharedTiles(Tiles):
             self.cut(before)
         return self.cuts is not before
 
-    def points_in(self, blocks: Iterable[Block]) -> np.ndarray:
-        """(blocks, tiles) number of the points, of blocks that are sorted."""
-        found = np.zeros((len(blocks), self.count), np.int64)
-        for row, block in zip(found, blocks, strict=True):
+    def loads(self, blocks: Sequence[Block]) -> np.ndarray:
+        """(blocks + 1, tiles) points of each sorted block, and nodes that all may reach."""
+        found = np.zeros((len(blocks) + 1, self.count), np.int64)
+        for row, block in zip(found, blocks, strict=False):
             tiles, points = occupied(block.tiling)
             row[tiles] = points
+            found[-1, tiles] += nodes_of(block.tiling)
         return found
 
     def partners(self, going: np.ndarray) -> list[int]:
@@ -136,8 +137,10 @@ class SharedTiles(Tiles):
     def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
         """Hand over the points that have gone to the tiles of others."""
         tiles = [self._by_tile(s, block)[1] for block in s.blocks]
-        here = np.array([np.bincount(of, minlength=self.count) for of in tiles])
-        self.balance(work_of(here, costs))
+        # Of nodes it is known what tiles reached from where their points were.
+        loads = self.loads(s.blocks)
+        loads[:-1] = [np.bincount(of, minlength=self.count) for of in tiles]
+        self.balance(work_of(loads, costs))
         own, me = [self.owner[of] for of in tiles], self.crew.rank
         others = self.partners(sum(np.bincount(to, minlength=self.crew.size) for to in own))
 
@@ -322,10 +325,15 @@ class SharedTiles(Tiles):
         return packed, self.crew.linked(given, taken)
 
 
-def work_of(points: np.ndarray, costs: np.ndarray) -> np.ndarray:
-    """(tiles,) cost of points (blocks, tiles), and of their tiles, in whole numbers."""
-    cost = points * costs[:-1, None] + (points > 0) * costs[-1]
-    return np.rint(FINE * cost.sum(axis=0)).astype(np.int64)
+def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:
+    """(tiles,) cost of points and nodes in whole numbers, from so many (k, tiles) of each kind."""
+    return np.rint(FINE * (costs @ loads)).astype(np.int64)
+
+
+def nodes_of(tiling: Tiling) -> np.ndarray:
+    """How many nodes the points of each occupied tile may reach."""
+    lo, hi = np.split(tiling.box[: tiling.count[0]], 2, axis=1)
+    return np.prod(hi - lo + 1, axis=1)
 
 
 def occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""What points and tiles cost a process, measured while it takes steps."""
+"""What points and nodes cost a process, measured while it takes steps."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class Work:
     Attributes
     ----------
     costs
-        (blocks + 1,) of a point of each block in a step, and of a tile; at first all points cost
-        the same, and tiles nothing.
+        (blocks + 1,) of a point of each block in a step, and of a node that the points of a tile
+        may reach; at first all points cost the same, and nodes nothing.
     """
 
     def __init__(self, blocks: int):
@@ -44,7 +44,7 @@ class Work:
         self.resume((self._at + 1) % self._rest)
 
     def done(self, counts: list[int], steps: int) -> None:
-        """Take note of so many steps with these numbers of points, and of tiles."""
+        """Take note of so many steps with these numbers of points, and of nodes."""
         self._spent[1] += np.array(counts) * steps
 
     def learn(self, crew: Crew) -> None:
