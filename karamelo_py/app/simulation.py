@@ -6,25 +6,29 @@ import gc
 import io
 import itertools
 import os
-import re
-import sys
-import warnings
-from argparse import ArgumentTypeError
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
 
-from karamelo_py.app.options import make_folder, threads_option
+from karamelo_py.app.options import make_folder
 from karamelo_py.app.shown import Picture, Table
+from karamelo_py.app.told import (
+    Quiet,
+    SimulationError,
+    refuse_copies,
+    said,
+    threads_of,
+    told,
+)
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.language.meanings import shown
 from karamelo_py.output.console import Console
-from karamelo_py.run.crew import launched
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Pause, Quit, ScriptError, nearest
@@ -33,33 +37,6 @@ from karamelo_py.script.parser import parse, parse_text
 
 SCRIPT = "the name of a script, or its text: statements, as in name = 1"
 _folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
-
-
-class SimulationError(ScriptError):
-    """What a script or a command is told that is wrong: the whole message, with its place.
-
-    Attributes
-    ----------
-    message, place, expected, hint
-        The parts of the message; `place` has file, line, column and the line itself.
-    """
-
-    def __str__(self) -> str:
-        return self.render()
-
-
-class KarameloWarning(UserWarning):
-    """What the command line would say as a warning."""
-
-
-class _Quiet(Console):
-    """Shows nothing; warnings are those of Python."""
-
-    def __init__(self) -> None:
-        super().__init__(quiet=True)
-
-    def warn(self, text: str) -> None:
-        warnings.warn(text, KarameloWarning, stacklevel=2)
 
 
 class Simulation:
@@ -120,24 +97,22 @@ class Simulation:
         **variables: Any,
     ):
         if not alone:
-            _refuse_copies()
-        self.hub = hub = Hub(Console() if verbose else _Quiet())
+            refuse_copies()
+        self.hub = hub = Hub(Console() if verbose else Quiet())
         hub.settings.trusts = trust_geometries
         hub.pausing = True
         hub.output.log.rows = []
         hub.output.writes = out is not None
         self._numbers = itertools.count(1)
         self._name = "a scene"
-        try:
-            hub.settings.threads = _threads(threads)
+        with told():
+            hub.settings.threads = threads_of(threads)
             if out is not None:
                 hub.folder = self._claimed(out)
-            presets = {name: _said(value) for name, value in variables.items()}
+            presets = {name: said(value) for name, value in variables.items()}
             self._interpreter = Interpreter(hub, presets)
             if script is not None:
                 self._read(script)
-        except ScriptError as error:
-            _tell(error)
 
     def _claimed(self, out: str | PathLike) -> Path:
         if not isinstance(out, (str, PathLike)):
@@ -176,42 +151,44 @@ class Simulation:
 
     # -- commands ---------------------------------------------------------------------------------
 
-    def command(self, text: str) -> float | None:
-        """Carry out a line of script (or several); the value of a line that is an expression.
+    def command(self, text: str) -> None:
+        """Carry out a line of script, or several.
 
         Raises
         ------
         SimulationError
             As on the command line.
         """
-        return self._do(text, "command")
+        self._do(text, "command")
 
-    def _do(self, text: str, name: str) -> Any:
-        hub, interpreter = self.hub, self._interpreter
-        pausing, hub.pausing = hub.pausing, False
-        try:
+    def _do(self, text: str, name: str) -> None:
+        with self._carried_out():
             for statement in parse(text, name):
-                interpreter.execute(statement)
-        except ScriptError as error:
-            _tell(error)
+                self._interpreter.execute(statement)
+
+    @contextmanager
+    def _carried_out(self) -> Iterator[None]:
+        """Runs are made at once, and end as the user wants."""
+        pausing, self.hub.pausing = self.hub.pausing, False
+        try:
+            with told():
+                yield
         except Quit:
             pass
         except Interrupted:
             raise KeyboardInterrupt from None
         finally:
-            hub.pausing = pausing
+            self.hub.pausing = pausing
 
     def evaluate(self, expression: str) -> float | str:
         """The present value of an expression of the language."""
-        try:
+        with told():
             raw, node = parse_text(expression, "evaluate")
             found = self._interpreter.evaluate(node, raw)
             if isinstance(found, Expression):
                 self.hub.refresh_values()
                 return found.evaluate(self.hub.values)
             return found
-        except ScriptError as error:
-            _tell(error)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         if name.startswith("_") or not registry.knows("command", name):
@@ -219,10 +196,10 @@ class Simulation:
             hint = f"; did you mean '{close}'?" if close else ""
             raise AttributeError(f"there is no command '{name}'{hint}")
 
-        def call(*arguments: Any, **named: Any) -> Any:
+        def call(*arguments: Any, **named: Any) -> None:
             words = [self._word(argument) for argument in arguments]
             words += [f"{key}={self._word(value)}" for key, value in named.items()]
-            return self._do(f"{name}({', '.join(words)})", f"Simulation.{name}")
+            self._do(f"{name}({', '.join(words)})", f"Simulation.{name}")
 
         call.__name__ = name
         call.__doc__ = registry.find("command", name).__doc__
@@ -237,28 +214,21 @@ class Simulation:
             name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
             self.hub.functions[name] = value
             return name
-        return _said(value)
+        return said(value)
 
     # -- time -------------------------------------------------------------------------------------
 
     def run(self, steps: int | None = None) -> None:
         """Take a number of steps; without one, carry out the rest of the script, with its runs."""
         if steps is not None:
-            self._do(f"run({_said(steps)})", "Simulation.run")
+            self._do(f"run({said(steps)})", "Simulation.run")
             return
         if not self._interpreter.waits:
             raise SimulationError(
                 "there is no rest of a script to carry out", hint="run(100), run_time(0.5) ..."
             )
-        self.hub.pausing = False
-        try:
+        with self._carried_out():
             self._interpreter.go_on()
-        except ScriptError as error:
-            _tell(error)
-        except Interrupted:
-            raise KeyboardInterrupt from None
-        finally:
-            self.hub.pausing = True
 
     @property
     def time(self) -> float:
@@ -281,13 +251,13 @@ class Simulation:
     def points(self) -> Table:
         """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) in the order of ids."""
         fields = self.hub.fields
-        return Table(fields.particle_names, _telling(fields.particle))
+        return Table(fields.particle_names, told()(fields.particle))
 
     @property
     def nodes(self) -> Table:
         """Columns of the nodes by name (x, vx, mass ...): arrays (n,)."""
         fields = self.hub.fields
-        return Table(fields.node_names, _telling(fields.node))
+        return Table(fields.node_names, told()(fields.node))
 
     @property
     def log(self) -> Table:
@@ -309,7 +279,7 @@ class Simulation:
                 self.hub.refresh_values()
             return self.hub.values.get(name)
 
-        return Table(self.hub.values.names, _telling(read))
+        return Table(self.hub.values.names, told()(read))
 
     @property
     def variables(self) -> dict[str, Any]:
@@ -331,7 +301,7 @@ class Simulation:
         """
         from karamelo_py.styles.dumps.pyplot import PyPlot
 
-        try:
+        with told():
             given = [] if field is None else [field]
             words = ["1", "shown.png", *(self._word(v) for v in (width, height, *given))]
             words += [f"{key}={self._word(value)}" for key, value in look.items()]
@@ -340,8 +310,6 @@ class Simulation:
             dump = signature.call(PyPlot, self.hub, arguments, "dump pyplot")
             file = io.BytesIO()
             dump.draw(file)
-        except ScriptError as error:
-            _tell(error)
         return Picture(file.getvalue())
 
     def close(self) -> None:
@@ -358,66 +326,3 @@ class Simulation:
     def __repr__(self) -> str:
         count = sum(solid.count for solid in self.hub.solids.values())
         return f"<{self._name}: {count} points, step {self.step}, time {self.time:.6g}>"
-
-
-def _refuse_copies() -> None:
-    """Of several processes that were started, the first tells that none shares a scene here."""
-    size, rank = launched()
-    if size == 1:
-        return
-    if rank > 0:
-        sys.exit()
-    raise SimulationError(
-        f"{size} processes were started, and a scene in Python is of one: they would do the same",
-        expected=f"mpiexec -n {size} karamelo-py SCRIPT, by which they share a scene",
-        hint="Simulation(..., alone=True) where each is to have a scene of its own",
-    )
-
-
-def _threads(given: Any) -> int | None:
-    """The number of threads, as `--threads` takes it; None for auto."""
-    try:
-        return None if given is None else threads_option(str(given))
-    except ArgumentTypeError:
-        raise ScriptError(
-            f"threads={given!r} is not a number of threads",
-            expected="1, 2, ..., or None: all cores where the scene is large enough",
-        ) from None
-
-
-def _said(value: Any) -> str:
-    """What a script says for a value in Python."""
-    if value is None:
-        return "NULL"
-    if isinstance(value, (bool, np.bool_)):
-        return str(bool(value)).lower()
-    if isinstance(value, PathLike):
-        return f'"{value}"'
-    if isinstance(value, (int, np.integer)):
-        return str(int(value))
-    if isinstance(value, (float, np.floating)):
-        return repr(float(value))
-    if isinstance(value, str):
-        words = value.split()
-        texts = len(words) > 1 and all(re.fullmatch(r"[\w.:'-]+", word) for word in words)
-        # Words with nothing but blanks between them are no formula.
-        return f'"{value}"' if texts and not {"and", "or", "not"} & set(words) else value
-    raise TypeError(f"{value!r} is no number, text, True, False, None or function")
-
-
-def _tell(error: ScriptError) -> NoReturn:
-    """Raise the error as one whose text is the whole message."""
-    told = SimulationError.__new__(SimulationError)
-    told.__dict__.update(vars(error))
-    told.args = error.args
-    raise told from error.__cause__
-
-
-def _telling(function: Callable[[str], Any]) -> Callable[[str], Any]:
-    def call(name: str) -> Any:
-        try:
-            return function(name)
-        except ScriptError as error:
-            _tell(error)
-
-    return call

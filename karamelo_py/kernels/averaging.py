@@ -56,13 +56,9 @@ class FBar(NamedTuple):
     node_fields = (NodalMean, NodalStress)
 
 
-@point_function()
+@point_function(otherwise=True)
 def no_ratio(averaging, like):
     """What the gather of the averaged ratio of volumes starts from; empty where there is none."""
-
-
-@no_ratio.on(PointByPoint)
-def _(averaging, like):
     return ()
 
 
@@ -71,13 +67,9 @@ def _(averaging, like):
     return (real(0, like),)
 
 
-@point_function()
+@point_function(otherwise=True)
 def gathered_ratio(averaging, w, stencil, k, total):
     """`total` with the ratio of volumes at the k-th node."""
-
-
-@gathered_ratio.on(PointByPoint)
-def _(averaging, w, stencil, k, total):
     return total
 
 
@@ -87,13 +79,9 @@ def _(averaging, w, stencil, k, total):
     return (fma(weight, field(w.nodes.fields, NodalMean)[i, 0], total[0]),)
 
 
-@point_function()
+@point_function(otherwise=True)
 def averaged(averaging, w, p, dl, ratio):
     """`dl` with the change of volume that the surroundings have on average."""
-
-
-@averaged.on(PointByPoint)
-def _(averaging, w, p, dl, ratio):
     return dl
 
 
@@ -110,13 +98,9 @@ def _(averaging, w, p, dl, ratio):
     return scaled_increment(w.frame, w.kin, dl, f, ratio[0] / own)
 
 
-@point_function()
+@point_function(otherwise=True)
 def kept_out(averaging, w, gradient):
     """The gradient to gather, or nothing where the transfer has it from v* already."""
-
-
-@kept_out.on(PointByPoint)
-def _(averaging, w, gradient):
     return straining(w.transfer, w.kin, gradient)
 
 
@@ -125,13 +109,9 @@ def _(averaging, w, gradient):
     return gradient
 
 
-@point_function()
+@point_function(otherwise=True)
 def known_gradient(averaging, w, moment, gradient):
     """The velocity gradient, gathered or kept by the transfer."""
-
-
-@known_gradient.on(PointByPoint)
-def _(averaging, w, moment, gradient):
     return kept_gradient(w.transfer, w.kin, moment, gradient)
 
 

@@ -27,7 +27,6 @@ from karamelo_py.kernels.arrays import (
     POST_UPDATE_GRID_HEAT,
     SUPPLY_HEAT,
     Hooks,
-    NoHooks,
     with_nodes,
 )
 from karamelo_py.kernels.clock import step_size
@@ -53,14 +52,9 @@ from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.points.kinematics import Line
 
 
-@point_function()
+@point_function(otherwise=True)
 def at_heat_nodes(hooks, stage, target, s):
     """Let the fixes act on the nodes of heat."""
-
-
-@at_heat_nodes.on(NoHooks)
-def _(hooks, stage, target, s):
-    return None
 
 
 @at_heat_nodes.on(Hooks)
@@ -94,14 +88,9 @@ def _supply(block, s, hooks):
 _supply_blocks = over_blocks(_supply)
 
 
-@point_function()
+@point_function(otherwise=True)
 def at_heated_points(hooks, s):
     """Let the fixes supply heat to points, or set their temperature."""
-
-
-@at_heated_points.on(NoHooks)
-def _(hooks, s):
-    return None
 
 
 @at_heated_points.on(Hooks)

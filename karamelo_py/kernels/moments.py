@@ -9,7 +9,6 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.kernels.arrays import (
     Hooks,
-    NoHooks,
 )
 from karamelo_py.kernels.clock import kick, step_size
 from karamelo_py.kernels.node_hooks import node_hooks
@@ -18,14 +17,9 @@ from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows
 
 
-@point_function()
+@point_function(otherwise=True)
 def at_nodes(hooks, stage, target, s):
     """Let the fixes act on the nodes."""
-
-
-@at_nodes.on(NoHooks)
-def _(hooks, stage, target, s):
-    return None
 
 
 @at_nodes.on(Hooks)
@@ -52,14 +46,9 @@ def _point_hooks(block, s, hooks, stage, now, then):
 hook_points = over_blocks(_point_hooks)
 
 
-@point_function()
+@point_function(otherwise=True)
 def at_points(hooks, stage, then, s):
     """Let the fixes act on the points; `then` is 1 when their new positions are known, else 0."""
-
-
-@at_points.on(NoHooks)
-def _(hooks, stage, then, s):
-    return None
 
 
 @at_points.on(Hooks)

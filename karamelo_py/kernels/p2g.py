@@ -25,7 +25,6 @@ from karamelo_py.kernels.averaging import (
     FBar,
     NodalMean,
     NodalStress,
-    PointByPoint,
     VolumeRatio,
 )
 from karamelo_py.kernels.g2p import zero_vector
@@ -242,13 +241,9 @@ def _(quantity, w, stencil, k, load):
     accumulate_optional(field(w.nodes.fields, SeenMass), i, (weight * mass * mass,))
 
 
-@point_function()
+@point_function(otherwise=True)
 def mean_stress(averaging, kin, law, state, volume):
     """Volume times mean stress, and volume, of a point of reference `volume`; () without F-bar."""
-
-
-@mean_stress.on(PointByPoint)
-def _(averaging, kin, law, state, volume):
     return ()
 
 

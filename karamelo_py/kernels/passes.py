@@ -11,7 +11,7 @@ from karamelo_py.kernels.sweep import (
     sum_buffers,
     sweep_points,
 )
-from karamelo_py.kernels.totals import Alone, agree_on_reports, take_over
+from karamelo_py.kernels.totals import agree_on_reports, take_over
 from karamelo_py.points.frames import follows
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import largest_component
@@ -24,13 +24,9 @@ def _sweep(block, s, mode, visit, then, gathers, scatters, dt):
 sweep_blocks = over_blocks(_sweep)
 
 
-@point_function()
+@point_function(otherwise=True)
 def sweep_all(ranks, s, mode, visit, then, gathers, scatters, dt):
     """Sweep over the points of all blocks; begin to pass on what they give to other processes."""
-
-
-@sweep_all.on(Alone)
-def _(ranks, s, mode, visit, then, gathers, scatters, dt):
     sweep_blocks(s, mode, visit, then, gathers, scatters, dt)
 
 

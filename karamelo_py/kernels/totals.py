@@ -149,64 +149,37 @@ def add_rows(totals, rows, terms):
         add_to(totals, rows[q], terms[q])
 
 
-@point_function()
+@point_function(otherwise=True)
 def collect(ranks, control, first, count):
     """Put the values of `count` totals, from row `first` on, into `control.answer`."""
-
-
-@collect.on(Alone)
-def _(ranks, control, first, count):
     _round(control.totals, control.digits, control.answer, first, count)
 
 
-@point_function()
+@point_function(otherwise=True)
 def counts(ranks, n):
     """Whether this process adds what node `n` gives to totals."""
-
-
-@counts.on(Alone)
-def _(ranks, n):
     return True
 
 
-@point_function()
+@point_function(otherwise=True)
 def number_of_all(ranks, control, number):
     """The sum of a number over all processes."""
-
-
-@number_of_all.on(Alone)
-def _(ranks, control, number):
     return number
 
 
-@point_function()
+@point_function(otherwise=True)
 def agree_on_reports(ranks, control):
     """Largest move and rate of all processes, and whether a point of any went wrong."""
 
 
-@agree_on_reports.on(Alone)
-def _(ranks, control):
-    return None
-
-
-@point_function()
+@point_function(otherwise=True)
 def agree_on_heat(ranks, control):
     """Lowest and highest temperatures of all processes."""
 
 
-@agree_on_heat.on(Alone)
-def _(ranks, control):
-    return None
-
-
-@point_function()
+@point_function(otherwise=True)
 def take_over(ranks, due):
     """Wait for what the tiles of other processes give to nodes in use here."""
-
-
-@take_over.on(Alone)
-def _(ranks, due):
-    return None
 
 
 @shared

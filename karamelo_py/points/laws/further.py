@@ -50,13 +50,9 @@ def part_pressure(part, memory):
 # ---- the same of all ----------------------------------------------------------------------------
 
 
-@point_function()
+@point_function(otherwise=True)
 def initial_further(parts, like):
     """The memories of all parts, one after the other."""
-
-
-@initial_further.on(Absent)
-def _(parts, like):
     return ()
 
 
@@ -65,13 +61,9 @@ def _(parts, like):
     return initial_part(parts.part, like) + initial_further(parts.rest, like)
 
 
-@point_function()
+@point_function(otherwise=True)
 def further_after(parts, memory, law, kin, j, s, memories, dt):
     """The memories after a step."""
-
-
-@further_after.on(Absent)
-def _(parts, memory, law, kin, j, s, memories, dt):
     return ()
 
 
@@ -83,13 +75,9 @@ def _(parts, memory, law, kin, j, s, memories, dt):
     return after + further_after(parts.rest, rest, law, kin, j, s, memories, dt)
 
 
-@point_function()
+@point_function(otherwise=True)
 def further_pressure(parts, memory, p):
     """p and what all parts add to it."""
-
-
-@further_pressure.on(Absent)
-def _(parts, memory, p):
     return p
 
 

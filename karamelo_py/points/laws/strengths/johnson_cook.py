@@ -121,13 +121,9 @@ def _(softening, heat, like):
     return real(1, like) - power(homologous(heat, softening.Tr, softening.Tm), softening.m)
 
 
-@point_function()
+@point_function(otherwise=True)
 def quickened(rate, flow, slope, increment, dt):
     """Flow stress and slope with the factor of the rate."""
-
-
-@quickened.on(Absent)
-def _(rate, flow, slope, increment, dt):
     return flow, slope
 
 
