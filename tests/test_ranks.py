@@ -100,6 +100,17 @@ def test_dumps_in_pieces(state_interpreted, tmp_path):
         assert np.isnan(file["x"][-1]).any() and len(file["id"]) > 32
 
 
+def test_what_is_asked_between_two_runs(state_interpreted, tmp_path):
+    """A picture had the first gather the points; then all ask for them, and for a file."""
+    script = block(
+        2, MOVING[0], *MOVING[2:], "dump(p, all, pyplot, 4, p.*.png, 1, 1, vx)",
+        "run(4)", "c = value(xcm(all, x))", "write_restart(between.h5)",
+        "fix(w, initial_velocity_particles, all, c, 0)",
+        "run(3)", size=(0.3, 0.2),
+    )  # fmt: skip
+    assert shared(state_interpreted, tmp_path, script)
+
+
 COMPUTES = """\
 region(left, block, INF, 0.55, INF, INF)
 group(left, particles, region, left, all)

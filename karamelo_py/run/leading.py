@@ -58,6 +58,9 @@ class Leading(Simulation):
     def _settle(self) -> None:
         """See that all processes have the state that the run has ended with."""
 
+    def _part_with_whole(self) -> None:
+        """From here on no process has what only the first has gathered."""
+
     @property
     def follows(self) -> bool:
         """Another process says what this one does in a run."""
@@ -78,10 +81,13 @@ class Leading(Simulation):
                 # In the midst of what all do together: the others would wait for ever.
                 self.crew.amid = True
             else:
-                if well and self.hub.interpreter.has_more:
+                goes_on = well and self.hub.interpreter.has_more
+                if goes_on:
                     self._settle()
                 deleted = np.flatnonzero(~self.present)
-                self.crew.told((OVER, well, deleted, self.hub.values.array))
+                self.crew.told((OVER, well, goes_on, deleted, self.hub.values.array))
+                if goes_on:
+                    self._part_with_whole()
 
     def _meet(self) -> None:
         """See that all processes are about to do the same run."""
@@ -111,11 +117,13 @@ class Leading(Simulation):
         while True:
             what, *arguments = self.crew.told()
             if what == OVER:
-                well, deleted, values = arguments
+                well, goes_on, deleted, values = arguments
                 hub.values.array[:] = values
                 self.present[deleted] = False
                 if not well:
                     raise Quit
+                if goes_on:
+                    self._part_with_whole()
                 return
             try:
                 with suppress(Abandoned):

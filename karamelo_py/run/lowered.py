@@ -25,7 +25,7 @@ from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.by_id import ById
 from karamelo_py.run.by_number import ByNumber
 from karamelo_py.run.lowering import State, chosen, lower, thread_count, warms_by_friction
-from karamelo_py.run.state import changing, go_back
+from karamelo_py.run.state import Stored, changing, go_back, stored
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.run.trial import try_parts
 from karamelo_py.scene.hub import Hub
@@ -240,6 +240,10 @@ class Lowered(ById, ByNumber):
         """Return to a snapshot."""
         go_back(self, snapshot)
         self.version += 1
+
+    def stored(self) -> Iterator[Stored]:
+        """What a file to go on from holds, array by array."""
+        return stored(self)
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:
         """Block and index of the points that the last sweep found wrong, one a tile at most."""

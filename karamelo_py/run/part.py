@@ -1,10 +1,13 @@
 """What one of several processes has of a scene: its points, and the nodes that they reach."""
 
+from typing import Any
+
 import numpy as np
 
 from karamelo_py.kernels.arrays import TIMESTEP, Block, Nodes, Setup, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import Linked
+from karamelo_py.kernels.totals import WORK
 from karamelo_py.run.answers import Answers
 from karamelo_py.run.by_id import Ordered
 from karamelo_py.run.crew import Crew
@@ -19,6 +22,7 @@ from karamelo_py.run.state import (
     take_points,
     take_tiling,
 )
+from karamelo_py.run.storing import points_of_tiles
 from karamelo_py.run.tiles import in_use, numbers
 from karamelo_py.run.work import Work
 from karamelo_py.scene.hub import Hub
@@ -125,31 +129,49 @@ class Part:
         nodes = numbers(self.setup.spans)
         return nodes[self.tiles.foreign[nodes] == 0]
 
+    def tilings(self) -> list[dict[str, np.ndarray]]:
+        """The tiles of each block."""
+        tilings = [block.tiling for block in self.setup.blocks]
+        return [{name: getattr(one, name)[:rows] for name, rows in in_use(one)} for one in tilings]
+
     def shown(self) -> dict:
         """Tiles and nodes that no other process shows, and how many points there are."""
         s, own = self.setup, self.counted()
         return {
             "counts": [block.points.mass.size for block in s.blocks],
             "tiling": [
-                {name: getattr(b.tiling, name)[:rows] for name, rows in in_use(b.tiling)}
-                | {"report": b.tiling.report[: b.tiling.count[0]]}
-                for b in s.blocks
+                tiling | {"report": block.tiling.report[: block.tiling.count[0]]}
+                for tiling, block in zip(self.tilings(), s.blocks, strict=True)
             ],
             "nodes": own,
             "at nodes": [array[own] for _, array in of_nodes(s)],
             "memory": [array[own] for array in self.memory()],
         }
 
+    def tell_of_tiles(self) -> dict:
+        """Tiles, the boxes of nodes that they reach, and work done."""
+        work = self.setup.control.totals[WORK].copy()
+        return {"tiling": self.tilings(), "reached": self.tiles.reached, "work": work}
+
+    def give_tiles(self, k: int, first: int, end: int) -> dict[str, Any]:
+        """Points of the k-th block in tiles with numbers from `first` to before `end`."""
+        return points_of_tiles(self.setup.blocks[k], first, end)
+
+    def give_rows(self, first: int, end: int, memory: bool) -> tuple:
+        """Own nodes from `first` to before `end`: their rows, or what contact remembers of them."""
+        arrays = [array for _, array in of_nodes(self.setup)]
+        return self.rows(self.memory() if memory else arrays, first, end)
+
     def node_rows(self, first: int, end: int, sums: dict[str, np.ndarray]) -> tuple:
         """The nodes from `first` to before `end`: what of them others do not show, and `sums`."""
-        if first == 0:
-            self._counted, self._in_use = self.counted(), numbers(self.setup.spans)
-        own, used = (
-            nodes[slice(*np.searchsorted(nodes, (first, end)))]
-            for nodes in (self._counted, self._in_use)
-        )
-        rows = [array[own] for _, array in of_nodes(self.setup)]
-        return own, rows, used, {name: of[used] for name, of in sums.items()}
+        used = _from_to(numbers(self.setup.spans), first, end)
+        rows = self.rows([array for _, array in of_nodes(self.setup)], first, end)
+        return *rows, used, {name: of[used] for name, of in sums.items()}
+
+    def rows(self, arrays: list[np.ndarray], first: int, end: int) -> tuple:
+        """Numbers of nodes from `first` to before `end` that others do not show, and their rows."""
+        own = _from_to(self.counted(), first, end)
+        return own, [array[own] for array in arrays]
 
     def piece(self, first: int, end: int, *, last: bool) -> list[list[np.ndarray]]:
         """The points with ids from `first` to before `end`, block by block; the `last` piece."""
@@ -225,6 +247,11 @@ class Part:
         self.tiles.empty_nodes(self.setup)
         self.tiles.cut(self._kept["cuts"])
         go_back(self, self._kept)
+
+
+def _from_to(numbers: np.ndarray, first: int, end: int) -> np.ndarray:
+    """Those of ascending numbers from `first` to before `end`."""
+    return numbers[slice(*np.searchsorted(numbers, (first, end)))]
 
 
 def _like(nodes: Nodes) -> Nodes:

@@ -25,7 +25,8 @@ from karamelo_py.run.lowering import State, lower
 from karamelo_py.run.part import Part
 from karamelo_py.run.shares import joined, sized, work_of
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.state import of_nodes
+from karamelo_py.run.state import Stored, of_nodes
+from karamelo_py.run.storing import stored
 from karamelo_py.run.tiles import DIRECT_UP_TO, Tiles, in_tiles, numbers
 from karamelo_py.scene.hub import Hub
 
@@ -127,6 +128,11 @@ class Ranks(Leading):
         """See that all processes have the state that the run has ended with."""
         if not self._bare:
             self._see_parts()
+
+    def _part_with_whole(self) -> None:
+        """From here on no process has what only the first has gathered."""
+        if not self._bare:
+            self._let_go()
 
     def _let_go(self) -> None:
         """From here on the parts alone have the present state."""
@@ -243,6 +249,23 @@ class Ranks(Leading):
     def give_nodes(self, first: int, end: int) -> list | None:
         """Own nodes with numbers from `first` to before `end`, for the first those of all."""
         return self.crew.gathered(self.part.node_rows(first, end, self._brought))
+
+    def stored(self) -> Iterator[Stored]:
+        """What a file to go on from holds: not even the first needs the memory of all."""
+        return super().stored() if self._shown or self._bare else stored(self)
+
+    @property
+    def apart(self) -> bool:
+        """Whether the parts alone have the present state, between two runs."""
+        return not (self._shown or self._bare)
+
+    def together(self, what: str, *arguments: Any) -> Any:
+        """What methods of all processes find, for the first."""
+        return self._together("tell", what, *arguments)
+
+    def tell(self, what: str, *arguments: Any) -> list | None:
+        """What the own part finds, for the first that of all."""
+        return self.crew.gathered(getattr(self.part, what)(*arguments))
 
     # --- steps ------------------------------------------------------------------------------------
 

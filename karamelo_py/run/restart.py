@@ -21,11 +21,11 @@ from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.run.memory import memory_of, remember, remembered
-from karamelo_py.run.state import arrays_by_name, take_arrays
+from karamelo_py.run.state import take_arrays
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-FORMAT, VERSION = "karamelo-py restart", 3
+FORMAT, VERSION = "karamelo-py restart", 4
 FLAT = {"track_times": False}
 
 
@@ -67,13 +67,24 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
 
     The file appears under its name when all of it is written.
     """
+    path, simulation = path_of(hub, file), hub.simulation
+    if hub.settings.crew is None or within:
+        _write(hub, path, within)
+    elif simulation.apart and simulation.follows:
+        simulation.follow()
+    elif simulation.apart:
+        with simulation.leading():
+            _write(hub, path, within)
+    else:
+        _ = simulation.setup  # of all processes together
+        if not simulation.follows:
+            _write(hub, path, within)
+    return path
+
+
+def _write(hub: Hub, path: Path, within: bool) -> None:
     import h5py
 
-    path = path_of(hub, file)
-    if hub.settings.crew is not None and not within:
-        _ = hub.simulation.setup  # of all processes together
-        if not hub.settings.crew.leads:
-            return path
     arrays: list[np.ndarray] = []
     interpreter = hub.interpreter
     content = {
@@ -96,9 +107,12 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
         root.create_dataset("content", data=text, **FLAT)
         for k, array in enumerate(arrays):
             root.create_dataset(f"memory/{k}", data=array, **FLAT)
-        for name, array in arrays_by_name(hub.simulation).items():
-            root.create_dataset(f"state/{name}", data=array, **FLAT)
-    return path
+        for name, shape, where, array in hub.simulation.stored():
+            state = root.require_group("state")
+            if name not in state:
+                state.create_dataset(name, shape, array.dtype, **FLAT)
+            if array.size:
+                state[name][where] = array
 
 
 def is_restart(path: Path) -> bool:

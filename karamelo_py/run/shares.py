@@ -288,6 +288,7 @@ class SharedTiles(Tiles):
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
+        self.reached = tiles, begin, end
         # Of those that have a node in use the first counts it.
         self.foreign[self._marked] = 0
         found = [self._marked[:0]]

@@ -16,6 +16,9 @@ from karamelo_py.script.errors import ScriptError
 # What else a simulation knows of its state; `measured` comes before what depends on its version.
 SHOWN = ("measured", "mapped", "followed", "told_of_growth")
 
+# Name and shape of an array, where in it something belongs, and that.
+Stored = tuple[str, tuple[int, ...], Any, np.ndarray]
+
 
 def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
     """Every array that a step changes and the next one needs, as far as it is in use."""
@@ -35,17 +38,31 @@ def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
     """Views and copies of them, and of what else a file holds; of nodes, the rows in use."""
     s = simulation.setup
     carry(s.control.totals[WORK])  # so that a sum is always the same digits
-    found = dict(changing(simulation)) | {
-        "clock": s.control.clock.view(np.ndarray),
-        "present": simulation.present,
-        "shown": np.array([getattr(simulation, name) for name in SHOWN]),
-    }
-    for name in found:
-        if name.startswith("contact/"):  # what touched before the last step is of no use
-            found[name] = np.where(np.abs(found[name]) == simulation.step, found[name], 0)
+    found = {name: a for name, a in changing(simulation) if not name.startswith("contact/")}
+    found["clock"] = s.control.clock.view(np.ndarray)
+    if memory := remembered_at(simulation, used(s.spans)[1:]):
+        found["contact"] = latest(np.concatenate(memory), simulation.step)
+    found |= known(simulation)
     nodes = numbers(s.spans)
     # Of zeros without a sign: which nodes beside a body are visited depends on who has its tiles.
     return found | {name: array[nodes] + 0 for name, array in of_nodes(s)}
+
+
+def known(simulation: Any) -> dict[str, np.ndarray]:
+    """What all processes know."""
+    shown = np.array([getattr(simulation, name) for name in SHOWN])
+    return {"present": simulation.present, "shown": shown}
+
+
+def latest(memory: np.ndarray, step: int) -> np.ndarray:
+    """What contact remembers, without what touched before the last step: it is of no use."""
+    return np.where(np.abs(memory) == step, memory, 0)
+
+
+def stored(simulation: Any) -> Iterator[Stored]:
+    """What a file to go on from holds, array by array."""
+    for name, array in arrays_by_name(simulation).items():
+        yield name, array.shape, ..., array
 
 
 def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
@@ -76,8 +93,10 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
     nodes = numbers(s.spans)
     for name, array in of_nodes(s):
         array[nodes] = _checked(found, name, array[nodes])
-    for k, rows in enumerate(remembered_at(simulation, used(s.spans)[1:])):
-        rows[...] = _checked(found, f"contact/{k}", rows)
+    if memory := remembered_at(simulation, used(s.spans)[1:]):
+        own = _checked(found, "contact", np.concatenate(memory))
+        for rows, some in zip(memory, np.split(own, np.cumsum([*map(len, memory)])), strict=False):
+            rows[...] = some
     simulation.present[:] = _checked(found, "present", simulation.present)
     for name, known in zip(SHOWN, _checked(found, "shown", np.ones(len(SHOWN), bool)), strict=True):
         setattr(simulation, name, bool(known))

@@ -268,6 +268,13 @@ class Tiles:
             room[: len(found)] = found
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
 
+    def spans_of(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """(k, 2) spans of nodes in use, from boxes of them (n, d) in tiles of nodes (n,)."""
+        order = np.argsort(tile, kind="stable")
+        starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
+        grid = np.searchsorted(self._first_of_nodes, tile[order][starts], side="right") - 1
+        return _spans(self._parts(grid, *extents(starts, begin[order], end[order]), 0, 0))
+
     def _boxes(self, s: Setup) -> Boxes:
         """The boxes of the tiles of all blocks."""
         d, tilings = self.dimension, [block.tiling for block in s.blocks]
