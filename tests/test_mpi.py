@@ -156,10 +156,15 @@ def test_nobody_has_the_whole(tmp_path):
         "dump(v, all, vtk, 10, v.*.vtu, seq)", "dump(g, all, grid, 10, g.*.txt, vx, mass, vol)",
     )  # fmt: skip
     log = "log_modify(custom, step, E, p_x, m_x, e, at)"
-    path = moving(tmp_path, *lines, *FILES[:3], log, "set_output(5)", "run(12)")
+    path = moving(tmp_path, *lines, *FILES[:3], log, *FILES[-2:], "run(12)", size=0.5)
     folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     status, _, err = by_ranks(tmp_path / "run", path, 2, PYTHONPATH=folders)
     assert status == 0, err
+    shutil.copytree(tmp_path / "run", tmp_path / "again")
+    words = path, 3, "-restart", "r.10.h5"
+    status, _, err = by_ranks(tmp_path / "again", *words, PYTHONPATH=folders)
+    assert status == 0, err
+    same_files(tmp_path / "run", tmp_path / "again")
 
 
 # --- one end for all ----------------------------------------------------------------------------

@@ -19,19 +19,25 @@ def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
 
 def share_of_block(k: int, block: Block, own: np.ndarray) -> dict[str, np.ndarray]:
     """The points and tiles of the k-th block in tiles of which `own` says so, by name."""
-    tiling = block.tiling
-    which = np.flatnonzero(own[occupied(tiling)[0]])
-    ranges = tiling.range[which]
-    points = between(*ranges.T)
-    found = {
+    points, found = share_of_tiling(k, block.tiling, own)
+    return found | {
         f"points/{k}/{name}": np.take(array, points, axis=-1)
         for name, array in arrays_of(block.points)
     }
+
+
+def share_of_tiling(
+    k: int, tiling: Tiling, own: np.ndarray
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Which points are in tiles of which `own` says so, and these tiles."""
+    which = np.flatnonzero(own[occupied(tiling)[0]])
+    ranges = tiling.range[which]
+    points = between(*ranges.T)
     rows = {name: getattr(tiling, name)[which] for name in ROWS}
     rows["range"] = one_after_another(ranges)
     rows["count"] = np.array([len(which), *tiling.count[1:]])
     rows["share"] = shares_of(rows["range"], int(tiling.count[1]), len(tiling.share))
-    return found | {f"tiling/{k}/{name}": array for name, array in rows.items()}
+    return points, {f"tiling/{k}/{name}": array for name, array in rows.items()}
 
 
 def stripped(found: dict[str, np.ndarray], stem: str) -> dict[str, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.by_id import ById
 from karamelo_py.run.by_number import ByNumber
 from karamelo_py.run.lowering import State, chosen, lower, thread_count, warms_by_friction
-from karamelo_py.run.state import Stored, changing, go_back, stored
+from karamelo_py.run.state import Stored, changing, go_back, opened, stored, take_arrays
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.run.trial import try_parts
 from karamelo_py.scene.hub import Hub
@@ -244,6 +245,11 @@ class Lowered(ById, ByNumber):
     def stored(self) -> Iterator[Stored]:
         """What a file to go on from holds, array by array."""
         return stored(self)
+
+    def take_stored(self, path: Path) -> None:
+        """Take the state that a file to go on from holds."""
+        with opened(path) as state:
+            take_arrays(self, {name: array[()] for name, array in state.items()})
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:
         """Block and index of the points that the last sweep found wrong, one a tile at most."""

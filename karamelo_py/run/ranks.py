@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,8 +26,8 @@ from karamelo_py.run.lowering import State, lower
 from karamelo_py.run.part import Part
 from karamelo_py.run.shares import joined, sized, work_of
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.state import Stored, of_nodes
-from karamelo_py.run.storing import stored
+from karamelo_py.run.state import Stored, check_points, of_nodes, opened, take_known
+from karamelo_py.run.storing import own_share, stored, take_nodes, tilings_of
 from karamelo_py.run.tiles import DIRECT_UP_TO, Tiles, in_tiles, numbers
 from karamelo_py.scene.hub import Hub
 
@@ -253,6 +254,38 @@ class Ranks(Leading):
     def stored(self) -> Iterator[Stored]:
         """What a file to go on from holds: not even the first needs the memory of all."""
         return super().stored() if self._shown or self._bare else stored(self)
+
+    def take_stored(self, path: Path) -> None:
+        """Take the state that a file holds: each process reads its own share."""
+        if not self._leading:
+            super().take_stored(path)
+            return
+        with opened(path) as state:
+            take_known(self, state)
+            blocks = self.part.setup.blocks
+            for k, block in enumerate(blocks):
+                check_points(block.points, state, f"points/{k}/")
+            tiles = self.part.tiles
+            tilings = tilings_of(tiles, len(blocks), state)
+            whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
+            tiles.share_out(work_of(tiles.points_in(whole), self.part.work.costs))
+        self._together("read", path, tiles.cuts)
+        self._handed_out = self.version
+
+    def read(self, path: Path, cuts: np.ndarray) -> None:
+        """Take the own share of the state that a file holds."""
+        part = self.part
+        with opened(path) as state:
+            part.tiles.cut(cuts)
+            part.tiles.empty_nodes(part.setup)
+            part.put(own_share(part, state))
+            reached = zip(*self.crew.everyone(part.tiles.reached), strict=True)
+            take_nodes(part, state, part.tiles.spans_of(*map(np.concatenate, reached)))
+            self.present[:] = state["present"][()]
+        if not self.crew.leads:
+            self.control.totals[WORK] = 0
+        self._bare = False
+        self._let_go()
 
     @property
     def apart(self) -> bool:

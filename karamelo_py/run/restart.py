@@ -21,7 +21,6 @@ from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.run.memory import memory_of, remember, remembered
-from karamelo_py.run.state import take_arrays
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -161,17 +160,10 @@ class Restart:
                         expected="the version of karamelo-py that wrote it",
                     )
                 self.content = json.loads(root["content"][()].tobytes())
-                memory = root.get("memory", ())
-                self._memory = [memory[str(k)][()] for k in range(len(memory))]
-                self._state: dict[str, np.ndarray] = {}
-                root["state"].visititems(self._keep)
+                _ = root["state"]
         except (OSError, KeyError) as error:
             why = "" if "signature" in str(error) else f": {error}"
             raise ScriptError(f"{what}{why}", argument="file", expected=expected) from None
-
-    def _keep(self, name: str, item: Any) -> None:
-        if hasattr(item, "shape"):
-            self._state[name] = item[()]
 
     @property
     def runs(self) -> list[dict[str, float]]:
@@ -210,13 +202,18 @@ class Restart:
         ScriptError
             If the file was written by another scene.
         """
+        import h5py
+
         check(hub, self)
         simulation = hub.simulation
         try:
-            take_arrays(simulation, self._state)
+            simulation.take_stored(self.path)
         except ScriptError as error:
             error.message = f"{self.path}: {error.message}"
             raise
+        with h5py.File(self.path, "r", locking=False) as root:
+            arrays = root.get("memory", ())
+            arrays = [arrays[str(k)][()] for k in range(len(arrays))]
         for name, value in self.content["values"].items():
             if name in hub.values:
                 hub.values.set(name, value)
@@ -224,7 +221,7 @@ class Restart:
         kept = {tuple(key): memory for *key, memory in self.content["parts"]}
         for key, part in _parts(hub):
             if key in kept and (outputs or key[0] not in OUTPUTS):
-                remember(part, kept[key], self._memory)
+                remember(part, kept[key], arrays)
                 if hasattr(part, "resumed"):
                     part.resumed()
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,6 +67,19 @@ def stored(simulation: Any) -> Iterator[Stored]:
         yield name, array.shape, ..., array
 
 
+@contextmanager
+def opened(path: Path) -> Iterator[dict[str, Any]]:
+    """The arrays in a file to go on from, by name; they are read when they are looked at."""
+    import h5py
+
+    with h5py.File(path, "r", locking=False) as root:
+        found: dict[str, Any] = {}
+        root["state"].visititems(
+            lambda name, item: found.update({name: item}) if hasattr(item, "shape") else None
+        )
+        yield found
+
+
 def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
     """Put a simulation into the state that `arrays_by_name` has given.
 
@@ -84,12 +99,7 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
     )
     s = simulation.setup = s._replace(blocks=blocks)
     simulation.tiles.lay_out(s)
-    clock, before = s.control.clock, found["clock"]
-    if set(clock.dtype.names) != set(before.dtype.names):
-        raise _misfit("clock")
-    for name in clock.dtype.names:
-        clock[name] = before[name]
-    s.control.totals[WORK] = _checked(found, "work", s.control.totals[WORK])
+    take_known(simulation, found)
     nodes = numbers(s.spans)
     for name, array in of_nodes(s):
         array[nodes] = _checked(found, name, array[nodes])
@@ -97,6 +107,17 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
         own = _checked(found, "contact", np.concatenate(memory))
         for rows, some in zip(memory, np.split(own, np.cumsum([*map(len, memory)])), strict=False):
             rows[...] = some
+
+
+def take_known(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
+    """Take what all processes know, and the work done."""
+    control = simulation.control
+    clock, before = control.clock, found["clock"]
+    if set(clock.dtype.names) != set(before.dtype.names):
+        raise _misfit("clock")
+    for name in clock.dtype.names:
+        clock[name] = before[name]
+    control.totals[WORK] = _checked(found, "work", control.totals[WORK])
     simulation.present[:] = _checked(found, "present", simulation.present)
     for name, known in zip(SHOWN, _checked(found, "shown", np.ones(len(SHOWN), bool)), strict=True):
         setattr(simulation, name, bool(known))
@@ -152,27 +173,29 @@ def _fill(array: np.ndarray, found: Mapping[str, np.ndarray], name: str) -> None
 
 def take_points(points: Points, found: Mapping[str, np.ndarray], stem: str) -> Points:
     """Points in the order and number of the file, with arrays of their own."""
-    count = found.get(stem + "id", np.empty(0)).size
-
-    def take(name: str, like: np.ndarray) -> np.ndarray:
-        there = found.get(stem + name)
-        if there is None or there.dtype != like.dtype or there.shape[:-1] != like.shape[:-1]:
-            raise _misfit(f"{name} of points")
-        if there.shape[-1] != count:
-            raise _misfit(f"{name} of points")
-        return np.ascontiguousarray(there)
-
-    names = {name for name, _ in arrays_of(points)}
-    extra = [n for n in found if n.startswith(stem) and n.removeprefix(stem) not in names]
-    if extra:
-        raise _misfit(f"{extra[0].removeprefix(stem)} of points")
+    check_points(points, found, stem)
     own = {
-        name: None if array is None else take(name, array)
+        name: None if array is None else np.ascontiguousarray(found[stem + name])
         for name, array in points._asdict().items()
         if name != "fields"
     }
-    declared = (type(one)(take(name_of(type(one)), one.array)) for one in points.fields)
+    declared = (
+        type(one)(np.ascontiguousarray(found[stem + name_of(type(one))])) for one in points.fields
+    )
     return Points(**own, fields=tuple(declared))
+
+
+def check_points(points: Points, found: Mapping[str, Any], stem: str) -> None:
+    """Refuse arrays that are none of such points."""
+    likes = dict(arrays_of(points))
+    there = {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
+    for name in likes.keys() ^ there.keys():
+        raise _misfit(f"{name} of points")
+    for name, like in likes.items():
+        array = there[name]
+        shape = *like.shape[:-1], there["id"].size
+        if array.dtype != like.dtype or array.shape != shape:
+            raise _misfit(f"{name} of points")
 
 
 def remembered_at(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:

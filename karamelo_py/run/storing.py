@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,10 @@ import numpy as np
 from karamelo_py.kernels.arrays import Block, Tiling, arrays_of
 from karamelo_py.kernels.totals import carry
 from karamelo_py.output.fields import PIECE
-from karamelo_py.run.handing import by_tile, join_tilings
-from karamelo_py.run.state import Stored, known, latest, of_nodes
-from karamelo_py.run.tiles import SHARES, between, in_use
+from karamelo_py.run.handing import by_tile, join_tilings, share_of_tiling
+from karamelo_py.run.shares import SharedTiles
+from karamelo_py.run.state import Stored, known, latest, of_nodes, take_tiling
+from karamelo_py.run.tiles import SHARES, between, in_use, numbers
 
 
 def points_of_tiles(block: Block, first: int, end: int) -> dict[str, Any]:
@@ -59,13 +61,10 @@ def _points(ranks: Any, k: int, tiling: Tiling) -> Iterator[Stored]:
     number, ends = (array[: tiling.count[0]] for array in (tiling.number, tiling.range[:, 1]))
     total = int(ends[-1]) if len(ends) else 0
     likes = [(name, array) for name, array in arrays_of(ranks.part.setup.blocks[k].points)]
-    cuts = np.unique(np.searchsorted(ends, np.arange(PIECE, total, PIECE), side="right"))
     begin = 0
-    for first, end in zip(np.append(0, cuts), np.append(cuts, len(ends)), strict=True):
-        if first == end and total:
-            continue
-        numbers = (int(number[first]), int(number[end - 1]) + 1) if total else (0, 0)
-        found = ranks.together("give_tiles", k, *numbers)
+    for first, end in _cuts(ends):
+        limits = (int(number[first]), int(number[end - 1]) + 1) if total else (0, 0)
+        found = ranks.together("give_tiles", k, *limits)
         order = by_tile(found)
         for (name, like), *same in zip(likes, *(part["points"] for part in found), strict=True):
             array = np.take(np.concatenate(same, axis=-1), order, axis=-1)
@@ -77,20 +76,71 @@ def _points(ranks: Any, k: int, tiling: Tiling) -> Iterator[Stored]:
 def _nodes(ranks: Any, spans: np.ndarray, kinds: dict[str, np.ndarray]) -> Iterator[Stored]:
     """Rows of nodes in use: of the arrays of nodes, or what contact remembers of them."""
     memory = "contact" in kinds
-    ends = np.cumsum(spans[:, 1] - spans[:, 0])
-    total, begin = int(ends[-1]) if len(ends) else 0, 0
-    cuts = np.unique(np.searchsorted(ends, np.arange(PIECE, total, PIECE), side="right"))
-    for first, end in zip(np.append(0, cuts), np.append(cuts, len(ends)), strict=True):
-        nodes = between(*spans[first:end].T)
-        if not len(nodes) and total:
-            continue
-        limits = (int(nodes[0]), int(nodes[-1]) + 1) if total else (0, 0)
+    total = int((spans[:, 1] - spans[:, 0]).sum())
+    for own, nodes in _pieces(spans):
         rows = {n: np.zeros((len(nodes), *a.shape[1:]), a.dtype) for n, a in kinds.items()}
-        for own, found in ranks.together("give_rows", *limits, memory):
+        limits = (int(nodes[0]), int(nodes[-1]) + 1) if len(nodes) else (0, 0)
+        for here, found in ranks.together("give_rows", *limits, memory):
             for array, some in zip(rows.values(), found, strict=True):
-                array[np.searchsorted(nodes, own)] = some
+                array[np.searchsorted(nodes, here)] = some
         for name, array in rows.items():
             array = latest(array, ranks.step) if memory else array + 0
-            shape = total, *array.shape[1:]
-            yield name, shape, slice(begin, begin + len(nodes)), array
+            yield name, (total, *array.shape[1:]), own, array
+
+
+def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
+    """From where to where what ends there has some `PIECE` rows."""
+    total = int(ends[-1]) if len(ends) else 0
+    cuts = np.searchsorted(ends, np.arange(PIECE, total, PIECE), side="right")
+    return pairwise([*np.unique([0, *cuts]).tolist(), len(ends)])
+
+
+def _pieces(spans: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+    """Nodes in spans, so many at a time: which of all, and their numbers."""
+    begin = 0
+    for first, end in _cuts(np.cumsum(spans[:, 1] - spans[:, 0])):
+        nodes = between(*spans[first:end].T)
+        yield slice(begin, begin + len(nodes)), nodes
         begin += len(nodes)
+
+
+# --- and back -------------------------------------------------------------------------------------
+
+
+def tilings_of(tiles: SharedTiles, blocks: int, state: Mapping) -> list[Tiling]:
+    """The tiles of all points."""
+    return [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(blocks)]
+
+
+def own_share(part: Any, state: Mapping) -> dict[str, np.ndarray]:
+    """Points and tiles of a part, as its tiles are cut."""
+    blocks, found = part.setup.blocks, {}
+    own = part.tiles.owner == part.crew.rank
+    for k, tiling in enumerate(tilings_of(part.tiles, len(blocks), state)):
+        points, tiles = share_of_tiling(k, tiling, own)
+        names = [f"points/{k}/{name}" for name, _ in arrays_of(blocks[k].points)]
+        found |= tiles | {name: _chosen(state[name], points) for name in names}
+    return found
+
+
+def _chosen(array: Any, points: np.ndarray) -> np.ndarray:
+    """Some points (ascending) of an array in a file, of which so many are read at a time."""
+    found = np.empty((*array.shape[:-1], len(points)), array.dtype)
+    for begin in range(0, array.shape[-1], PIECE):
+        own = slice(*np.searchsorted(points, (begin, begin + PIECE)))
+        if own.start < own.stop:
+            found[..., own] = array[..., begin : begin + PIECE][..., points[own] - begin]
+    return found
+
+
+def take_nodes(part: Any, state: Mapping, spans: np.ndarray) -> None:
+    """Rows of the nodes in use here, and what contact remembers of all nodes."""
+    used = np.zeros(len(part.tiles.foreign), np.bool_)
+    used[numbers(part.setup.spans)] = True
+    memory = part.memory()
+    for own, nodes in _pieces(spans):
+        here = used[nodes]
+        for name, array in of_nodes(part.setup):
+            array[nodes[here]] = state[name][own][here]
+        for array in memory:
+            array[nodes] = state["contact"][own]
