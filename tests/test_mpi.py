@@ -148,7 +148,7 @@ ranks.Ranks.gather = gathers
 
 @needs_mpi
 def test_nobody_has_the_whole(tmp_path):
-    """Dumps of points and nodes, sums, largest values and values at a point."""
+    """Dumps, computes, files to go on from, and three that go on from one of two."""
     (tmp_path / "sitecustomize.py").write_text(NOBODY, encoding="utf-8")
     lines = (
         "compute(p, linear_momentum, all)", "compute(m, max_position, all)",

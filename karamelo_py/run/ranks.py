@@ -268,7 +268,7 @@ class Ranks(Leading):
             tiles = self.part.tiles
             tilings = tilings_of(tiles, len(blocks), state)
             whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
-            tiles.share_out(work_of(tiles.points_in(whole), self.part.work.costs))
+            tiles.share_out(work_of(tiles.loads(whole), self.part.work.costs))
         self._together("read", path, tiles.cuts)
         self._handed_out = self.version
 
