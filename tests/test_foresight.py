@@ -157,6 +157,52 @@ def test_failures_of_long_runs(run_interpreted, name, method, more, steps, told)
     assert (name in run_interpreted(text, command="check").err) == told
 
 
+@pytest.mark.parametrize(
+    ("method", "ppc", "more", "steps", "told"),
+    [
+        ("ulmpm, FLIP, linear, 1", 2, "dt_factor(0.4)", 3000, "gains a tenth"),
+        ("ulmpm, FLIP, linear, 1", 2, "dt_factor(0.4)", 1000, ""),
+        ("ulmpm, FLIP, quadratic-spline, 1", 2, "dt_factor(0.9)", 3000, ""),
+        ("tlmpm, FLIP, linear, 1", 2, "dt_factor(0.4)", 3000, ""),
+        ("ulmpm, FLIP, quadratic-spline, 1", 2, "dt_factor(0.9)\nscheme(usf)", 100, "scheme(musl)"),
+        ("ulmpm, FLIP, quadratic-spline, 1", 2, "dt_factor(0.9)\nscheme(usf)", 10, ""),
+        ("ulmpm, APIC, quadratic-spline", 2, "dt_factor(0.9)\nscheme(usavg)", 300, "scheme(musl)"),
+        ("ulmpm, APIC, quadratic-spline", 2, "dt_factor(0.9)", 300, ""),
+        ("ulmpm, FLIP, quadratic-spline, 1", 1, "dt_factor(0.9)", 300, "loses points"),
+        ("ulmpm, FLIP, quadratic-spline, 1", 2, "dt_factor(0.9)", 300, ""),
+    ],
+)
+def test_noise_of_a_turn(run_interpreted, method, ppc, more, steps, told):
+    """A square turns at 0.05, 1.25 cells from its centre to its outer points, waves at 1.16: at the
+    end of 3000 steps of 0.34 by 52 rad, its rim through 65 cells (docs/energy.md)."""
+    turn = "0.05*(3.5 - y), 0.05*(x - 3.5)"
+    words = {**QUIET, "method": method, "ppc": ppc, "u": turn, "more": more, "steps": steps}
+    text = dedent(SCENE).format(**words).replace("set_dt(0.01)", "")
+    said = run_interpreted(text, command="check").err
+    assert ("noise of a turn" in said) == bool(told) and told in said
+
+
+@pytest.mark.parametrize(
+    ("strength", "v", "told"),
+    [
+        ("linear, 0.4", "-0.9, 0", True),
+        ("plastic, 0.4, 0.1", "-0.9, 0", False),  # it hits the other after two cells
+        ("plastic, 0.4, 0.1", "0, -0.9", True),
+        ("plastic, 0.4, 0.1", "0, 0.9", False),  # the edge of the domain is three cells away
+        ("fluid, 0.1", "0, -0.9", False),
+    ],
+)
+def test_metals_that_drift_are_told(run_interpreted, strength, v, told):
+    """Up to its yield a metal gains what rubber gains: 3.4 times in 400 periods, both."""
+    steel = f"strength(s, {strength})\nmaterial(steel, eos-strength, metal, s)\nsolid(left"
+    words = {**QUIET, "method": "ulmpm, FLIP, linear, 1", "v": v, "law": "steel", "steps": 400}
+    text = dedent(SCENE).format(**words).replace("set_dt(0.01)", "dt_factor(0.4)")
+    text = text.replace("solid(left", steel, 1).replace(
+        "(2, 0, 12, 0, 8, 1)", "(2, 0, 12, -90, 8, 1)"
+    )
+    assert ("noise of a drift" in run_interpreted(text, command="check").err) == told
+
+
 STEEL = "linear, {rho}, {E}, 0.3"
 
 

@@ -19,20 +19,17 @@ from karamelo_py.language import registry
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpgimp import CPGIMPDiagonal
-from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws import law_kind, specific_volume
 from karamelo_py.points.laws.eos.ideal_gas import IdealGas
 from karamelo_py.points.laws.eos.shock import Shock
-from karamelo_py.points.laws.linear import LinearElastic
-from karamelo_py.points.laws.neo_hookean import NeoHookean
-from karamelo_py.points.laws.thermoelastic import Thermoelastic
 from karamelo_py.points.transfers import Moment
 from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.motion import Motion
+from karamelo_py.run.noise import ELASTIC, noises
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import (
     elastic_speed,
@@ -44,8 +41,6 @@ from karamelo_py.run.stable import (
 from karamelo_py.run.velocities import warn_about_velocities
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.schemes.musl import MUSL
-from karamelo_py.schemes.usf import USF
 from karamelo_py.schemes.usl import USL
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.body_force import BodyForce
@@ -53,18 +48,12 @@ from karamelo_py.styles.fixes.body_force import BodyForce
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
 FAST = 0.2  # of the speed of waves, from where on usf and usavg feed moments
 STRETCH = 0.3  # strain beyond which one is said to stretch
-DRIFT = 0.01  # of the speed of waves, from where on it feeds the noise of FLIP ...
-# ... over so many cells times c dt/h in the plane and in space, a sixth of that in 1D: functions
-# whose gradients jump, boxes, quadratic and cubic splines, with two points a cell or with one
-# (a disk that vibrates by 0.3 to 2 % gains 10 % to several times its energy over twice that).
-FAR_JUMPS, FAR_BOXES, FAR_QUADRATIC, FAR_CUBIC = (7, 4), (18, 18), (54, 27), (135, 70)
 SWING = 0.05  # strain of vibrations that bodies do not bear for long
 SEPARATE = 0.1  # of ASFLIP's strength of separation, which elastic bodies bear
 SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
 DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
 GAS = 1e-3  # kg/m^3, from where on
 SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
-ELASTIC = LinearElastic, NeoHookean, Thermoelastic
 
 
 class Failure(NamedTuple):
@@ -125,12 +114,6 @@ class Foreseen:
     def speed(self) -> float:
         """The largest component of a velocity over the speed of waves."""
         return self.simulation.fastest() / self.waves if self.waves > 0 else 0.0
-
-    @cached_property
-    def drift(self) -> float:
-        """The largest speed of the centre of a solid over that of waves."""
-        speeds = (float(np.linalg.norm(one.velocity)) for one in self.motions)
-        return max(speeds, default=0.0) / self.waves if self.waves > 0 else 0.0
 
     @cached_property
     def impact(self) -> float:
@@ -211,27 +194,9 @@ def _strained_before(s: Foreseen) -> Iterator[Failure]:
         )
 
 
-def _drift_noise(s: Foreseen) -> Iterator[Failure]:
-    feeds = isinstance(s.transfer, FLIP) and isinstance(s.scheme, (MUSL, USF))
-    if not (s.moves and feeds and s.transfer.alpha > 0.9 and s.solids(*ELASTIC)):
-        return
-    if getattr(s.basis, "gradient_jumps", False):
-        far = FAR_JUMPS
-    elif s.basis.steep_edge:
-        far = FAR_BOXES
-    else:
-        far = FAR_CUBIC if isinstance(s.basis, CubicSpline) else FAR_QUADRATIC
-    spacing = s.simulation.control.clock[0].spacing
-    cells = s.drift * s.waves * s.duration / spacing
-    step = s.simulation.dt * s.waves / spacing
-    if DRIFT < s.drift < 1 and cells * step > far[sparse(s.hub)] / (1 if s.d > 1 else 6):
-        yield Failure(
-            "noise of a drift",
-            f"a body drifts at {s.drift:.2g} times the speed of waves through about {cells:.0f} "
-            "cells, and with musl and usf what the grid does not see of the velocities grows with "
-            "each cell: if it vibrates, that gains a tenth to several times its energy",
-            "scheme(usavg), with which it does not",
-        )
+def _noise(s: Foreseen) -> Iterator[Failure]:
+    for words in noises(s):
+        yield Failure(*words)
 
 
 def _large_vibration(s: Foreseen) -> Iterator[Failure]:
@@ -377,7 +342,7 @@ RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _cell_crossing,
     _numerical_fracture,
     _repeated_contact,
-    _drift_noise,
+    _noise,
     _large_vibration,
     _vanishing_domains,
     _hourglass,

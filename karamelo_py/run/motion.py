@@ -15,6 +15,8 @@ class Motion(NamedTuple):
 
     Attributes
     ----------
+    number
+        Of the solid among those of the scene.
     mass
         Its mass.
     centre, velocity
@@ -27,6 +29,7 @@ class Motion(NamedTuple):
         (d,) Least and largest coordinates and velocities of points.
     """
 
+    number: int
     mass: float
     centre: np.ndarray
     velocity: np.ndarray
@@ -41,6 +44,10 @@ class Motion(NamedTuple):
     def size(self) -> float:
         """Half of the longest side of the box around it."""
         return float((self.high - self.low).max()) / 2
+
+    def drift(self, axisymmetric: bool) -> np.ndarray:
+        """(d,) Velocity of the body as a whole: along the radius it has none."""
+        return np.array([0.0, self.velocity[1]]) if axisymmetric else self.velocity
 
     @property
     def spin(self) -> float:
@@ -72,7 +79,7 @@ def motions(simulation: Any) -> list[Motion]:
         ends[k] = np.maximum(ends[k], np.concatenate([xv.max(axis=1), -xv.min(axis=1)]))
     limbs, ends = simulation.of_all(limbs), simulation.most(ends)
     found = []
-    for own, end in zip(limbs, ends, strict=True):
+    for k, (own, end) in enumerate(zip(limbs, ends, strict=True)):
         mass, *sums = map(rounded, own)
         if not mass > 0:
             continue
@@ -80,7 +87,9 @@ def motions(simulation: Any) -> list[Motion]:
         moments = np.array(sums[2 * d :]).reshape(d, 2 * d) - mass * np.outer(mean[:d], mean)
         high, fast, low, slow = end.reshape(4, d) * [[1], [1], [-1], [-1]]
         found.append(
-            Motion(mass, mean[:d], mean[d:], moments[:, :d], moments[:, d:], low, high, slow, fast)
+            Motion(
+                k, mass, mean[:d], mean[d:], moments[:, :d], moments[:, d:], low, high, slow, fast
+            )
         )
     return found
 

@@ -1,0 +1,188 @@
+"""Motion through the grid that feeds what the grid does not see of velocities, told beforehand.
+
+Thresholds are measured with disks of rubber and of metal, 4 to 16 cells across the radius, that
+vibrate by 0.01 to 2 % while they drift or turn (docs/energy.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import inf
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.points.basis.cubic_spline import CubicSpline
+from karamelo_py.points.laws import law_kind
+from karamelo_py.points.laws.linear import LinearElastic
+from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.strengths import shear_modulus
+from karamelo_py.points.laws.strengths.fluid import Viscous
+from karamelo_py.points.laws.strengths.linear import Elastic
+from karamelo_py.points.laws.strengths.mu_i import MuI
+from karamelo_py.points.laws.thermoelastic import Thermoelastic
+from karamelo_py.points.transfers.flip import FLIP
+from karamelo_py.run.motion import Motion
+from karamelo_py.run.stable import sparse
+from karamelo_py.schemes.musl import MUSL
+from karamelo_py.schemes.usavg import USAVG
+from karamelo_py.schemes.usf import USF
+
+SLOW = 0.01  # of the speed of waves, up to where nothing is fed in any time that was tried
+USF_TURNS = 0.035  # omega^2 t dt, from where on usf feeds a tenth to a body that turns
+USAVG_TURNS = 0.2  # the same of usavg, with moments
+USAVG_FLIP = 0.04  # that times rim speed over that of waves, with FLIP
+TORN = 9.0, 14.0  # angle, in radian, that a body bears with one point a cell: FLIP, moments
+ELASTIC = LinearElastic, NeoHookean, Thermoelastic
+
+
+class Far(NamedTuple):
+    """Cells crossed times c dt/h up to which energy is kept, with two points a cell or one.
+
+    Attributes
+    ----------
+    drift
+        By the centre of mass in the plane and in space, with musl and usf.
+    line
+        By how much less that is in 1D.
+    averaged
+        The same as `drift` with usavg.
+    rim
+        By the rim of a body that turns, with musl and usf.
+    rim_averaged
+        The same with usavg.
+    """
+
+    drift: tuple[float, float]
+    line: float
+    averaged: tuple[float, float]
+    rim: tuple[float, float]
+    rim_averaged: tuple[float, float]
+
+
+JUMPS = Far((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # functions whose gradients jump
+BOXES = Far((18, 18), 6, (inf, inf), (60, 25), (inf, inf))
+QUADRATIC = Far((54, 27), 6, (inf, inf), (inf, 25), (inf, inf))
+CUBIC = Far((135, 70), 6, (inf, inf), (inf, inf), (inf, inf))
+
+
+def far(basis: Any) -> Far:
+    """What is known of these functions."""
+    if getattr(basis, "gradient_jumps", False):
+        return JUMPS
+    if basis.steep_edge:
+        return BOXES
+    return CUBIC if isinstance(basis, CubicSpline) else QUADRATIC
+
+
+def rings(law: Any) -> bool:
+    """Whether a body of this law vibrates: not fluids, nor what flows like one."""
+    if set(law_kind(law)) & set(ELASTIC):
+        return True
+    strength = getattr(law, "strength", None)
+    return not isinstance(strength, (type(None), Viscous, MuI)) and shear_modulus(strength) > 0
+
+
+def yields(law: Any) -> bool:
+    """Whether it stops where it hits something: its impact is spent on plastic flow."""
+    return not set(law_kind(law)) & {*ELASTIC, Elastic}
+
+
+def noises(s: Any) -> Iterator[tuple[str, str, str]]:
+    """Name, reason and cure of what the motion in the scene `s` (Foreseen) feeds."""
+    keeps = s.moves and isinstance(s.transfer, FLIP) and s.transfer.alpha > 0.9
+    if not isinstance(s.scheme, (MUSL, USF, USAVG)):
+        return
+    if keeps:
+        yield from _drift(s)
+    if (keeps or s.moments) and s.d > 1 and not s.hub.domain.axisymmetric:
+        yield from _turn(s)
+
+
+def _bodies(s: Any) -> list[tuple[Motion, Any]]:
+    """The solids that may vibrate, and how they move."""
+    solids = list(s.hub.solids.values())
+    bodies = [(one, solids[one.number].material.law) for one in s.motions if s.waves > 0]
+    return [(one, law) for one, law in bodies if rings(law)]
+
+
+def _drift(s: Any) -> Iterator[tuple[str, str, str]]:
+    known, spacing = far(s.basis), float(s.simulation.control.clock[0].spacing)
+    averages = isinstance(s.scheme, USAVG)
+    bound = (known.averaged if averages else known.drift)[sparse(s.hub)]
+    bound *= spacing / (s.simulation.dt * s.waves or inf) / (known.line if s.d == 1 else 1)
+    speed = cells = 0.0
+    for one, law in _bodies(s):
+        own = float(np.linalg.norm(one.drift(s.hub.domain.axisymmetric)))
+        time = min(s.duration, _free_time(s, one)) if yields(law) else s.duration
+        if SLOW < own / s.waves < 1 and own * time / spacing > cells:
+            speed, cells = own / s.waves, own * time / spacing
+    if cells > bound:
+        schemes = "usavg" if averages else "musl and usf"
+        smooth = "quadratic-spline in the place of the basis"
+        yield (
+            "noise of a drift",
+            f"a body drifts at {speed:.2g} times the speed of waves through about {cells:.0f} "
+            f"cells, and with {schemes} what the grid does not see of the velocities grows with "
+            "each cell: if it vibrates, that gains a tenth to several times its energy",
+            smooth if averages else "scheme(usavg), with which it grows ten times less, or not",
+        )
+
+
+def _turn(s: Any) -> Iterator[tuple[str, str, str]]:
+    known, spacing = far(s.basis), float(s.simulation.control.clock[0].spacing)
+    averages, dt, one_point = isinstance(s.scheme, USAVG), s.simulation.dt, sparse(s.hub)
+    bound = (known.rim_averaged if averages else known.rim)[one_point]
+    for one, _ in _bodies(s):
+        speed, angle = one.spin * one.size / s.waves, one.spin * s.duration
+        cells, fed = angle * one.size / spacing, one.spin * angle * dt
+        strains_early = isinstance(s.scheme, USF) and fed > USF_TURNS
+        if averages:
+            strains_early = fed > USAVG_TURNS if s.moments else fed * speed > USAVG_FLIP
+        torn = one_point and angle > TORN[s.moments]
+        noise = not s.moments and cells * dt * s.waves / spacing > bound
+        if speed > SLOW and (noise or strains_early or torn):
+            ends = "loses points at its rim" if torn else "gains a tenth of its energy or more"
+            known_cures = {
+                f"{2**s.d} points a cell": one_point,
+                "scheme(musl)": strains_early,
+                "quadratic-spline in the place of the basis": noise and not one_point,
+            }
+            cures = [cure for cure, helps in known_cures.items() if helps]
+            yield (
+                "noise of a turn",
+                f"a body turns by about {angle:.2g} rad, its rim at {speed:.2g} times the speed of "
+                f"waves through about {cells:.0f} cells, and with {s.words} and "
+                f"{s.method.basis_name} functions it {ends} on the way",
+                ", ".join(cures) + ", or method tlmpm",
+            )
+            return
+
+
+def _free_time(s: Any, one: Motion) -> float:
+    """How long a body flies until it meets another, or the edge of the domain."""
+    d, domain = s.d, s.hub.domain
+    ways = zip(one.velocity, one.low, one.high, domain.lo[:d], domain.hi[:d], strict=True)
+    first = min(
+        ((hi - high) / v if v > 0 else (lo - low) / v for v, low, high, lo, hi in ways if v),
+        default=inf,
+    )
+    for other in s.motions:
+        if other is not one:
+            first = min(first, _meeting(one, other))
+    return max(first, 0.0)
+
+
+def _meeting(one: Motion, other: Motion) -> float:
+    """When the boxes around two bodies meet; infinite if they never do."""
+    begin, end = 0.0, inf
+    for v, gap, over in zip(
+        one.velocity - other.velocity, other.low - one.high, other.high - one.low, strict=True
+    ):
+        if v == 0:
+            if gap > 0 or over < 0:
+                return inf
+        else:
+            times = sorted((gap / v, over / v))
+            begin, end = max(begin, times[0]), min(end, times[1])
+    return begin if begin <= end else inf
