@@ -18,7 +18,7 @@ from test_restart import ways
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run import tiles
-from karamelo_py.run.curve import along_curve
+from karamelo_py.run.bisection import bisected
 from karamelo_py.run.plan import bytes_of_node, plan
 from karamelo_py.run.shares import SharedTiles, work_of
 from karamelo_py.run.work import Work
@@ -151,20 +151,26 @@ def test_computes_by_shares(state_interpreted, tmp_path):
     assert "nan" not in log and len(log.split()) > 100
 
 
-@pytest.mark.parametrize("shape", [(7,), (8, 8), (4, 4, 4), (5, 3), (3, 7, 2)])
-def test_a_curve_through_all_places(shape):
-    """Each number once; in a full cube from each place to the next beside it, as Hilbert's does."""
-    number = along_curve(shape, [1] * len(shape))
-    assert sorted(number) == list(range(np.prod(shape)))
-    places = np.stack(np.unravel_index(np.argsort(number), shape), axis=1)
-    if shape in {(7,), (8, 8), (4, 4, 4)}:
-        assert (np.abs(np.diff(places, axis=0)).sum(axis=1) == 1).all()
+@pytest.mark.parametrize("parts", [2, 3, 4, 8])
+def test_tiles_are_cut_in_halves(parts):
+    """A ball of tiles of equal work: each part has its share of them, but for the halves of tiles
+    that three cuts leave; of eight each has an octant.
+    """
+    places = np.argwhere(np.ones((12, 12, 12), bool)) * 8.0
+    work = (((places - 44) ** 2).sum(axis=1) < 32**2).astype(np.int64)
+    part = bisected(places, work, parts)
+    shares = np.bincount(part, work)
+    assert len(shares) == parts and np.abs(shares - work.sum() / parts).max() <= 1.5
+    if parts == 8:
+        for k in range(8):
+            assert np.ptp(places[(part == k) & (work > 0)], axis=0).max() <= 24
 
 
-def test_a_curve_through_long_places():
-    """First through the half of a bar: a cut there has 9 places of 8 x 8 cells, not of 8 x 256."""
-    number = along_curve((3, 3, 2), (8, 8, 128)).reshape(3, 3, 2)
-    assert sorted(number[:, :, 0].ravel()) == list(range(9))
+def test_a_bar_is_cut_in_its_length():
+    """Of places of 8 x 8 x 128 cells, 3 x 3 x 2: the face has 24 x 24 cells, not 24 x 256."""
+    places = np.argwhere(np.ones((3, 3, 2), bool)) * (8.0, 8.0, 128.0)
+    part = bisected(places, np.ones(18, np.int64), 2)
+    assert set(places[part == 0, 2]) == {0.0} and set(places[part == 1, 2]) == {128.0}
 
 
 def hub_in_tiles(monkeypatch, *lines: str) -> Hub:

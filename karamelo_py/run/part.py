@@ -239,13 +239,13 @@ class Part:
         """Copy every array that a step changes."""
         self._kept = {name: array.copy() for name, array in changing(self)}
         values = self.setup.control.values.copy()
-        self._kept |= {"values": values, "cuts": self.tiles.cuts}
+        self._kept |= {"values": values, "owner": self.tiles.owner}
         return self._kept
 
     def go_back(self) -> None:
         """Put back what was kept."""
         self.tiles.empty_nodes(self.setup)
-        self.tiles.cut(self._kept["cuts"])
+        self.tiles.owner = self._kept["owner"]
         go_back(self, self._kept)
 
 

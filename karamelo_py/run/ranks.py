@@ -159,11 +159,11 @@ class Ranks(Leading):
         self._handed_out = self.version
 
     def _cut(self) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-        """Share the tiles of the whole out: where they are cut; nodes, and what these remember."""
+        """Share the tiles of the whole out: whose they are; nodes, and what these remember."""
         tiles = self.part.tiles
         tiles.share_out(work_of(tiles.loads(self._whole.blocks), self.part.work.costs))
         nodes = numbers(self._whole.spans)
-        return tiles.cuts, nodes, [one[nodes] for one in self.part.memory()]
+        return tiles.owner, nodes, [one[nodes] for one in self.part.memory()]
 
     def _shares(self) -> list[dict[str, np.ndarray]]:
         """What each process has of the whole."""
@@ -177,11 +177,11 @@ class Ranks(Leading):
         self._bare = False
 
     def take(
-        self, cuts: np.ndarray, nodes: np.ndarray, memory: list, shares: list | None = None
+        self, owner: np.ndarray, nodes: np.ndarray, memory: list, shares: list | None = None
     ) -> None:
         """Take the own tiles from what the first hands out."""
         found = self.crew.handed_out(shares)
-        self.part.tiles.cut(cuts)
+        self.part.tiles.owner = owner
         self.part.tiles.empty_nodes(self.part.setup)
         for one, rows in zip(self.part.memory(), memory, strict=True):
             one[nodes] = rows

@@ -1,6 +1,6 @@
 """The tiles of a scene shared out among processes: who has which, and what they pass on.
 
-Each process has the points in a range of tiles along a curve. Nodes that several reach are summed
+Each process has the points of tiles that lie beside each other. Nodes that several reach are summed
 by each of them, from the same boxes in the same order.
 """
 
@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of
+from karamelo_py.run.bisection import bisected
 from karamelo_py.run.crew import Crew
-from karamelo_py.run.curve import along_curve
 from karamelo_py.run.tiles import (
     SHARES,
     Boxes,
@@ -74,13 +74,13 @@ class SharedTiles(Tiles):
         super().__init__(lattices, basis, points, sparse)
         self.crew = crew
         self.one_place = one_place
-        self._along = np.concatenate(
+        self._places = np.concatenate(
             [
-                first + along_curve(shape, self.size)
-                for first, shape in zip(self.first, self.shapes, strict=False)
+                one.lo[: self.dimension] + one.h * self.size * np.argwhere(np.ones(shape, bool))
+                for one, shape in zip(lattices, self.shapes, strict=True)
             ]
         )
-        self.cut(np.append(0, np.full(crew.size, self.count)))
+        self.owner = np.zeros(self.count, np.int64)
         self.foreign = np.zeros(int(self._first_node[-1] + self._nodes[-1].prod()), np.uint8)
         self._marked = np.empty(0, np.int64)
         self.given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
@@ -90,26 +90,14 @@ class SharedTiles(Tiles):
 
     # --- points -----------------------------------------------------------------------------------
 
-    def cut(self, cuts: np.ndarray) -> None:
-        """Let each process have the tiles along the curve from its cut to the next."""
-        self.cuts = cuts
-        self.owner = np.searchsorted(cuts, self._along, side="right") - 1
-
     def share_out(self, work: np.ndarray) -> None:
-        """Cut the tiles into ranges of nearly as much work each."""
-        cuts = np.append(0, np.full(self.crew.size, self.count))
+        """Cut the tiles into parts of nearly as much work each."""
         if not self.direct:
-            along = np.empty_like(work)
-            along[self._along] = work
-            ends = np.cumsum(along)
-            parts = np.arange(1, self.crew.size) * ends[-1] / self.crew.size
-            # A tile is of the one that has its middle.
-            cuts[1:-1] = np.searchsorted(ends - 0.5 * along, parts)
-        self.cut(cuts)
+            self.owner = bisected(self._places, work, self.crew.size)
 
     def balance(self, work: np.ndarray) -> bool:
         """Cut the tiles anew where that is worth it; `work` (tiles,) is of the own points."""
-        before, work = self.cuts, self.crew.added(work)
+        before, work = self.owner, self.crew.added(work)
 
         def largest() -> float:
             return np.bincount(self.owner, work, self.crew.size).max()
@@ -117,8 +105,8 @@ class SharedTiles(Tiles):
         now = largest()
         self.share_out(work)
         if now <= IMBALANCE * largest():
-            self.cut(before)
-        return self.cuts is not before
+            self.owner = before
+        return self.owner is not before
 
     def loads(self, blocks: Sequence[Block]) -> np.ndarray:
         """(blocks + 1, tiles) points of each sorted block, and nodes that all may reach."""

@@ -80,8 +80,10 @@ class Tiles:
     def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int, sparse: bool):
         self.direct = points <= DIRECT_UP_TO
         self.dimension = d = lattices[0].dimension
-        rows = np.array([1] * (d - 1) + [LONGER if sparse and d == 3 else 1])
-        self.size, self.node_size = TILES[d] * rows, NODES[d] * rows
+        self.size, self.node_size = np.full(d, TILES[d]), np.full(d, NODES[d])
+        if sparse and d == 3:
+            self.size[-1] *= LONGER
+            self.node_size[:] = 1, 1, self.size[-1]
         self.per_cell = type(basis).nodes_per_cell
         self.least_nodes = type(basis).least_nodes
         self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
