@@ -203,6 +203,20 @@ def test_metals_that_drift_are_told(run_interpreted, strength, v, told):
     assert ("noise of a drift" in run_interpreted(text, command="check").err) == told
 
 
+@pytest.mark.parametrize("wall", ["0, 0", "0, NULL", "NULL, 0"])
+def test_what_is_held_neither_drifts_nor_turns(run_interpreted, wall):
+    """A square whose lower edge is held swings at most; along a wall it may slide, not turn."""
+    hold = f"""region(edge, block, INF, INF, INF, 2)
+    group(edge, nodes, region, edge, all)
+    fix(hold, velocity_nodes, edge, {wall})
+    dt_factor(0.4)"""
+    turning = "0.9 + 0.05*(3.5 - y), 0.05*(x - 3.5)"
+    words = {**QUIET, "method": "ulmpm, FLIP, linear, 1", "u": turning, "more": hold}
+    text = SCENE.format(**words | {"steps": 3000}).replace("set_dt(0.01)", "")
+    said = run_interpreted(text, command="check").err
+    assert ("noise of a drift" in said) == (wall == "NULL, 0") and "noise of a turn" not in said
+
+
 STEEL = "linear, {rho}, {E}, 0.3"
 
 

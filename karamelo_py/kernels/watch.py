@@ -34,7 +34,7 @@ from karamelo_py.points.laws import (
 LOOK = 10  # steps between two looks
 LOOKS = 10  # looks that are averaged, in a window of 100 steps
 GROWTH = 0.01  # of the largest energy so far, in a window: more is told
-DRIFTING = 0.01  # of the energy of bodies that drift, which hides what they vibrate by
+DRIFTING = 1e-3  # of the energy of bodies that drift, which hides what they vibrate by
 BOUND = 10.0  # times the energy that there was and that loads have brought: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
 COARSE = 1000.0  # round-off errors: a strain of so many is noise, too

@@ -27,6 +27,7 @@ from karamelo_py.run.stable import sparse
 from karamelo_py.schemes.musl import MUSL
 from karamelo_py.schemes.usavg import USAVG
 from karamelo_py.schemes.usf import USF
+from karamelo_py.styles.fixes.velocity_nodes import VelocityNodes
 
 SLOW = 0.01  # of the speed of waves, up to where nothing is fed in any time that was tried
 USF_TURNS = 0.035  # omega^2 t dt, from where on usf feeds a tenth to a body that turns
@@ -113,7 +114,10 @@ def _drift(s: Any) -> Iterator[tuple[str, str, str]]:
     bound *= spacing / (s.simulation.dt * s.waves or inf) / (known.line if s.d == 1 else 1)
     speed = cells = 0.0
     for one, law in _bodies(s):
-        own = float(np.linalg.norm(one.drift(s.hub.domain.axisymmetric)))
+        velocity = one.drift(s.hub.domain.axisymmetric)
+        if np.linalg.norm(velocity) <= SLOW * s.waves:
+            continue
+        own = float(np.linalg.norm(velocity[~held(s, one)]))
         time = min(s.duration, _free_time(s, one)) if yields(law) else s.duration
         if SLOW < own / s.waves < 1 and own * time / spacing > cells:
             speed, cells = own / s.waves, own * time / spacing
@@ -135,13 +139,15 @@ def _turn(s: Any) -> Iterator[tuple[str, str, str]]:
     bound = (known.rim_averaged if averages else known.rim)[one_point]
     for one, _ in _bodies(s):
         speed, angle = one.spin * one.size / s.waves, one.spin * s.duration
+        if speed <= SLOW or held(s, one).any():
+            continue
         cells, fed = angle * one.size / spacing, one.spin * angle * dt
         strains_early = isinstance(s.scheme, USF) and fed > USF_TURNS
         if averages:
             strains_early = fed > USAVG_TURNS if s.moments else fed * speed > USAVG_FLIP
         torn = one_point and angle > TORN[s.moments]
         noise = not s.moments and cells * dt * s.waves / spacing > bound
-        if speed > SLOW and (noise or strains_early or torn):
+        if noise or strains_early or torn:
             ends = "loses points at its rim" if torn else "gains a tenth of its energy or more"
             known_cures = {
                 f"{2**s.d} points a cell": one_point,
@@ -157,6 +163,23 @@ def _turn(s: Any) -> Iterator[tuple[str, str, str]]:
                 ", ".join(cures) + ", or method tlmpm",
             )
             return
+
+
+def held(s: Any, one: Motion) -> np.ndarray:
+    """(d,) Whether fixes hold nodes at a body in each direction: it goes nowhere."""
+    found, lattices = np.zeros(s.d, np.bool_), s.hub.lattices
+    solid = list(s.hub.solids.values())[one.number]
+    lattice = lattices[s.method.lattice_of(s.hub, solid)]
+    for fix in s.hub.fixes.values():
+        if not isinstance(fix, VelocityNodes):
+            continue
+        nodes = fix.group.nodes
+        own = (nodes >= lattice.first) & (nodes < lattice.first + lattice.node_count)
+        x = lattice.positions(nodes[own])[:, : s.d]
+        near = ((x >= one.low - lattice.h) & (x <= one.high + lattice.h)).all(axis=1)
+        given = [formula is not None and not formula.bound for formula in fix.formulas[: s.d]]
+        found |= near.any() & np.array(given)
+    return found
 
 
 def _free_time(s: Any, one: Motion) -> float:
