@@ -216,7 +216,8 @@ CLOCK = np.dtype(
         ("end_time", np.float64),
         ("last_dt", np.float64),  # of the last step; of the present one before there was any
         ("kick", np.float64),  # how long the forces act: between the middles of the two steps
-        ("rate", np.float64),  # of the fastest point, c + max |v_i|
+        ("rate", np.float64),  # of the fastest point, c + max |v_i - common_i|
+        ("common", np.float64, (1, 3)),  # velocity that speeds are measured from
         ("new_rate", np.float64),  # of the last sweep
         ("move", np.float64),  # of the point that went furthest in this step, in cells
         ("new_move", np.float64),

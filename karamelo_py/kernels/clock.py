@@ -12,6 +12,7 @@ from karamelo_py.kernels.arrays import (
     TIME,
     TIMESTEP,
 )
+from karamelo_py.points.kinematics import vector_at
 
 
 @shared
@@ -39,6 +40,12 @@ def kick(s):
     one step to that of the next.
     """
     return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
+
+
+@shared
+def common_velocity(kin, clock, like):
+    """The velocity that speeds are measured from, in the number type of `like`."""
+    return tuple([real(a, like) for a in vector_at(kin, clock.common, 0)])
 
 
 NEXT_TO_NOTHING = 1e-9  # of a step
