@@ -218,6 +218,8 @@ CLOCK = np.dtype(
         ("kick", np.float64),  # how long the forces act: between the middles of the two steps
         ("rate", np.float64),  # of the fastest point, c + max |v_i - common_i|
         ("common", np.float64, (1, 3)),  # velocity that speeds are measured from
+        ("follows", np.int64),  # whether that is the one of the centre of masses, not 0
+        ("speed", np.float64),  # of the point that goes furthest, in cells
         ("new_rate", np.float64),  # of the last sweep
         ("move", np.float64),  # of the point that went furthest in this step, in cells
         ("new_move", np.float64),

@@ -258,8 +258,8 @@ def _(task, w, stencil, k, total):
 def settled(task, w, stencil, p, dt, total, totals, fastest):
     """Store what follows from `total`; return how far the point moved in cells, and its rate.
 
-    The rate, c + max |v_i - common_i|, bounds the stable step; what is returned is the larger of it and
-    `fastest`, the largest so far. A point that went wrong (det F <= 0, NaN, outside the domain)
+    The rate, c + max |v_i - common_i|, bounds the stable step; what is returned is the larger of it
+    and `fastest`, the largest so far. A point that went wrong (det F <= 0, NaN, outside the domain)
     returns a distance or a rate of NaN or infinity. `totals` are those of all tasks of the visit.
     """
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.arrays import DT
-from karamelo_py.kernels.clock import STILL
+from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.points.laws import Absent, initial_state, wave_speed_squared
 from karamelo_py.points.transfers import Moment
@@ -48,27 +48,65 @@ def keeping_share(hub: Hub) -> float:
     return max(share, DAMPED) if sparse(hub) else USUAL
 
 
+def bears_drift(hub: Hub) -> bool:
+    """Whether a body that drifts bears the steps of one at rest, and keeps its energy with them.
+
+    With cubic splines next to no energy comes from the places in the cells; usavg feeds none with
+    functions that are smooth (FLIP; 50 periods, 0.05 to 0.5 of the speed of waves).
+    """
+    update, basis = hub.update, hub.update.method.basis
+    return (
+        update.method.frame.moves
+        and getattr(update.transfer, "alpha", 0.0) > 0.9
+        and Moment not in getattr(update.transfer, "point_fields", ())
+        and not getattr(basis, "gradient_jumps", False)
+        and (getattr(basis, "bears_drift", False) or getattr(update.scheme, "bears_drift", False))
+        and keeping_share(hub) == USUAL
+        and min(getattr(update.scheme, "courant", (1.0,))) >= 1
+    )
+
+
+def follows_drift(hub: Hub) -> bool:
+    """Whether steps are those of the frame in which the scene as a whole is at rest."""
+    return hub.update.dt_factor is None and hub.update.fixed_dt is None and bears_drift(hub)
+
+
+def common_velocity(simulation: Any) -> np.ndarray:
+    """(3,) The velocity of the centre of all masses."""
+    motions = simulation.motions()
+    mass = sum(one.mass for one in motions)
+    common = np.zeros(3)
+    if mass > 0:
+        common[: simulation.kin.dimension] = sum(one.mass * one.velocity for one in motions) / mass
+    return common
+
+
+def courant_number(hub: Hub, *, longer: bool) -> float:
+    """The stable step over h/c; `longer` is that of points which stay where they are."""
+    scheme, method = hub.update.scheme, hub.update.method
+    two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
+    if min(two, one) < 1:
+        # Nodes between the corners of cells make the highest frequency higher.
+        nodes = 0.7 if method.basis.nodes_per_cell > 1 else 1
+        return (one if sparse(hub) else two) * nodes
+    if not method.frame.moves:
+        return getattr(method.basis, "courant_total", 1.0)
+    return getattr(method.basis, "courant_still", 1.0) if longer else 1.0
+
+
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     """The stable step over h/c, and the share of it that the program takes of itself.
 
     `still`: while no point has gone as far as `STILL`. The stable step is that of scheme, basis and
     points a cell.
     """
-    scheme, method, update = hub.update.scheme, hub.update.method, hub.update
-    share = keeping_share(hub)
+    method, share = hub.update.method, keeping_share(hub)
     # Transfers of moments bear 1.3 h/c with quadratic splines, 1.5 with cubic ones.
-    still &= method.frame.moves and Moment not in getattr(update.transfer, "point_fields", ())
+    still &= method.frame.moves and Moment not in getattr(hub.update.transfer, "point_fields", ())
     if still:
         # A lone point of linear functions is stable up to 0.8 h/c in space.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
-    two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
-    if min(two, one) < 1:
-        # Nodes between the corners of cells make the highest frequency higher.
-        nodes = 0.7 if method.basis.nodes_per_cell > 1 else 1
-        return (one if sparse(hub) else two) * nodes, share
-    if not method.frame.moves:
-        return getattr(method.basis, "courant_total", 1.0), share
-    return getattr(method.basis, "courant_still", 1.0) if still else 1.0, share
+    return courant_number(hub, longer=still or bears_drift(hub)), share
 
 
 def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
@@ -76,8 +114,7 @@ def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     update = hub.update
     if update.dt_factor is None and update.fixed_dt is None:
         return own_step_of_waves(hub, still=still)
-    courant, share = own_step_of_waves(hub, still=False)
-    return courant, update.dt_factor or share
+    return courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
 
 
 def share_of_heat(hub: Hub) -> float:
@@ -95,8 +132,12 @@ def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
     """The step that the program would take of itself now: at rest, or had points moved."""
     clock = simulation.control.clock[0]
     courant, share = own_step_of_waves(hub, still=still)
-    limit = courant * clock.spacing / clock.rate if clock.rate > 0 else inf
-    return float(min(share * limit, USUAL * clock.heat_limit))
+    follows = bears_drift(hub)
+    rate = simulation.rate_from_centre() if follows and not clock.follows else clock.rate
+    limit = courant * clock.spacing / rate if rate > 0 else inf
+    step = min(share * limit, USUAL * clock.heat_limit)
+    speed = simulation.fastest() if follows else 0.0
+    return float(min(step, STRIDE * clock.spacing / speed) if speed > 0 else step)
 
 
 def what_follows(hub: Hub, simulation: Any, step: float) -> str:
@@ -168,11 +209,13 @@ def ruling_limit(simulation: Any) -> str:
         return "set_dt"
     waves = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     of_waves, of_heat = clock.dt_factor * waves, clock.heat_factor * clock.heat_limit
+    if clock.follows and STRIDE <= clock.speed * control.values[DT] * (1 + 1e-9):
+        return "speed"
     if control.values[DT] < min(of_waves, of_heat) * (1 - 1e-9):
         return "end"
     if of_heat < of_waves:
         return "conduction"
-    speed = simulation.fastest()
+    speed = simulation.fastest(clock.common[0])
     if speed > 0.5 * clock.rate:
         return "speed"
     without = _speed_without_viscosity(simulation)
