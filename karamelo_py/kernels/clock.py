@@ -54,7 +54,7 @@ ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
 # Points that go from cell to cell feed energy to a body, by so much a cell, and the more the longer
 # the step. Until they have gone so far, in cells, a scene takes the steps of bodies at rest.
 STILL = 0.25
-# Where steps follow from speeds within a common drift, none moves a point by more cells.
+# Where a common drift does not count in the step, none moves a point by more cells.
 STRIDE = 0.65
 
 
@@ -69,7 +69,7 @@ def choose_dt(control):
     clock = control.clock[0]
     limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     dt = min(clock.dt_factor * limit, clock.heat_factor * clock.heat_limit)
-    if clock.follows and clock.speed * dt > STRIDE:
+    if clock.weight == 0 and clock.speed * dt > STRIDE:
         dt = STRIDE / clock.speed
     dt = clock.fixed_dt if clock.fixed_dt > 0 else dt
     limit = min(limit, clock.heat_limit)
@@ -102,7 +102,7 @@ def finish(control):
     clock.drift += clock.move
     clock.path += clock.move
     clock.pace = max(clock.pace, clock.move)
-    clock.speed = clock.move / dt
+    clock.speed = clock.move / dt if dt > 0 else 0.0
     clock.move = 0.0
     if clock.path > STILL:
         clock.courant, clock.dt_factor = clock.courant_moving, clock.dt_factor_moving

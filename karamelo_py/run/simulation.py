@@ -20,11 +20,11 @@ from karamelo_py.run.motion import Motion, motions
 from karamelo_py.run.python_hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.stable import (
     common_velocity,
-    follows_drift,
     moves_already,
     ruling_limit,
     share_of_heat,
     step_of_waves,
+    weight_of_drift,
 )
 from karamelo_py.run.tiles import in_tiles
 from karamelo_py.run.watch import unknown_heat, unknown_work
@@ -133,26 +133,26 @@ class Simulation(Lowered):
         numbers = [now[0], moving[0], *(number / 2**halvings for number in asked)]
         for name, number in zip((*courants, *names), numbers, strict=True):
             clock[name] = number
-        follows = int(follows_drift(self.hub))
-        if follows != clock.follows:
-            clock.follows, self._measured = follows, -1
+        weight = weight_of_drift(self.hub)
+        if weight != clock.weight:
+            clock.weight, self._measured = weight, -1
         return numbers != before
 
     def _choose_dt(self) -> None:
         if self._measured != self.version:
             # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
             clock = self.control.clock[0]
-            clock.common[:] = common_velocity(self) if clock.follows else 0.0
-            clock.speed = self.fastest() / clock.spacing if clock.follows else 0.0
+            clock.common[:] = common_velocity(self, float(clock.weight))
+            clock.speed = self.fastest() / clock.spacing if clock.weight == 0 else 0.0
             self.measure()
             self._measured = self.version
         choose_dt(self.control)
 
-    def rate_from_centre(self) -> float:
-        """The rate of the fastest point, were speeds measured from that of the centre of masses."""
+    def rate_with(self, weight: float) -> float:
+        """The rate of the fastest point, if the common drift of all had this weight."""
         clock = self.control.clock[0]
         common, rate = clock.common.copy(), float(clock.rate)
-        clock.common[:] = common_velocity(self)
+        clock.common[:] = common_velocity(self, weight)
         self.measure()
         found = float(clock.rate)
         clock.common[:], clock.rate = common, rate

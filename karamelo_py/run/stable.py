@@ -15,6 +15,7 @@ from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.hub import Hub
 
 USUAL = 0.9
+BOXES = 6.0  # weight of a common drift in the steps of boxes
 LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
 DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
 
@@ -40,45 +41,71 @@ def keeping_share(hub: Hub) -> float:
     alpha = getattr(update.transfer, "alpha", 0.0)
     if not update.method.frame.moves or not alpha > 0.9:
         return USUAL
-    jumps = getattr(update.method.basis, "gradient_jumps", False)
-    keeping = getattr(update.scheme, "keeping", ((USUAL, USUAL), (USUAL, USUAL)))
-    share = keeping[jumps][sparse(hub)]
+    basis = update.method.basis
+    kind = getattr(basis, "gradient_jumps", False) * basis.nodes_per_cell
+    keeping = getattr(update.scheme, "keeping", ((USUAL, USUAL),) * 3)
+    share = keeping[kind][sparse(hub)]
     if alpha > 0.99:
         return share
     return max(share, DAMPED) if sparse(hub) else USUAL
+
+
+def _keeps_velocities(hub: Hub) -> bool:
+    """Whether points of FLIP and its kin move through the grid, without moments and usl."""
+    update = hub.update
+    return (
+        update.method.frame.moves
+        and getattr(update.transfer, "alpha", 0.0) > 0.9
+        and Moment not in getattr(update.transfer, "point_fields", ())
+        and min(getattr(update.scheme, "courant", (1.0,))) >= 1
+    )
 
 
 def bears_drift(hub: Hub) -> bool:
     """Whether a body that drifts bears the steps of one at rest, and keeps its energy with them.
 
     With cubic splines next to no energy comes from the places in the cells; usavg feeds none with
-    functions that are smooth (FLIP; 50 periods, 0.05 to 0.5 of the speed of waves).
+    functions that are smooth (50 periods at 0.05 to 0.5 of the speed of waves).
     """
-    update, basis = hub.update, hub.update.method.basis
+    basis, scheme = hub.update.method.basis, hub.update.scheme
     return (
-        update.method.frame.moves
-        and getattr(update.transfer, "alpha", 0.0) > 0.9
-        and Moment not in getattr(update.transfer, "point_fields", ())
+        _keeps_velocities(hub)
         and not getattr(basis, "gradient_jumps", False)
-        and (getattr(basis, "bears_drift", False) or getattr(update.scheme, "bears_drift", False))
+        and (getattr(basis, "bears_drift", False) or getattr(scheme, "bears_drift", False))
         and keeping_share(hub) == USUAL
-        and min(getattr(update.scheme, "courant", (1.0,))) >= 1
     )
 
 
-def follows_drift(hub: Hub) -> bool:
-    """Whether steps are those of the frame in which the scene as a whole is at rest."""
-    return hub.update.dt_factor is None and hub.update.fixed_dt is None and bears_drift(hub)
+def own_weight_of_drift(hub: Hub) -> float:
+    """How much of the common velocity of all counts in the step that the program takes of itself.
+
+    1 as in the rule of the language, h/(c + |v|). What drifts by boxes (ugimp, cpgimp) gains the
+    more the faster it is: by edges of shaken bars and blocks at 0.05 to 0.5 of the speed of waves.
+    """
+    if bears_drift(hub):
+        return 0.0
+    basis = hub.update.method.basis
+    boxes = getattr(basis, "steep_edge", False) and basis.cells > 1
+    fed = boxes and _keeps_velocities(hub) and not getattr(hub.update.scheme, "bears_drift", False)
+    return BOXES if fed and hub.update.transfer.alpha > 0.99 else 1.0
 
 
-def common_velocity(simulation: Any) -> np.ndarray:
-    """(3,) The velocity of the centre of all masses."""
+def weight_of_drift(hub: Hub) -> float:
+    """The same where the script may ask for steps, which are shares of h/(c + |v|)."""
+    own = hub.update.dt_factor is None and hub.update.fixed_dt is None
+    return own_weight_of_drift(hub) if own else 1.0
+
+
+def common_velocity(simulation: Any, weight: float) -> np.ndarray:
+    """(3,) The velocity that speeds are measured from so that the common drift has this weight."""
+    if weight == 1:
+        return np.zeros(3)
     motions = simulation.motions()
     mass = sum(one.mass for one in motions)
     common = np.zeros(3)
     if mass > 0:
         common[: simulation.kin.dimension] = sum(one.mass * one.velocity for one in motions) / mass
-    return common
+    return (1 - weight) * common
 
 
 def courant_number(hub: Hub, *, longer: bool) -> float:
@@ -132,11 +159,11 @@ def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
     """The step that the program would take of itself now: at rest, or had points moved."""
     clock = simulation.control.clock[0]
     courant, share = own_step_of_waves(hub, still=still)
-    follows = bears_drift(hub)
-    rate = simulation.rate_from_centre() if follows and not clock.follows else clock.rate
+    weight = own_weight_of_drift(hub)
+    rate = clock.rate if weight == clock.weight else simulation.rate_with(weight)
     limit = courant * clock.spacing / rate if rate > 0 else inf
     step = min(share * limit, USUAL * clock.heat_limit)
-    speed = simulation.fastest() if follows else 0.0
+    speed = simulation.fastest() if weight == 0 else 0.0
     return float(min(step, STRIDE * clock.spacing / speed) if speed > 0 else step)
 
 
@@ -209,7 +236,7 @@ def ruling_limit(simulation: Any) -> str:
         return "set_dt"
     waves = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     of_waves, of_heat = clock.dt_factor * waves, clock.heat_factor * clock.heat_limit
-    if clock.follows and STRIDE <= clock.speed * control.values[DT] * (1 + 1e-9):
+    if clock.weight == 0 and clock.speed * control.values[DT] * (1 + 1e-9) >= STRIDE:
         return "speed"
     if control.values[DT] < min(of_waves, of_heat) * (1 - 1e-9):
         return "end"
