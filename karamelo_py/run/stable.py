@@ -79,15 +79,16 @@ def bears_drift(hub: Hub) -> bool:
 def own_weight_of_drift(hub: Hub) -> float:
     """How much of the common velocity of all counts in the step that the program takes of itself.
 
-    1 as in the rule of the language, h/(c + |v|). What drifts by boxes (ugimp, cpgimp) gains the
-    more the faster it is: by edges of shaken bars and blocks at 0.05 to 0.5 of the speed of waves.
+    1 as in the rule of the language, h/(c + |v|). What drifts by boxes (ugimp, cpgimp), two and
+    more a cell, gains the more the faster it is: by edges of shaken bars and blocks at 0.05 to 0.5
+    of the speed of waves.
     """
     if bears_drift(hub):
         return 0.0
     basis = hub.update.method.basis
     boxes = getattr(basis, "steep_edge", False) and basis.cells > 1
     fed = boxes and _keeps_velocities(hub) and not getattr(hub.update.scheme, "bears_drift", False)
-    return BOXES if fed and hub.update.transfer.alpha > 0.99 else 1.0
+    return BOXES if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
 
 
 def weight_of_drift(hub: Hub) -> float:
