@@ -242,8 +242,7 @@ def farthest(basis, which, kind, drift, ppc):
 
     2 at rest, as in `SCRIPT`, where nodes and points see all waves. Splines and single points see
     less of the shortest ones, and bear more where they drift, and with usl, and at rest in the
-    updated frame, where the program's own step is longer for that. No longer step is taken for what
-    drifts: the longer it is, the faster do such bodies gain energy (run/foresight.py).
+    updated frame, where the program's own step is longer for that.
     """
     if not drift and which != "usl":
         longer = {"quadratic-spline": 1.25, "cubic-spline": 1.4} if kind == "ulmpm" else {}
@@ -258,11 +257,49 @@ def test_the_own_step_is_stable_and_not_far_from_the_edge(run_interpreted, basis
     options = [w for name, value in words.items() for w in ("-var", name, str(value))]
 
     own = run_interpreted(SHAKEN.format(step=""), *options, folder="own", status=None)
-    # What jumps at cell faces is told beforehand.
-    assert settled(own) or (drift and "points that cross cells" in own.err)
+    assert settled(own)
     step = f"dt_factor({farthest(basis, which, kind, drift, ppc)})"
     far = run_interpreted(SHAKEN.format(step=step), *options, folder="far", status=None)
     assert not settled(far)
+
+
+@pytest.mark.parametrize(
+    ("basis", "which", "drift", "words", "expected"),
+    [
+        ("cubic-spline", "musl", 0.3, "", 0.9 * 1.4),
+        ("quadratic-spline", "usavg", 0.3, "", 0.9 * 1.25),
+        ("quadratic-spline", "usavg", 0.8, "", 0.65 / 0.8),
+        ("quadratic-spline", "usavg", 0.3, "dt_factor(0.9)", 0.9 / 1.3),
+        ("quadratic-spline", "musl", 0.3, "", 0.9 / 1.3),
+        ("ugimp", "usavg", 0.3, "", 0.9),
+        ("ugimp", "musl", 0.3, "", 0.9 / (1 + 6 * 0.3)),
+        ("Bernstein-quadratic", "musl", 0.3, "", 0.2 / 1.3),
+    ],
+)
+def test_the_own_step_of_what_drifts(run_interpreted, basis, which, drift, words, expected):
+    """The table of docs/studies.md, in cells over the speed of waves."""
+    script = SHAKEN.format(step=words).replace("drift + 1e", "drift*c + 1e")
+    script = "c = sqrt(100*0.7/1.3/0.4)\n" + script.replace("run(120)", "run(4)")
+    options = ["-var", "basis", basis, "-var", "which", which]
+    log = read_log(run_interpreted(script, *options, "-var", "drift", str(drift)).folder)
+    assert log["dt"] * np.sqrt(100 * 0.7 / 1.3 / 0.4) == pytest.approx(expected, rel=1e-4)
+
+
+def test_bodies_that_meet_have_no_drift_in_common(run_interpreted):
+    """The centre of both is at rest: h/(c + |v|), as in the rule of the language."""
+    script = SHAKEN.format(step="").replace("run(120)", "run(4)")
+    two = """
+region(other, block, 8, 12)
+solid(other, region, other, ppc, rubber, 1, 0)
+fix(v, initial_velocity_particles, all, if(x0 < 6, 1, -1)*drift)
+"""
+    head, tail = script.split("fix(v", 1)
+    script = head + two + tail.split("\n", 1)[1]
+    log = read_log(
+        run_interpreted(script, "-var", "basis", "cubic-spline", "-var", "drift", "3").folder
+    )
+    c = np.sqrt(100 * 0.7 / 1.3 / 0.4)
+    assert log["dt"][0] == pytest.approx(0.9 * 1.4 / (c + 3), rel=1e-4)
 
 
 def settled(result) -> bool:

@@ -216,7 +216,10 @@ CLOCK = np.dtype(
         ("end_time", np.float64),
         ("last_dt", np.float64),  # of the last step; of the present one before there was any
         ("kick", np.float64),  # how long the forces act: between the middles of the two steps
-        ("rate", np.float64),  # of the fastest point, c + max |v_i|
+        ("rate", np.float64),  # of the fastest point, c + max |v_i - common_i|
+        ("common", np.float64, (1, 3)),  # velocity that speeds are measured from
+        ("weight", np.float64),  # of what all drift by in that: 1, with which `common` is 0
+        ("speed", np.float64),  # of the point that goes furthest, in cells
         ("new_rate", np.float64),  # of the last sweep
         ("move", np.float64),  # of the point that went furthest in this step, in cells
         ("new_move", np.float64),
@@ -290,6 +293,7 @@ class Control(NamedTuple):
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
     """A control of these published values, its clock at zero, of solids in `d` dimensions."""
     clock = np.zeros(1, CLOCK).view(np.recarray)
+    clock[0].weight = 1.0
     more = (1 + d) * len(firsts)
     totals = np.zeros((len(values) + more, LIMBS), np.int64)
     digits, answer = np.zeros(LIMBS, np.int64), np.zeros(max(16, more))

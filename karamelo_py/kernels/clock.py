@@ -12,6 +12,7 @@ from karamelo_py.kernels.arrays import (
     TIME,
     TIMESTEP,
 )
+from karamelo_py.points.kinematics import vector_at
 
 
 @shared
@@ -41,12 +42,20 @@ def kick(s):
     return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
 
 
+@shared
+def common_velocity(kin, clock, like):
+    """The velocity that speeds are measured from, in the number type of `like`."""
+    return tuple([real(a, like) for a in vector_at(kin, clock.common, 0)])
+
+
 NEXT_TO_NOTHING = 1e-9  # of a step
 ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
 
 # Points that go from cell to cell feed energy to a body, by so much a cell, and the more the longer
 # the step. Until they have gone so far, in cells, a scene takes the steps of bodies at rest.
 STILL = 0.25
+# Where a common drift does not count in the step, none moves a point by more cells.
+STRIDE = 0.65
 
 
 @entered
@@ -60,6 +69,8 @@ def choose_dt(control):
     clock = control.clock[0]
     limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     dt = min(clock.dt_factor * limit, clock.heat_factor * clock.heat_limit)
+    if clock.weight == 0 and clock.speed * dt > STRIDE:
+        dt = STRIDE / clock.speed
     dt = clock.fixed_dt if clock.fixed_dt > 0 else dt
     limit = min(limit, clock.heat_limit)
     clock.limit = limit
@@ -91,6 +102,7 @@ def finish(control):
     clock.drift += clock.move
     clock.path += clock.move
     clock.pace = max(clock.pace, clock.move)
+    clock.speed = clock.move / dt if dt > 0 else 0.0
     clock.move = 0.0
     if clock.path > STILL:
         clock.courant, clock.dt_factor = clock.courant_moving, clock.dt_factor_moving

@@ -258,8 +258,8 @@ def _(task, w, stencil, k, total):
 def settled(task, w, stencil, p, dt, total, totals, fastest):
     """Store what follows from `total`; return how far the point moved in cells, and its rate.
 
-    The rate, c + max |v_i|, bounds the stable step; what is returned is the larger of it and
-    `fastest`, the largest so far. A point that went wrong (det F <= 0, NaN, outside the domain)
+    The rate, c + max |v_i - common_i|, bounds the stable step; what is returned is the larger of it
+    and `fastest`, the largest so far. A point that went wrong (det F <= 0, NaN, outside the domain)
     returns a distance or a rate of NaN or infinity. `totals` are those of all tasks of the visit.
     """
 
@@ -379,7 +379,7 @@ def _strain(w, x, p, dt, gradient, ratio, fastest):
     squared = wave_speed_squared(law, w.kin, state) * inverse_stretch_squared(
         w.frame, w.kin, now, dt
     )
-    speed = largest_component(w.kin, load_vector(w.kin, w.points.v, p))
+    speed = largest_component(w.kin, subtract(load_vector(w.kin, w.points.v, p), w.common))
     slack = fastest - speed
     if in_all((slack >= 0) & (squared <= slack * slack)):  # so written, NaN is noticed too
         return grown, fastest

@@ -15,14 +15,14 @@ from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import loop
 from karamelo_py.compiler.threads import by_team
-from karamelo_py.compiler.tuples import record
+from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import (
     DT,
     TIME,
     NoHooks,
 )
-from karamelo_py.kernels.clock import finish, kick, last_step_size, step_size
+from karamelo_py.kernels.clock import common_velocity, finish, kick, last_step_size, step_size
 from karamelo_py.kernels.g2p import STRAINS
 from karamelo_py.kernels.moments import at_nodes, at_points
 from karamelo_py.kernels.passes import check_moves, sweep
@@ -180,6 +180,7 @@ def _fastest(frame, kin, points, laws, control):
     points, laws = at_hand(points), at_hand(laws)
     clock = control.clock[0]
     rate = 0.0
+    common = common_velocity(kin, clock, clock.rate)
     for p in range(points.mass.size):
         law = record(laws, points.material[p])
         mass = points.mass[p]
@@ -188,7 +189,8 @@ def _fastest(frame, kin, points, laws, control):
         speed = sqrt(
             wave_speed_squared(law, kin, state) * inverse_stretch_squared(frame, kin, f, mass)
         )
-        rate = max(rate, speed + largest_component(kin, load_vector(kin, points.v, p)))
+        v = subtract(load_vector(kin, points.v, p), common)
+        rate = max(rate, speed + largest_component(kin, v))
     clock.rate = max(clock.rate, rate)
 
 

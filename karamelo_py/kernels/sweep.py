@@ -30,6 +30,7 @@ from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Places
+from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
@@ -64,6 +65,7 @@ class Context(NamedTuple):
     buffers: NamedTuple  # nodes that are given to
     now: int
     room: float  # cells that points may still go before their tile's box does not hold them
+    common: tuple  # velocity that speeds are measured from
 
 
 class OldWeights(NamedTuple):
@@ -79,7 +81,7 @@ def work_of(s, grid, nodes, block, places):
     """What a visit of points of a block works with; `nodes` are those of `grid`."""
     return Work(
         s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, nodes, block.points, block.laws,
-        places,
+        places, s.common,
     )  # fmt: skip
 
 
@@ -343,7 +345,7 @@ def sweep_shares(mode, visit, s, block, then, gathers, scatters, dt, first, coun
     room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
     context = Context(
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.buffers.nodes,
-        clock.now, real(room, dt),
+        clock.now, real(room, dt), common_velocity(s.kin, clock, dt),
     )  # fmt: skip
     _visit_all(mode, visit, context, block, then, gathers, scatters, dt, first, count)
 

@@ -33,6 +33,7 @@ class Work(NamedTuple):
     points: NamedTuple
     laws: NamedTuple
     places: NamedTuple
+    common: tuple  # velocity that speeds are measured from
 
 
 @shared

@@ -108,7 +108,8 @@ class Foreseen:
     @cached_property
     def waves(self) -> float:
         """The speed of waves."""
-        return float(self.simulation.control.clock[0].rate) - self.simulation.fastest()
+        clock = self.simulation.control.clock[0]
+        return float(clock.rate) - self.simulation.fastest(clock.common[0])
 
     @cached_property
     def speed(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, ClassVar
 
@@ -18,7 +18,14 @@ from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_
 from karamelo_py.run.lowered import Lowered
 from karamelo_py.run.motion import Motion, motions
 from karamelo_py.run.python_hooks import PythonHooks, sets_initial_state, views_of
-from karamelo_py.run.stable import moves_already, ruling_limit, share_of_heat, step_of_waves
+from karamelo_py.run.stable import (
+    common_velocity,
+    moves_already,
+    ruling_limit,
+    share_of_heat,
+    step_of_waves,
+    weight_of_drift,
+)
 from karamelo_py.run.tiles import in_tiles
 from karamelo_py.run.watch import unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
@@ -103,7 +110,7 @@ class Simulation(Lowered):
         other_end, clock.end_time = clock.end_time != end_time, end_time
         over_limit = clock.over_limit
         if self._ask_for_steps(halvings):
-            choose_dt(self.control)
+            self._choose_dt()
             self._watch_limit()
         elif other_end:
             choose_dt(self.control)
@@ -126,14 +133,30 @@ class Simulation(Lowered):
         numbers = [now[0], moving[0], *(number / 2**halvings for number in asked)]
         for name, number in zip((*courants, *names), numbers, strict=True):
             clock[name] = number
+        weight = weight_of_drift(self.hub)
+        if weight != clock.weight:
+            clock.weight, self._measured = weight, -1
         return numbers != before
 
     def _choose_dt(self) -> None:
         if self._measured != self.version:
             # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
+            clock = self.control.clock[0]
+            clock.common[:] = common_velocity(self, float(clock.weight))
+            clock.speed = self.fastest() / clock.spacing if clock.weight == 0 else 0.0
             self.measure()
             self._measured = self.version
         choose_dt(self.control)
+
+    def rate_with(self, weight: float) -> float:
+        """The rate of the fastest point, if the common drift of all had this weight."""
+        clock = self.control.clock[0]
+        common, rate = clock.common.copy(), float(clock.rate)
+        clock.common[:] = common_velocity(self, weight)
+        self.measure()
+        found = float(clock.rate)
+        clock.common[:], clock.rate = common, rate
+        return found
 
     def measure(self) -> None:
         """Measure the rate of the fastest point."""
@@ -141,11 +164,12 @@ class Simulation(Lowered):
         clock = self.control.clock[0]
         clock.rate = self.most(np.array([clock.rate]))[0]
 
-    def fastest(self) -> float:
-        """The largest component of the velocities of all points."""
+    def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
+        """The largest component of the velocities of all points, less that of a common one."""
         velocities = (block.points.v for block in self.stepped.blocks)
         # No copy of them: there may be millions.
-        own = max((max(v.max(initial=0), -v.min(initial=0)) for v in velocities), default=0.0)
+        components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
+        own = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
         return float(self.most(np.array([own], float))[0])
 
     def motions(self) -> list[Motion]:

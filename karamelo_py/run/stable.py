@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.arrays import DT
-from karamelo_py.kernels.clock import STILL
+from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.points.laws import Absent, initial_state, wave_speed_squared
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.hub import Hub
 
 USUAL = 0.9
+BOXES = 6.0  # weight of a common drift in the steps of boxes
 LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
 DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
 
@@ -40,12 +41,85 @@ def keeping_share(hub: Hub) -> float:
     alpha = getattr(update.transfer, "alpha", 0.0)
     if not update.method.frame.moves or not alpha > 0.9:
         return USUAL
-    jumps = getattr(update.method.basis, "gradient_jumps", False)
-    keeping = getattr(update.scheme, "keeping", ((USUAL, USUAL), (USUAL, USUAL)))
-    share = keeping[jumps][sparse(hub)]
+    basis = update.method.basis
+    kind = getattr(basis, "gradient_jumps", False) * basis.nodes_per_cell
+    keeping = getattr(update.scheme, "keeping", ((USUAL, USUAL),) * 3)
+    share = keeping[kind][sparse(hub)]
     if alpha > 0.99:
         return share
     return max(share, DAMPED) if sparse(hub) else USUAL
+
+
+def _keeps_velocities(hub: Hub) -> bool:
+    """Whether points of FLIP and its kin move through the grid, without moments and usl."""
+    update = hub.update
+    return (
+        update.method.frame.moves
+        and getattr(update.transfer, "alpha", 0.0) > 0.9
+        and Moment not in getattr(update.transfer, "point_fields", ())
+        and min(getattr(update.scheme, "courant", (1.0,))) >= 1
+    )
+
+
+def bears_drift(hub: Hub) -> bool:
+    """Whether a body that drifts bears the steps of one at rest, and keeps its energy with them.
+
+    With cubic splines next to no energy comes from the places in the cells; usavg feeds none with
+    functions that are smooth (50 periods at 0.05 to 0.5 of the speed of waves).
+    """
+    basis, scheme = hub.update.method.basis, hub.update.scheme
+    return (
+        _keeps_velocities(hub)
+        and not getattr(basis, "gradient_jumps", False)
+        and (getattr(basis, "bears_drift", False) or getattr(scheme, "bears_drift", False))
+        and keeping_share(hub) == USUAL
+    )
+
+
+def own_weight_of_drift(hub: Hub) -> float:
+    """How much of the common velocity of all counts in the step that the program takes of itself.
+
+    1 as in the rule of the language, h/(c + |v|). What drifts by boxes (ugimp, cpgimp), two and
+    more a cell, gains the more the faster it is: by edges of shaken bars and blocks at 0.05 to 0.5
+    of the speed of waves.
+    """
+    if bears_drift(hub):
+        return 0.0
+    basis = hub.update.method.basis
+    boxes = getattr(basis, "steep_edge", False) and basis.cells > 1
+    fed = boxes and _keeps_velocities(hub) and not getattr(hub.update.scheme, "bears_drift", False)
+    return BOXES if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
+
+
+def weight_of_drift(hub: Hub) -> float:
+    """The same where the script may ask for steps, which are shares of h/(c + |v|)."""
+    own = hub.update.dt_factor is None and hub.update.fixed_dt is None
+    return own_weight_of_drift(hub) if own else 1.0
+
+
+def common_velocity(simulation: Any, weight: float) -> np.ndarray:
+    """(3,) The velocity that speeds are measured from so that the common drift has this weight."""
+    if weight == 1:
+        return np.zeros(3)
+    motions = simulation.motions()
+    mass = sum(one.mass for one in motions)
+    common = np.zeros(3)
+    if mass > 0:
+        common[: simulation.kin.dimension] = sum(one.mass * one.velocity for one in motions) / mass
+    return (1 - weight) * common
+
+
+def courant_number(hub: Hub, *, longer: bool) -> float:
+    """The stable step over h/c; `longer` is that of points which stay where they are."""
+    scheme, method = hub.update.scheme, hub.update.method
+    two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
+    if min(two, one) < 1:
+        # Nodes between the corners of cells make the highest frequency higher.
+        nodes = 0.7 if method.basis.nodes_per_cell > 1 else 1
+        return (one if sparse(hub) else two) * nodes
+    if not method.frame.moves:
+        return getattr(method.basis, "courant_total", 1.0)
+    return getattr(method.basis, "courant_still", 1.0) if longer else 1.0
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
@@ -54,21 +128,13 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     `still`: while no point has gone as far as `STILL`. The stable step is that of scheme, basis and
     points a cell.
     """
-    scheme, method, update = hub.update.scheme, hub.update.method, hub.update
-    share = keeping_share(hub)
+    method, share = hub.update.method, keeping_share(hub)
     # Transfers of moments bear 1.3 h/c with quadratic splines, 1.5 with cubic ones.
-    still &= method.frame.moves and Moment not in getattr(update.transfer, "point_fields", ())
+    still &= method.frame.moves and Moment not in getattr(hub.update.transfer, "point_fields", ())
     if still:
         # A lone point of linear functions is stable up to 0.8 h/c in space.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
-    two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
-    if min(two, one) < 1:
-        # Nodes between the corners of cells make the highest frequency higher.
-        nodes = 0.7 if method.basis.nodes_per_cell > 1 else 1
-        return (one if sparse(hub) else two) * nodes, share
-    if not method.frame.moves:
-        return getattr(method.basis, "courant_total", 1.0), share
-    return getattr(method.basis, "courant_still", 1.0) if still else 1.0, share
+    return courant_number(hub, longer=still or bears_drift(hub)), share
 
 
 def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
@@ -76,8 +142,7 @@ def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     update = hub.update
     if update.dt_factor is None and update.fixed_dt is None:
         return own_step_of_waves(hub, still=still)
-    courant, share = own_step_of_waves(hub, still=False)
-    return courant, update.dt_factor or share
+    return courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
 
 
 def share_of_heat(hub: Hub) -> float:
@@ -95,8 +160,12 @@ def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
     """The step that the program would take of itself now: at rest, or had points moved."""
     clock = simulation.control.clock[0]
     courant, share = own_step_of_waves(hub, still=still)
-    limit = courant * clock.spacing / clock.rate if clock.rate > 0 else inf
-    return float(min(share * limit, USUAL * clock.heat_limit))
+    weight = own_weight_of_drift(hub)
+    rate = clock.rate if weight == clock.weight else simulation.rate_with(weight)
+    limit = courant * clock.spacing / rate if rate > 0 else inf
+    step = min(share * limit, USUAL * clock.heat_limit)
+    speed = simulation.fastest() if weight == 0 else 0.0
+    return float(min(step, STRIDE * clock.spacing / speed) if speed > 0 else step)
 
 
 def what_follows(hub: Hub, simulation: Any, step: float) -> str:
@@ -168,11 +237,13 @@ def ruling_limit(simulation: Any) -> str:
         return "set_dt"
     waves = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     of_waves, of_heat = clock.dt_factor * waves, clock.heat_factor * clock.heat_limit
+    if clock.weight == 0 and clock.speed * control.values[DT] * (1 + 1e-9) >= STRIDE:
+        return "speed"
     if control.values[DT] < min(of_waves, of_heat) * (1 - 1e-9):
         return "end"
     if of_heat < of_waves:
         return "conduction"
-    speed = simulation.fastest()
+    speed = simulation.fastest(clock.common[0])
     if speed > 0.5 * clock.rate:
         return "speed"
     without = _speed_without_viscosity(simulation)

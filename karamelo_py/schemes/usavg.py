@@ -37,7 +37,8 @@ class USAVG(NamedTuple):
     """
 
     courant = (1.0, 1.0)
-    keeping = ((0.9, 0.9), (0.9, 0.5))  # as in musl
+    keeping = ((0.9, 0.9), (0.9, 0.5), (0.45, 0.45))  # as in musl
+    bears_drift = True
     strained_before = 0.5
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),

@@ -34,7 +34,7 @@ class USF(NamedTuple):
     """
 
     courant = (1.0, 1.0)
-    keeping = ((0.9, 0.6), (0.4, 0.2))  # as in musl
+    keeping = ((0.9, 0.6), (0.4, 0.2), (0.2, 0.2))  # as in musl
     strained_before = 1.0
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),

@@ -31,6 +31,7 @@ class CubicSpline(NamedTuple):
     # a free block: 1.9 to 2.7, 1.84 to 2.6 and 1.46 to 2.7, over places, distances, walls, ratios
     # up to 0.49.
     courant_still = 1.4
+    bears_drift = True
 
 
 @along.on(CubicSpline)
