@@ -289,6 +289,14 @@ def largest(a: float) -> float:
 of_numbers(largest)(lambda a: lambda a: a)
 
 
+def added(total: float, value: float) -> float:
+    """`total` + `value`, which may be in lanes: one after another, as numbers would be added."""
+    return total + value
+
+
+of_numbers(added)(lambda total, value: lambda total, value: total + value)
+
+
 def first_failing(condition: bool) -> int:
     """The first lane in which a condition does not hold; 0 where there are none."""
     return 0

@@ -146,7 +146,7 @@ def run_steps(scheme, visits, mode, s, hooks, count):
         if not step(scheme, visits, mode, s, hooks, not last):
             return STOPPED
         finish(s.control)
-        if not look(s):
+        if not look(s, mode):
             return GAINED
         if not look_at_heat(s):
             return HEATED

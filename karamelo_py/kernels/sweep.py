@@ -156,11 +156,26 @@ def _in_lanes(visit, s, block):
     of_scene = (s[s.fields.index(name)] for name in ("basis", "transfer", "averaging"))
     law = block[block.fields.index("laws")]
     parts = {part.instance_class for part in (*tasks, *quantities, *of_scene)}
-    parts.update(classes_in(law))
-    if not all(getattr(part, "in_lanes", False) for part in parts):
-        return lambda visit, s, block: OneByOne()
-    made = lanes_for(block[0][block[0].fields.index("mass")].dtype.bitwidth)
+    made = _lanes_if_known(parts, law, block[0][block[0].fields.index("mass")])
     return lambda visit, s, block: made()
+
+
+def _lanes_if_known(parts, laws, mass):
+    """The lanes for points of such `mass`, or none where a part does not know them."""
+    if all(getattr(part, "in_lanes", False) for part in (*parts, *classes_in(laws))):
+        return lanes_for(mass.dtype.bitwidth)
+    return OneByOne
+
+
+def lanes_of_law(laws, mass):
+    """The same as `in_lanes`, where only a law is asked."""
+    return OneByOne()
+
+
+@by_type(lanes_of_law)
+def _lanes_of_law(laws, mass):
+    made = _lanes_if_known((), laws, mass)
+    return lambda laws, mass: made()
 
 
 def width_of(width):

@@ -15,11 +15,14 @@ from math import inf
 
 import numpy as np
 
-from karamelo_py.compiler.compile import over_blocks, shared
+from karamelo_py.compiler.compile import added, index, of_present, over_blocks, real, shared
 from karamelo_py.compiler.fields import load, load_vector
+from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import TIMESTEP
+from karamelo_py.kernels.sweep import lanes_of_law, points_from, width_of
 from karamelo_py.kernels.totals import KINETIC, STORED, WORK, add_to, agree_on_heat, collect
 from karamelo_py.points.kinematics import dimension, free_from
 from karamelo_py.points.laws import (
@@ -46,28 +49,47 @@ OVERSHOOT = 0.1  # of the range of temperatures that sources allow: more stops t
 BORNE = 4.0
 
 
-@entered
-def _sum_energies(kin, points, laws, tiling, control):
-    for t in range(tiling.count[0]):
-        kinetic = 0.0
-        stored = 0.0
-        for p in range(tiling.range[t, 0], tiling.range[t, 1]):
-            law = record(laws, points.material[p])
-            mass = points.mass[p]
+@shared
+def _squared(v):
+    return sum([real(x, 0.0) * real(x, 0.0) for x in v])
+
+
+@subkernel
+def _energies_of_share(kin, points, laws, tiling, k):
+    """Kinetic and stored energy of the points of each tile of the k-th share, for its report."""
+    points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
+    width = lanes_of_law(laws, points.mass)
+    for place in range(tiling.share[k], tiling.share[k + 1]):
+        t = tiling.order[place]
+        kinetic = stored = 0.0
+        end = tiling.range[t, 1]
+        for q in range(tiling.range[t, 0], end, width_of(width)):
+            p = points_from(width, q, end)
+            law = record(laws, index(points.material[p]))
+            mass = of_present(p, points.mass[p])
             state = load(points.state, p, initial_state(law, kin, mass))
-            v = load_vector(kin, points.v, p)
-            squared = 0.0
-            for k in range(dimension(kin)):
-                squared += float(v[k]) * float(v[k])
-            kinetic += 0.5 * float(mass) * squared
+            squared = _squared(load_vector(kin, points.v, p))
+            kinetic = added(kinetic, 0.5 * real(mass, 0.0) * squared)
             energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
-            stored += float(mass) * float(specific_volume(law)) * float(energy)
-        add_to(control.totals, KINETIC, kinetic)
-        add_to(control.totals, STORED, stored)
+            volume = real(mass, 0.0) * real(specific_volume(law), 0.0)
+            stored = added(stored, volume * real(energy, 0.0))
+        tiling.report[t, 3] = kinetic
+        tiling.report[t, 4] = stored
 
 
-def _sum(block, s):
-    _sum_energies(s.kin, block.points, block.laws, block.tiling, s.control)
+_energies_of_shares = shared_out(_energies_of_share, "kin, points, laws, tiling")
+
+
+@entered
+def _sum_energies(mode, kin, points, laws, tiling, control):
+    _energies_of_shares(mode, tiling.count[1], kin, points, laws, tiling)
+    for t in range(tiling.count[0]):
+        add_to(control.totals, KINETIC, tiling.report[t, 3])
+        add_to(control.totals, STORED, tiling.report[t, 4])
+
+
+def _sum(block, s, mode):
+    _sum_energies(mode, s.kin, block.points, block.laws, block.tiling, s.control)
 
 
 _sum_blocks = over_blocks(_sum)
@@ -88,10 +110,10 @@ def _take_sums(control):
 
 
 @shared
-def sum_energies(s):
+def sum_energies(s, mode):
     """Energies of all points, kinetic and stored plus dissipated, and the work into the clock."""
     _clear(s.control)
-    _sum_blocks(s)
+    _sum_blocks(s, mode)
     collect(s.control.ranks, s.control, KINETIC, 3)
     _take_sums(s.control)
 
@@ -157,9 +179,9 @@ def _sum_drift(s):
 
 
 @shared
-def _sum_before(s, step):
+def _sum_before(s, mode, step):
     """The energies of a step whose next is looked at."""
-    sum_energies(s)
+    sum_energies(s, mode)
     clock = s.control.clock[0]
     clock.stored_before = clock.stored
     clock.stored_at = step
@@ -252,7 +274,7 @@ def look_at_heat(s):
 
 
 @shared
-def begin_to_look(s, level, anew):
+def begin_to_look(s, mode, level, anew):
     """Before a run: the stored energy of the present state, where a look is due after a step.
 
     `level` is the share of a stored energy in that of the velocities' time. With `anew` the balance
@@ -267,20 +289,20 @@ def begin_to_look(s, level, anew):
         clock.sum_of_balance = clock.largest_energy = clock.largest_own = 0.0
     step = int(s.control.values[TIMESTEP])
     if step % LOOK == 0 and (anew or clock.stored_at != step):
-        _sum_before(s, step)
+        _sum_before(s, mode, step)
 
 
 @shared
-def look(s):
+def look(s, mode):
     """Look at the energy where it is due; whether it keeps within its bound."""
     clock = s.control.clock[0]
     if clock.watch_energy == 0:
         return True
     step = int(s.control.values[TIMESTEP])
     if step % LOOK == 0:
-        _sum_before(s, step)
+        _sum_before(s, mode, step)
     elif step % LOOK == 1 and clock.stored_at == step - 1:
-        sum_energies(s)
+        sum_energies(s, mode)
         _sum_drift(s)
         return judge(s.control)
     return True

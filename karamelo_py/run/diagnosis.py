@@ -123,7 +123,7 @@ def _energy(simulation: Simulation) -> float:
     if not (clock[0].watch_energy and covered):
         return nan
     present = clock.copy()
-    sum_energies(s)
+    sum_energies(s, simulation.mode)
     energy = float(clock[0].kinetic + clock[0].stored - clock[0].work)
     clock[:] = present
     return energy

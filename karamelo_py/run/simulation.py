@@ -232,7 +232,7 @@ class Simulation(Lowered):
         if any(in_tiles(block.tiling) != block.points.mass.size for block in s.blocks):
             self.sort()
             self.mapped = False
-        begin_to_look(s, level, anew)
+        begin_to_look(s, self.mode, level, anew)
 
     def measure_heat(self) -> None:
         """Measure the lowest and highest temperatures of all points."""

@@ -14,6 +14,7 @@ from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import (
+    added,
     by_type,
     define,
     first_failing,
@@ -153,7 +154,19 @@ def _first(typing_context, a):
     return a.scalar(a), codegen
 
 
+@intrinsic
+def _added_lanes(typing_context, total, a):
+    def codegen(context, builder, sig, arguments):
+        sum_so_far, values = arguments
+        for k in range(a.width):
+            sum_so_far = builder.fadd(sum_so_far, lane(builder, values, k))
+        return sum_so_far
+
+    return total(total, a), codegen
+
+
 known(largest, _largest_lane)
+known(added, _added_lanes)
 known(first_failing, _first_false)
 known(first_lane, _first)
 
