@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +40,8 @@ DRIFT = 1.0  # cells that points may go at most before they are sorted again
 # the same nodes; in the plane that brings less than it costs to sort.
 LEAST_DRIFT = {1: DRIFT, 2: DRIFT, 3: 0.25}
 STEPS = 32  # that are to be between two sorts where points may go further for that
+# The same where points give straight to the nodes: it costs only that more nodes are in use.
+DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Boxes(NamedTuple):
@@ -147,9 +150,9 @@ class Tiles:
         """What points gave to the nodes in use becomes zero."""
         of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
         arrays = [array for nodes in of for array in summed(nodes)]
-        nodes = numbers(s.spans)
-        for array in arrays:
-            array[nodes] = 0
+        for begin, end in used(s.spans)[1:].tolist():
+            for array in arrays:
+                array[begin:end] = 0
         if not self.direct:
             for one in buffers_of(s):
                 for array in summed(one.nodes):
@@ -159,11 +162,12 @@ class Tiles:
         """Sort all points by tile and find the nodes in use; all sums at nodes are zero then."""
         self.empty_nodes(s)
         clock = s.control.clock[0]
-        limit = min(max(LEAST_DRIFT[self.dimension], STEPS * clock.pace), DRIFT)
+        most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (DRIFT, STEPS)
+        limit = min(max(LEAST_DRIFT[self.dimension], steps * clock.pace), most)
         clock.drift_limit = limit if s.frame.moves else np.inf
         clock.drift = clock.pace = 0.0
         occupied = [self._sort_block(s, block) for block in s.blocks]
-        self.occupied = len(np.unique(np.concatenate(occupied)))
+        self.occupied = len(set().union(*(tiles.tolist() for tiles in occupied)))
         self.lay_out(s)
         self.sorts += 1
 
@@ -215,13 +219,13 @@ class Tiles:
         del tile, scratch, bins  # their memory is needed again at once
         for _, array in arrays_of(points):
             # Component by component: a copy of a whole field would be the peak of the set-up.
-            for k in np.ndindex(array.shape[:-1]):
+            for k in product(*map(range, array.shape[:-1])):
                 array[k] = array[k][order]
         top, least = self._nodes[grid] - 1, self.least_nodes - 1
         # Cells at a wall see as many nodes as others: those further inside.
-        first, last = (np.floor(b) for b in (boxes[0] - reach, boxes[1] + reach))
-        first = np.clip(first, 0, self._cells[grid] - 1).astype(np.int64)
-        last = np.clip(last, 0, self._cells[grid] - 1).astype(np.int64)
+        boxes[0] -= reach
+        boxes[1] += reach
+        first, last = np.clip(np.floor(boxes), 0, self._cells[grid] - 1).astype(np.int64)
         lo = first * self.per_cell - self.beyond
         hi = (last + 1) * self.per_cell + self.beyond
         tiling.box[:count, : self.dimension] = np.clip(lo, 0, top - least)
@@ -239,6 +243,35 @@ class Tiles:
 
         Everything follows from the boxes of the tiles.
         """
+        if self.direct:
+            spans, firsts, parts = self._rows_to_clear(s)
+        else:
+            spans, firsts, parts = self._parts_to_sum(s)
+        grow(s.spans, 1 + len(spans))
+        s.spans[0, 0] = len(spans)
+        s.spans[1 : 1 + len(spans)] = spans
+        count, *rooms = s.buffers[1:4]
+        count[:] = len(firsts) - 1, self.direct
+        for room, found in zip(rooms, (firsts, parts), strict=True):
+            grow(room, len(found))
+            room[: len(found)] = found
+
+    def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
+        """Spans of the nodes in the boxes; a part for each, the first parts, where they are direct.
+
+        Boxes have the numbers of the grids.
+        """
+        boxes = Tiles._boxes(self, s)
+        steps = self._steps[boxes.grid]
+        self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
+        spans = _spans(self._parts(boxes.grid, boxes.lo, boxes.hi, 0, steps))
+        parts = np.ones((len(spans), 10), np.int64)
+        parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
+        parts[:, 9] = CLEAR
+        return spans, np.arange(len(spans) + 1), parts
+
+    def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
+        """Spans of the nodes in tiles that boxes reach; the parts, and the first of each tile."""
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
         # The largest part first: mostly it has all the nodes that others reach.
@@ -252,23 +285,9 @@ class Tiles:
         parts[:, 9] = ADD
         parts[starts[~more], 9] = TAKE
         own = self._parts(grid[starts], own_begin, own_end, 0, 0)
-        spans = _spans(own)
         parts = np.insert(parts, starts[more], own[more], axis=0)
-        firsts = np.append(starts + np.cumsum(more) - more, len(parts))
-        grow(s.spans, 1 + len(spans))
-        s.spans[0, 0] = len(spans)
-        s.spans[1 : 1 + len(spans)] = spans
-        if self.direct:
-            parts = np.ones((len(spans), 10), np.int64)
-            parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
-            parts[:, 9] = CLEAR
-            firsts = np.arange(len(spans) + 1)
-        count, *rooms = s.buffers[1:4]
-        count[:] = len(firsts) - 1, self.direct
-        for room, found in zip(rooms, (firsts, parts), strict=True):
-            grow(room, len(found))
-            room[: len(found)] = found
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
+        return _spans(own), np.append(starts + np.cumsum(more) - more, len(parts)), parts
 
     def spans_of(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
         """(k, 2) spans of nodes in use, from boxes of them (n, d) in tiles of nodes (n,)."""
@@ -299,23 +318,24 @@ class Tiles:
 
     def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
         """Give each box its rows of the buffers: its number of node 0, and steps (k, d)."""
-        steps = self._steps[boxes.grid] if self.direct else steps_of(boxes.hi - boxes.lo + 1)
+        steps = steps_of(boxes.hi - boxes.lo + 1)
         ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
         begins = np.concatenate([[0], ends])[:-1]
         first = begins - (boxes.lo * steps).sum(axis=1)
-        if self.direct:
-            begins = ends = np.zeros_like(ends)
-            first = self._first_node[boxes.grid]
+        self._tell_buffers(s, begins, ends, first, steps)
+        self._make_room(s, int(ends[-1]) if len(ends) else 0)
+        return first, steps
+
+    def _tell_buffers(self, s: Setup, begins, ends, first, steps) -> None:
+        """Tell the tiles of all blocks where in the buffers their boxes are; see `Tiling`."""
         columns = np.zeros((len(first), 5), np.int64)
-        columns[:, :3] = np.stack([begins, ends, first], axis=1)
+        columns[:, 0], columns[:, 1], columns[:, 2] = begins, ends, first
         columns[:, 3 : 2 + self.dimension] = steps[:, :-1]
         done = 0
         for block in s.blocks:
             count = block.tiling.count[0]
             block.tiling.buffer[:count] = columns[done : done + count]
             done += count
-        self._make_room(s, int(ends[-1]) if len(ends) else 0)
-        return first, steps
 
     def _make_room(self, s: Setup, rows: int) -> None:
         """Make the buffers as large as the boxes of all tiles need."""
@@ -354,11 +374,11 @@ def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.
 
 
 def _spans(boxes: np.ndarray) -> np.ndarray:
-    """(k, 2) the rows of boxes of nodes (see `Buffers`), joined where one ends at another."""
+    """(k, 2) the rows of boxes of nodes (see `Buffers`), joined where they meet."""
     begin, end = rows_of(boxes)
     order = np.argsort(begin, kind="stable")
-    begin, end = begin[order], end[order]
-    apart = begin[1:] != end[:-1]
+    begin, end = begin[order], np.maximum.accumulate(end[order])
+    apart = begin[1:] > end[:-1]
     begin, end = np.append(begin[:1], begin[1:][apart]), np.append(end[:-1][apart], end[-1:])
     of, left = ragged(-(-(end - begin) // SPAN))
     begin = begin[of] + left * SPAN
@@ -383,10 +403,11 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
     """(size,) where shares of tiles with these points (T, 2) begin, nearly equal, and the end."""
     out = np.zeros(size, np.int64)
-    # Where the sum of the points is nearest to equal parts.
-    parts = np.arange(1, shares) * ranges[:, 1].max(initial=0) / shares
-    out[1:shares] = np.searchsorted(ranges.sum(axis=1) / 2, parts)
     out[shares] = len(ranges)
+    if shares > 1:
+        # Where the sum of the points is nearest to equal parts.
+        parts = np.arange(1, shares) * ranges[:, 1].max(initial=0) / shares
+        out[1:shares] = np.searchsorted(ranges.sum(axis=1) / 2, parts)
     return out
 
 
