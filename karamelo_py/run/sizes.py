@@ -14,7 +14,10 @@ THERE = 1  # bytes of each point of the whole scene: whether it was deleted
 
 
 class Memory(NamedTuple):
-    """Bytes that are touched by the steps, and of a copy of the last good state."""
+    """Bytes that are touched by the steps, and of a copy of the last good state.
+
+    Of places, the copy has only those of the present.
+    """
 
     touched: int
     copied: int
@@ -26,14 +29,14 @@ def memory_of(simulation: Any, s: Setup, boxes: int) -> Memory:
     Places before the first step and members of groups, where fixes act on points by them, and
     whether points are there, are known of the whole scene.
     """
-    points = sum(
-        sum(size for *_, size in point_fields(b)) * int(occupied(b.tiling)[1].sum())
-        for b in s.blocks
-    )
+    counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
+    of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
+    points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
+    moved = sum(of["x moved"] * n for of, n in zip(of_point, counts, strict=True))
     nodes = sum(array.itemsize * array.shape[1] for _, array in node_fields(simulation.setup))
     hooks = sum(getattr(simulation.hooks, name, np.empty(0)).nbytes for name in ("x0", "members"))
     whole = THERE * simulation.count + hooks
-    return Memory(points + whole + nodes * nodes_in_use(s) + boxes, points)
+    return Memory(points + whole + nodes * nodes_in_use(s) + boxes, points - moved)
 
 
 def nodes_in_use(s: Setup) -> int:

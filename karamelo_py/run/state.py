@@ -30,8 +30,10 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
     yield "clock", s.control.clock
     yield "work", s.control.totals[WORK]
     for k, block in enumerate(s.blocks):
+        now = s.control.clock[0].now  # known once the clock is put back
         for name, array in arrays_of(block.points):
-            yield f"points/{k}/{name}", array
+            # The other places are those of the step before, and of none that went wrong.
+            yield f"points/{k}/{name}", array[now] if name == "x" else array
     for k, rows in enumerate(remembered_at(simulation, used(s.spans)[1:])):
         yield f"contact/{k}", rows
 
@@ -42,6 +44,7 @@ def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
     carry(s.control.totals[WORK])  # so that a sum is always the same digits
     found = {name: a for name, a in changing(simulation) if not name.startswith("contact/")}
     found["clock"] = s.control.clock.view(np.ndarray)
+    found |= {f"points/{k}/x": block.points.x for k, block in enumerate(s.blocks)}
     if memory := remembered_at(simulation, used(s.spans)[1:]):
         found["contact"] = latest(np.concatenate(memory), simulation.step)
     found |= known(simulation)
@@ -134,12 +137,17 @@ def go_back(simulation: Any, kept: Mapping[str, np.ndarray]) -> None:
         stem = f"points/{k}/"
         points, tiling = block.points, take_tiling(block.tiling, kept, f"tiling/{k}/")
         if points.mass.size != kept[stem + "mass"].size:
-            points = take_points(points, {n: array.copy() for n, array in kept.items()}, stem)
+            again = {n: np.copy(a) for n, a in kept.items()} | {
+                stem + "x": np.stack([kept[stem + "x"]] * 2)
+            }
+            points = take_points(points, again, stem)
         blocks.append(block._replace(points=points, tiling=tiling))
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
         array[...] = kept[name]
+    for block in s.blocks:
+        block.points.x[1 - s.control.clock[0].now] = block.points.x[s.control.clock[0].now]
     values = s.control.values
     values[:] = kept["values"]
     for marks in remembered_at(simulation, spans):
