@@ -103,8 +103,9 @@ class Tiling(NamedTuple):
     box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes that its points may reach
     buffer: np.ndarray  # (T + 1, 5) int64: its records in the buffers begin and end; Grid.first,
     #                     step_x and step_y of the numbers that its nodes have there
-    report: np.ndarray  # (T + 1, 5): largest move, largest rate, offending point + 1 of each tile;
-    #                     kinetic and stored energy of its points when they were looked at
+    report: np.ndarray  # (T + 1, 10): largest move, largest rate, offending point + 1 of each tile;
+    #                     when its points were looked at, their kinetic and stored energy, the
+    #                     number of their solid (-1: of several), their mass and momentum
 
 
 CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts

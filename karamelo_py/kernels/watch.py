@@ -15,7 +15,15 @@ from math import inf
 
 import numpy as np
 
-from karamelo_py.compiler.compile import added, index, of_present, over_blocks, real, shared
+from karamelo_py.compiler.compile import (
+    added,
+    in_all,
+    index,
+    of_present,
+    over_blocks,
+    real,
+    shared,
+)
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel
@@ -42,6 +50,7 @@ BOUND = 10.0  # times the energy that there was and that loads have brought: mor
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
 COARSE = 1000.0  # round-off errors: a strain of so many is noise, too
 LAST = 2**62  # no id of a point is so large
+ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
 HEAT_NOISE = 1e-4  # of a temperature: what does not count where all are alike
 OVERSHOOT = 0.1  # of the range of temperatures that sources allow: more stops the run
 # Steps so many times the stable one of conduction are borne: what nodes do not show of the points'
@@ -54,38 +63,65 @@ def _squared(v):
     return sum([real(x, 0.0) * real(x, 0.0) for x in v])
 
 
+@shared
+def _nothing(kin):
+    """No mass and no momentum."""
+    return (0.0,) * (1 + kin.dimension)
+
+
+@shared
+def _carried(total, mass, v):
+    """Mass and momentum with those of more points."""
+    more = (mass, *[mass * real(x, 0.0) for x in v])
+    return tuple([added(part, x) for part, x in zip(total, more, strict=True)])
+
+
+@shared
+def _note(report, t, total):
+    for k, part in enumerate(total):
+        report[t, OF_SOLID + 1 + k] = part
+
+
 @subkernel
-def _energies_of_share(kin, points, laws, tiling, k):
-    """Kinetic and stored energy of the points of each tile of the k-th share, for its report."""
+def _look_at_share(kin, points, laws, tiling, firsts, k):
+    """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
     width = lanes_of_law(laws, points.mass)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
+        start, end = tiling.range[t, 0], tiling.range[t, 1]
+        solid = np.searchsorted(firsts, points.id[start], side="right") - 1
+        begin, behind = firsts[solid], _behind(firsts, solid)
         kinetic = stored = 0.0
-        end = tiling.range[t, 1]
-        for q in range(tiling.range[t, 0], end, width_of(width)):
+        total = _nothing(kin)
+        for q in range(start, end, width_of(width)):
             p = points_from(width, q, end)
             law = record(laws, index(points.material[p]))
-            mass = of_present(p, points.mass[p])
-            state = load(points.state, p, initial_state(law, kin, mass))
-            squared = _squared(load_vector(kin, points.v, p))
-            kinetic = added(kinetic, 0.5 * real(mass, 0.0) * squared)
+            own = of_present(p, points.mass[p])
+            state = load(points.state, p, initial_state(law, kin, own))
+            v = load_vector(kin, points.v, p)
+            mass = real(own, 0.0)
+            kinetic = added(kinetic, 0.5 * mass * _squared(v))
             energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
-            volume = real(mass, 0.0) * real(specific_volume(law), 0.0)
-            stored = added(stored, volume * real(energy, 0.0))
-        tiling.report[t, 3] = kinetic
-        tiling.report[t, 4] = stored
+            stored = added(stored, mass * real(specific_volume(law), 0.0) * real(energy, 0.0))
+            total = _carried(total, mass, v)
+            if not in_all((points.id[p] >= begin) & (points.id[p] < behind)):
+                solid = -1
+        tiling.report[t, ENERGIES] = kinetic
+        tiling.report[t, ENERGIES + 1] = stored
+        tiling.report[t, OF_SOLID] = solid
+        _note(tiling.report, t, total)
 
 
-_energies_of_shares = shared_out(_energies_of_share, "kin, points, laws, tiling")
+_look_at_shares = shared_out(_look_at_share, "kin, points, laws, tiling, firsts")
 
 
 @entered
 def _sum_energies(mode, kin, points, laws, tiling, control):
-    _energies_of_shares(mode, tiling.count[1], kin, points, laws, tiling)
+    _look_at_shares(mode, tiling.count[1], kin, points, laws, tiling, control.firsts)
     for t in range(tiling.count[0]):
-        add_to(control.totals, KINETIC, tiling.report[t, 3])
-        add_to(control.totals, STORED, tiling.report[t, 4])
+        add_to(control.totals, KINETIC, tiling.report[t, ENERGIES])
+        add_to(control.totals, STORED, tiling.report[t, ENERGIES + 1])
 
 
 def _sum(block, s, mode):
@@ -122,24 +158,34 @@ def sum_energies(s, mode):
 def _add_momenta(kin, points, tiling, control):
     """Mass and momentum of each solid, to the totals behind those of the published values."""
     firsts, sums, d = control.firsts, control.answer, dimension(kin)
-    row, begin, end = control.values.size, 0, 0
-    sums[: 1 + d] = 0
     for t in range(tiling.count[0]):
-        for p in range(tiling.range[t, 0], tiling.range[t, 1]):
-            if not begin <= points.id[p] < end:
-                _add_momentum(control, row, d)
-                k = np.searchsorted(firsts, points.id[p], side="right")
-                row = control.values.size + (k - 1) * (1 + d)
-                begin, end = firsts[k - 1], firsts[k] if k < firsts.size else LAST
-            mass = float(points.mass[p])
-            sums[0] += mass
-            for k in range(d):
-                sums[1 + k] += mass * float(points.v[k, p])
-        _add_momentum(control, row, d)
+        solid = int(tiling.report[t, OF_SOLID])
+        if solid >= 0:
+            for k in range(1 + d):
+                sums[k] = tiling.report[t, OF_SOLID + 1 + k]
+        else:
+            sums[: 1 + d] = begin = end = 0
+            for p in range(tiling.range[t, 0], tiling.range[t, 1]):
+                if not begin <= points.id[p] < end:
+                    _add_momentum(control, solid, d)
+                    solid = np.searchsorted(firsts, points.id[p], side="right") - 1
+                    begin, end = firsts[solid], _behind(firsts, solid)
+                mass = float(points.mass[p])
+                sums[0] += mass
+                for k in range(d):
+                    sums[1 + k] += mass * float(points.v[k, p])
+        _add_momentum(control, solid, d)
+
+
+@shared
+def _behind(firsts, solid):
+    """The id behind those of the points of a solid."""
+    return firsts[solid + 1] if solid + 1 < firsts.size else LAST
 
 
 @subkernel
-def _add_momentum(control, row, d):
+def _add_momentum(control, solid, d):
+    row = control.values.size + solid * (1 + d)
     for k in range(1 + d):
         add_to(control.totals, row + k, control.answer[k])
         control.answer[k] = 0
@@ -170,7 +216,7 @@ def _take_drift(kin, control):
 
 @shared
 def _sum_drift(s):
-    """Kinetic energy of the centres of mass of the solids, into the clock."""
+    """Kinetic energy of the centres of mass of the solids, into the clock; after `sum_energies`."""
     _clear_momenta(s.control)
     _add_blocks(s)
     own = s.control.values.size

@@ -118,7 +118,7 @@ class Tiles:
             number=np.zeros(self.count + 1, np.int64),
             box=np.zeros((self.count + 1, 2 * self.dimension), np.int64),
             buffer=np.zeros((self.count + 1, 5), np.int64),
-            report=np.zeros((self.count + 1, 5)),
+            report=np.zeros((self.count + 1, 10)),
         )
 
     def empty_buffers(self, nodes: Nodes) -> Buffers:
