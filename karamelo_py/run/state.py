@@ -137,17 +137,16 @@ def go_back(simulation: Any, kept: Mapping[str, np.ndarray]) -> None:
         stem = f"points/{k}/"
         points, tiling = block.points, take_tiling(block.tiling, kept, f"tiling/{k}/")
         if points.mass.size != kept[stem + "mass"].size:
-            again = {n: np.copy(a) for n, a in kept.items()} | {
-                stem + "x": np.stack([kept[stem + "x"]] * 2)
-            }
-            points = take_points(points, again, stem)
+            own = {name: np.copy(array) for name, array in kept.items()}
+            own[stem + "x"] = np.stack([kept[stem + "x"]] * 2)
+            points = take_points(points, own, stem)
         blocks.append(block._replace(points=points, tiling=tiling))
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
         array[...] = kept[name]
     for block in s.blocks:
-        block.points.x[1 - s.control.clock[0].now] = block.points.x[s.control.clock[0].now]
+        block.points.x[:] = block.points.x[s.control.clock[0].now]
     values = s.control.values
     values[:] = kept["values"]
     for marks in remembered_at(simulation, spans):
