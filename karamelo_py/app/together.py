@@ -120,8 +120,7 @@ def together(
 
     def act() -> int:
         nonlocal crew
-        crew = join(asked)
-        crew.fail = fail
+        crew = join(asked, fail)
         return run(crew)
 
     def fail(error: BaseException) -> None:
@@ -173,8 +172,8 @@ def _signed(text: str, rank: int, size: int) -> str:
     return f"{text}\nin process {rank + 1} of {size}" if text else ""
 
 
-def join(asked: int | None) -> Crew:
-    """Join the processes that mpiexec has started.
+def join(asked: int | None, ends: Callable[[BaseException], None]) -> Crew:
+    """Join the processes that mpiexec has started; `ends` as of `Crew`.
 
     Raises
     ------
@@ -187,7 +186,7 @@ def join(asked: int | None) -> Crew:
             f"--ranks {asked}: mpiexec has started {size} processes",
             expected="one of the two: mpiexec -n N, or --ranks N",
         )
-    crew = Crew()
+    crew = Crew(ends)
     if crew.size != size:
         raise ScriptError(
             f"{size} processes were started, and mpi4py sees {crew.size} of them",

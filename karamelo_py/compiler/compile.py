@@ -345,7 +345,7 @@ of_numbers(beside)(lambda first, steps: lambda first, steps: numba.uint64(first 
 
 
 def over_blocks(per_block: Callable) -> Callable:
-    """Make ``f(setup, ...)`` that calls ``per_block(block, setup, ...)`` for each of setup.blocks.
+    """Make of ``f(block, setup, ...)`` an ``f(setup, ...)`` that does so for each of setup.blocks.
 
     The blocks have different types (one for each constitutive law), which a loop in a kernel cannot
     run over: the calls are written out once per number of blocks.

@@ -17,7 +17,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import by_type, choose, define, fma, real, shared
-from karamelo_py.compiler.lanes.numbers import Lanes, element, vector_of
+from karamelo_py.compiler.lanes.registers import Lanes, element, vector_of
 
 
 def logarithm(x: float) -> float:

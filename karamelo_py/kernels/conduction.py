@@ -70,7 +70,8 @@ def _(hooks, stage, target, s):
     clock.hottest = max(clock.hottest, clock.set_high)
 
 
-def _supply(block, s, hooks):
+@over_blocks
+def _supply_blocks(block, s, hooks):
     points = block.points
     fields = points.fields
     warmth = Warmth(
@@ -83,9 +84,6 @@ def _supply(block, s, hooks):
         points.x[s.control.clock[0].now],
     )
     point_hooks(SUPPLY_HEAT, warmth, s.kin, points.id, hooks, s.control, step_size(s))
-
-
-_supply_blocks = over_blocks(_supply)
 
 
 @point_function(otherwise=True)

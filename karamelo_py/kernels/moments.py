@@ -37,13 +37,11 @@ def corners_that_move(s):
     return placed(s.basis, s.kin) if follows(s.frame) else 0
 
 
-def _point_hooks(block, s, hooks, stage, now, then):
+@over_blocks
+def hook_points(block, s, hooks, stage, now, then):
     points = block.points
     motion = Motion(points.v, points.mass, points.x[now], points.x[then], corners_that_move(s))
     point_hooks(stage, motion, s.kin, points.id, hooks, s.control, step_size(s))
-
-
-hook_points = over_blocks(_point_hooks)
 
 
 @point_function(otherwise=True)

@@ -31,7 +31,7 @@ from karamelo_py.kernels.g2p import zero_vector
 from karamelo_py.kernels.loss import Lost, bring_energy
 from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
-from karamelo_py.points.frames import Total, Updated, add_force, force_stress
+from karamelo_py.points.frames import Total, add_force, force_stress
 from karamelo_py.points.kinematics import add_pressure, dimension, stretching_mean, zero_symmetric
 from karamelo_py.points.laws import (
     constrained_velocity,
@@ -297,13 +297,9 @@ def _(quantity, w, stencil, k, load):
     accumulate_optional(field(w.nodes.fields, NodalStress), i, scale(weight, mean))
 
 
-@point_function()
+@point_function(otherwise=True)
 def mapped_again_in(frame, basis, grid, moment):
     """The part of the moment of velocity that MUSL maps again: all where weights never change."""
-
-
-@mapped_again_in.on(Updated)
-def _(frame, basis, grid, moment):
     return mapped_again(basis, grid, moment)
 
 

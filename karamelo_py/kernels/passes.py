@@ -17,11 +17,9 @@ from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import largest_component
 
 
-def _sweep(block, s, mode, visit, then, gathers, scatters, dt):
+@over_blocks
+def sweep_blocks(block, s, mode, visit, then, gathers, scatters, dt):
     sweep_points(mode, visit, s, block, then, gathers, scatters, dt)
-
-
-sweep_blocks = over_blocks(_sweep)
 
 
 @point_function(otherwise=True)
@@ -44,11 +42,9 @@ def _read_reports(tiling, control):
     clock.new_rate = max(clock.new_rate, rate)
 
 
-def _survey(block, s):
+@over_blocks
+def _survey_blocks(block, s):
     _read_reports(block.tiling, s.control)
-
-
-_survey_blocks = over_blocks(_survey)
 
 
 @shared
@@ -114,11 +110,9 @@ def _look_at_moves(frame, kin, grids, points, tiling, control):
             tiling.report[0, 2] = p + 1
 
 
-def _check_moves(block, s):
+@over_blocks
+def _check_moves_of_blocks(block, s):
     _look_at_moves(s.frame, s.kin, s.grids, block.points, block.tiling, s.control)
-
-
-_check_moves_of_blocks = over_blocks(_check_moves)
 
 
 @shared

@@ -111,11 +111,9 @@ def _(laws, contact, s, points, led):
     )  # fmt: skip
 
 
-def _of_block(block, s, led):
+@over_blocks
+def _sum_forces_of_blocks(block, s, led):
     sum_forces(block.laws, s.contact, s, block.points, led)
-
-
-_sum_forces_of_blocks = over_blocks(_of_block)
 
 
 @entered

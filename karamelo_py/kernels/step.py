@@ -194,11 +194,9 @@ def _fastest(frame, kin, points, laws, control):
     clock.rate = max(clock.rate, rate)
 
 
-def _measure(block, s):
+@over_blocks
+def measure_blocks(block, s):
     _fastest(s.frame, s.kin, block.points, block.laws, s.control)
-
-
-measure_blocks = over_blocks(_measure)
 
 
 @shared

@@ -15,7 +15,7 @@ from karamelo_py.compiler.compile import index, point_function, real, shared
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.points.basis import blank, locate
-from karamelo_py.points.frames import DeformationGradient, Total, Updated
+from karamelo_py.points.frames import DeformationGradient, Total
 from karamelo_py.points.kinematics import zero_tensor
 from karamelo_py.points.laws import deformation, initial_state
 
@@ -60,13 +60,9 @@ def stored_or_own(f, law, kin, state):
     return f if len(f) else deformation(law, kin, state)
 
 
-@point_function()
+@point_function(otherwise=True)
 def deformation_of(frame, kin, law, state, points, p):
     """F of a point where the frame needs it."""
-
-
-@deformation_of.on(Updated)
-def _(frame, kin, law, state, points, p):
     return ()
 
 
@@ -76,13 +72,9 @@ def _(frame, kin, law, state, points, p):
     return stored_or_own(f, law, kin, state)
 
 
-@point_function()
+@point_function(otherwise=True)
 def present_stencil(frame, w, stencil, p):
     """The stencil of the place after the move; in the total frame it never changes."""
-
-
-@present_stencil.on(Updated)
-def _(frame, w, stencil, p):
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
 
 

@@ -124,11 +124,9 @@ def _sum_energies(mode, kin, points, laws, tiling, control):
         add_to(control.totals, STORED, tiling.report[t, ENERGIES + 1])
 
 
-def _sum(block, s, mode):
+@over_blocks
+def _sum_blocks(block, s, mode):
     _sum_energies(mode, s.kin, block.points, block.laws, block.tiling, s.control)
-
-
-_sum_blocks = over_blocks(_sum)
 
 
 @entered
@@ -191,11 +189,9 @@ def _add_momentum(control, solid, d):
         control.answer[k] = 0
 
 
-def _add(block, s):
+@over_blocks
+def _add_blocks(block, s):
     _add_momenta(s.kin, block.points, block.tiling, s.control)
-
-
-_add_blocks = over_blocks(_add)
 
 
 @entered
@@ -290,11 +286,9 @@ def _range_of_heat(kin, points, laws, control):
             clock.own_heat = max(clock.own_heat, float(work) / float(capacity))
 
 
-def _range(block, s):
+@over_blocks
+def _range_blocks(block, s):
     _range_of_heat(s.kin, block.points, block.laws, s.control)
-
-
-_range_blocks = over_blocks(_range)
 
 
 @shared

@@ -56,13 +56,9 @@ class Total(NamedTuple):
     point_fields = (DeformationGradient,)
 
 
-@point_function()
+@point_function(otherwise=True)
 def follows(frame):
     """Whether weights follow the points; constant at compile time."""
-
-
-@follows.on(Updated)
-def _(frame):
     return True
 
 
@@ -71,13 +67,9 @@ def _(frame):
     return False
 
 
-@point_function()
+@point_function(otherwise=True)
 def spatial_increment(frame, kin, dl, f):
     """dt grad v from `dl`, dt times the gradient of velocity in the frame, and F before it."""
-
-
-@spatial_increment.on(Updated)
-def _(frame, kin, dl, f):
     return dl
 
 
@@ -87,13 +79,9 @@ def _(frame, kin, dl, f):
     return increment_of(kin, dl, f)
 
 
-@point_function()
+@point_function(otherwise=True)
 def force_stress(frame, kin, tau, f):
     """The stress that makes nodal forces, per reference volume."""
-
-
-@force_stress.on(Updated)
-def _(frame, kin, tau, f):
     return tau
 
 
@@ -102,13 +90,9 @@ def _(frame, kin, tau, f):
     return nominal(kin, tau, f)
 
 
-@point_function()
+@point_function(otherwise=True)
 def add_force(frame, kin, total, stress, gradient):
     """total + stress . gradient of a basis function."""
-
-
-@add_force.on(Updated)
-def _(frame, kin, total, stress, gradient):
     return add_symmetric_dot(kin, total, stress, gradient)
 
 
@@ -117,17 +101,13 @@ def _(frame, kin, total, stress, gradient):
     return add_tensor_dot(kin, total, stress, gradient)
 
 
-@point_function()
+@point_function(otherwise=True)
 def pulled_back(frame, kin, g, f):
     """The direction of a flux down the gradient `g`, pulled back to the frame.
 
     Per deformed volume: in space that is g, and C^-1 g with respect to reference positions, which
     C^-1 = F^-1 F^-T takes to space and back.
     """
-
-
-@pulled_back.on(Updated)
-def _(frame, kin, g, f):
     return g
 
 
@@ -138,13 +118,9 @@ def _(frame, kin, g, f):
     return add_symmetric_dot(flat, subtract(g, g), left_cauchy_green(flat, inside), g)
 
 
-@point_function()
+@point_function(otherwise=True)
 def scaled_increment(frame, kin, dl, f, ratio):
     """`dl` changed such that the volume after it is `ratio` times what it would be."""
-
-
-@scaled_increment.on(Updated)
-def _(frame, kin, dl, f, ratio):
     # (I + dl) s - I
     s = power(ratio, stretched_share(kin, ratio))
     return add_scaled(scale(s, dl), s - real(1, s), identity(kin, s))
@@ -163,13 +139,9 @@ def stretched_share(kin, like: Number):
     return 1 / len(kin.axes)
 
 
-@point_function()
+@point_function(otherwise=True)
 def inverse_stretch_squared(frame, kin, f, like):
     """(h / size of a deformed cell)^2, one over the least stretch squared: it shortens the step."""
-
-
-@inverse_stretch_squared.on(Updated)
-def _(frame, kin, f, like):
     return real(1, like)
 
 

@@ -7,7 +7,7 @@ import signal
 import socket
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any
 
@@ -42,6 +42,11 @@ def launched() -> tuple[int, int]:
 class Crew:
     """All processes of a run, in the order of their ranks. The first leads.
 
+    Parameters
+    ----------
+    ends
+        Ends all of them because of an error, of which it tells.
+
     Attributes
     ----------
     beside
@@ -62,8 +67,10 @@ class Crew:
     beside = 1
     waited = 0.0
     amid = parted = False
+    _ends = None
 
-    def __init__(self):
+    def __init__(self, ends: Callable[[BaseException], None] | None = None):
+        self._ends = ends
         try:
             from mpi4py import MPI
             from mpi4py.util import pkl5
@@ -171,6 +178,9 @@ class Crew:
 
     def fail(self, error: BaseException) -> None:
         """End all processes because of an error that cannot be raised here."""
+        if self._ends is not None:
+            self._ends(error)
+            return
         traceback.print_exception(error)
         self.abandon()
 

@@ -8,13 +8,10 @@ once.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cached_property
-from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language import registry
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
@@ -23,27 +20,23 @@ from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws import law_kind, specific_volume
 from karamelo_py.points.laws.eos.ideal_gas import IdealGas
 from karamelo_py.points.laws.eos.shock import Shock
-from karamelo_py.points.transfers import Moment
 from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
-from karamelo_py.run.motion import Motion
+from karamelo_py.run.foreseen import Foreseen
+from karamelo_py.run.large_steps import warn_about_steps
 from karamelo_py.run.noise import ELASTIC, noises
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import (
     elastic_speed,
     one_a_cell,
-    own_step_instead,
     sparse,
-    what_follows,
 )
 from karamelo_py.run.velocities import warn_about_velocities
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.usl import USL
-from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.fixes.body_force import BodyForce
 
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
 FAST = 0.2  # of the speed of waves, from where on usf and usavg feed moments
@@ -63,92 +56,6 @@ class Failure(NamedTuple):
     reason: str
     cure: str
     place: Any = None
-
-
-class Foreseen:
-    """A scene before a run of `duration`: what rules ask of it."""
-
-    def __init__(self, hub: Hub, simulation: Simulation, duration: float):
-        self.hub, self.simulation = hub, simulation
-        # A run that a condition ends takes some hundred steps at least.
-        self.duration = duration if isfinite(duration) else 300 * simulation.dt
-        update = hub.update
-        self.transfer, self.method, self.scheme = update.transfer, update.method, update.scheme
-        self.basis = update.method.basis
-        self.moves = update.method.frame.moves
-        self.d = hub.domain.dimension
-        self.words = registry.name_of("transfer", type(self.transfer))
-
-    def solids(self, *laws: type) -> list[Any]:
-        """The solids with one of these laws, or parts of laws."""
-        return [s for s in self.hub.solids.values() if set(law_kind(s.material.law)) & set(laws)]
-
-    @property
-    def moments(self) -> bool:
-        """Whether points move through the grid, with moments or gradients of their velocity."""
-        return self.moves and Moment in getattr(self.transfer, "point_fields", ())
-
-    @property
-    def vanishing(self) -> bool:
-        """Whether points move through places at which D of the affine transfers vanishes."""
-        return self.moves and not self.basis.steady_moment
-
-    @cached_property
-    def motions(self) -> list[Motion]:
-        """How the solids move."""
-        return self.simulation.motions()
-
-    @cached_property
-    def turn(self) -> float:
-        """The angle by which the solid that turns most would turn in this run, if none held it."""
-        if self.d == 1 or self.hub.domain.axisymmetric:
-            return 0.0
-        return max((one.spin for one in self.motions), default=0.0) * self.duration
-
-    @cached_property
-    def waves(self) -> float:
-        """The speed of waves."""
-        clock = self.simulation.control.clock[0]
-        return float(clock.rate) - self.simulation.fastest(clock.common[0])
-
-    @cached_property
-    def speed(self) -> float:
-        """The largest component of a velocity over the speed of waves."""
-        return self.simulation.fastest() / self.waves if self.waves > 0 else 0.0
-
-    @cached_property
-    def impact(self) -> float:
-        """Half of the largest difference of velocities over the speed of waves."""
-        if not (self.motions and self.waves > 0):
-            return 0.0
-        fast, slow = (
-            np.array([getattr(m, name) for m in self.motions]) for name in ("fast", "slow")
-        )
-        return float((fast.max(axis=0) - slow.min(axis=0)).max()) / 2 / self.waves
-
-    @cached_property
-    def vibration(self) -> tuple[float, float]:
-        """The strain by which a solid swings that is stretched evenly, and in how many periods."""
-        most = 0.0, 0.0
-        for one in self.motions if self.waves > 0 else ():
-            strain = one.rate * one.size / (2 * self.waves)
-            periods = self.duration * self.waves / (3 * one.size) if one.size else 0.0
-            most = max(most, (strain, periods))
-        return most
-
-    @cached_property
-    def sag(self) -> float:
-        """The strain of a solid under its own weight, g L / c^2."""
-        most = 0.0
-        for fix in self.hub.fixes.values():
-            if isinstance(fix, BodyForce) and self.waves > 0 and self.motions:
-                x = np.array([one.centre for one in self.motions])
-                for k, formula in enumerate(fix.formulas[: self.d]):
-                    if formula is not None:
-                        g = abs(formula.evaluate_points(self.hub.values, x, x).mean())
-                        size = max(one.high[k] - one.low[k] for one in self.motions)
-                        most = max(most, float(g * size / self.waves**2))
-        return most
 
 
 def _affine_noise(s: Foreseen) -> Iterator[Failure]:
@@ -398,79 +305,3 @@ def _warn_about_groups(hub: Hub) -> None:
         if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
             group.awaits_solids = False
             hub.warn(f"group '{group.id}' holds no nodes; {NOTHING_THERE}", place=group.place)
-
-
-class Step(NamedTuple):
-    """The step that a run asks for, where that is, and what its stable limit depends on."""
-
-    place: Any
-    fixed_dt: float | None
-    dt_factor: float | None
-    halves: bool
-    scene: tuple
-
-    @property
-    def command(self) -> str:
-        """What the script asks for it by."""
-        return "set_dt" if self.fixed_dt else "dt_factor"
-
-
-def step_of(hub: Hub, halves: bool) -> Step:
-    """The step that a run asks for here, which goes back and halves it in trouble or not."""
-    update = hub.update
-    method, scheme, transfer = update.method, update.scheme, update.transfer
-    scene = (
-        *(hub.domain.h, *hub.solids.values(), method, update.thermal),
-        *(type(scheme), scheme, type(transfer), transfer),
-    )
-    return Step(hub.place, update.fixed_dt, update.dt_factor, halves, scene)
-
-
-def warn_about_steps(
-    hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
-) -> None:
-    """Say so, once, where the step of this run or of a later one is above the stable limit.
-
-    Who goes on from a file is told `again`.
-
-    Raises
-    ------
-    ScriptError
-        See `warn`.
-    """
-    present = step_of(hub, halves)
-    _warn_about_step(hub, simulation, present, again=again)
-    for step in hub.later[len(hub.runs) :]:
-        if step.scene == present.scene:
-            _warn_about_step(hub, simulation, step, later=True)
-    hub.later.clear()
-
-
-def _warn_about_step(
-    hub: Hub, simulation: Simulation, step: Step, *, later: bool = False, again: bool = False
-) -> None:
-    limit = simulation.limit_moving
-    asked = step.fixed_dt or (step.dt_factor or 0) * limit
-    if not asked > limit * (1 + 1e-12):
-        return
-    of_heat = float(simulation.control.clock[0].heat_limit)
-    words = f"the step {asked:.4g} of {step.command} is "
-    hint = own_step_instead(hub, step.command)
-    if asked > BORNE * of_heat and not step.halves:
-        words += (
-            f"{asked / of_heat:.3g} times the stable one of conduction: temperatures would swing"
-        )
-        if not later:
-            raise ScriptError(words, hint=hint)
-    else:
-        words += f"above the stable limit {limit:.4g}"
-        words += (
-            f" of conduction; beyond {BORNE:g} times that temperatures swing"
-            if limit == of_heat
-            else what_follows(hub, simulation, asked)
-        )
-    name = f"{step.command} {step.fixed_dt or step.dt_factor}"
-    told = hub.update.foreseen
-    if again or name not in told:
-        told += [name] * (name not in told)
-        hub.warn(words, place=step.place, hint=hint)

@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from enum import Enum, auto
 from functools import wraps
 from typing import Any
 from zlib import crc32
@@ -18,6 +19,15 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
 OVER = "over"
+
+
+class At(Enum):
+    """What the processes are at, as the first sees it."""
+
+    APART = auto()  # each carries out the script, between two runs
+    LEADING = auto()  # the others do what it says
+    READY = auto()  # and are made ready for steps
+    JOINT = auto()  # all do the same, and wait for each other
 
 
 class Abandoned(Exception):
@@ -45,15 +55,13 @@ class Leading(Simulation):
 
     def __init__(self, hub: Hub, previous: Leading | None = None):
         self.crew: Crew = hub.settings.crew
-        self._leading = False
-        self._joint = False  # all processes do the same, and wait for each other
-        self._prepared = False
+        self._at = At.APART
         super().__init__(hub, previous)
 
     @property
-    def _at_hand(self) -> bool:
-        """Whether the points that are asked about are at hand: own ones in steps, or all."""
-        return self._stepping or self._shown or not self._leading
+    def _leading(self) -> bool:
+        """Whether this process says what the others do."""
+        return self._at is not At.APART
 
     def _settle(self) -> None:
         """See that all processes have the state that the run has ended with."""
@@ -70,14 +78,13 @@ class Leading(Simulation):
     def leading(self) -> Iterator[None]:
         """While a run goes on: the others follow."""
         self._meet()
-        self._leading, self._prepared = True, False
-        well = False
+        self._at, well = At.LEADING, False
         try:
             yield
             well = True
         finally:
-            self._leading = False
-            if self._joint:
+            joint, self._at = self._at is At.JOINT, At.APART
+            if joint:
                 # In the midst of what all do together: the others would wait for ever.
                 self.crew.amid = True
             else:
@@ -137,8 +144,8 @@ class Leading(Simulation):
 
     def _together(self, what: str, *arguments: Any, **own: Any) -> Any:
         """Have all call a method with these arguments, this process with its `own` ones, too."""
-        before, self._joint = self._joint, True
+        before, self._at = self._at, At.JOINT
         self._tell(what, *arguments)
         found = getattr(self, what)(*arguments, **own)
-        self._joint = before  # not where it failed: then the others wait
+        self._at = before  # not where it failed: then the others wait
         return found

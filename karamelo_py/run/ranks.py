@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from enum import Enum, auto
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +22,7 @@ from karamelo_py.output.node_columns import NodeRows
 from karamelo_py.run.answers import reads_totals
 from karamelo_py.run.by_id import ById, Piece
 from karamelo_py.run.gathering import join, lined_up, spread
-from karamelo_py.run.leading import Abandoned, HandedOutAnew, Leading, by_all
+from karamelo_py.run.leading import Abandoned, At, HandedOutAnew, Leading, by_all
 from karamelo_py.run.lowering import State, lower
 from karamelo_py.run.part import Part
 from karamelo_py.run.shares import joined, sized, work_of
@@ -34,19 +35,25 @@ from karamelo_py.scene.hub import Hub
 CHANGING = ("advance", "set_initial")  # what changes the points
 
 
+class Held(Enum):
+    """Who has the present state."""
+
+    NOBODY = auto()  # there are no points yet: each process makes those of a share in a run
+    PARTS = auto()
+    WHOLE = auto()  # and perhaps the parts, too
+
+
 class Ranks(Leading):
     """The arrays of a scene that several processes share."""
 
     def __init__(self, hub: Hub, previous: Ranks | None = None):
         self._whole: Setup | None = None
-        self._shown = True  # the whole has the present state
+        self._held = Held.WHOLE
         self._handed_out = -1  # the version of the whole that the parts have
         self._stepping = False  # arrays are those of the part
-        self._bare = False
         super().__init__(hub, previous)
-        # Nobody has points yet: each makes those of a share when a run begins.
-        self._bare = previous is None
-        self._shown = not self._bare
+        if previous is None:
+            self._held = Held.NOBODY
         self.part = Part(self.crew, hub, self._whole, self.count)
 
     # --- the whole --------------------------------------------------------------------------------
@@ -54,14 +61,14 @@ class Ranks(Leading):
     @property
     def setup(self) -> Setup:
         """The whole scene. It is gathered first where steps were taken since."""
-        if self._bare and self._leading:
+        if self._held is Held.NOBODY and self._leading:
             self._see_parts()
-        elif self._bare:
+        elif self._held is Held.NOBODY:
             # Before the first run a script asks for the points: of all processes alike.
             whole, self.tiles = lower(self.hub)
             self._whole = whole._replace(control=self.control, contact=self.contact)
-            self._bare, self._shown = False, True
-        if not self._shown:
+            self._held = Held.WHOLE
+        if self._held is not Held.WHOLE:
             if self._leading:
                 self._together("gather")
             else:
@@ -119,25 +126,30 @@ class Ranks(Leading):
 
     def _see_prepared(self) -> None:
         """Have all that follow made ready."""
-        if not self._prepared:
+        if self._at is At.LEADING:
             self._tell("prepare", self.begun)
-            self._prepared = True
+            self._at = At.READY
+
+    @property
+    def _at_hand(self) -> bool:
+        """Whether the points that are asked about are at hand: own ones in steps, or all."""
+        return self._stepping or self._held is Held.WHOLE or not self._leading
 
     # --- handing out and gathering ----------------------------------------------------------------
 
     def _settle(self) -> None:
         """See that all processes have the state that the run has ended with."""
-        if not self._bare:
+        if self._held is not Held.NOBODY:
             self._see_parts()
 
     def _part_with_whole(self) -> None:
         """From here on no process has what only the first has gathered."""
-        if not self._bare:
+        if self._held is not Held.NOBODY:
             self._let_go()
 
     def _let_go(self) -> None:
         """From here on the parts alone have the present state."""
-        self._shown = False
+        self._held = Held.PARTS
         self._whole = self._whole._replace(
             blocks=tuple(b._replace(points=sized(b.points, 0)) for b in self._whole.blocks)
         )
@@ -146,7 +158,7 @@ class Ranks(Leading):
         """Hand out the whole where the parts do not have its present state."""
         if self._handed_out == self.version:
             return
-        if self._bare:
+        if self._held is Held.NOBODY:
             self._together("fill")
             self._handed_out = self.version
             return
@@ -174,7 +186,7 @@ class Ranks(Leading):
         rank, size = self.crew.rank, self.crew.size
         found, _ = lower(self.hub, ids=(self.count * rank // size, self.count * (rank + 1) // size))
         self.part.fill(found.blocks)
-        self._bare = False
+        self._held = Held.PARTS
 
     def take(
         self, owner: np.ndarray, nodes: np.ndarray, memory: list, shares: list | None = None
@@ -196,7 +208,7 @@ class Ranks(Leading):
         self.control.totals[WORK] = 0
         if self.crew.leads:
             self.control.totals[WORK] = sum(part["work"] for part in parts)
-        self._shown = True
+        self._held = Held.WHOLE
         blocks = lined_up(self.crew, self._whole.blocks, self.part.setup.blocks, parts)
         if everywhere:
             blocks = spread(self.crew, blocks)
@@ -206,7 +218,7 @@ class Ranks(Leading):
 
     def pieces(self) -> Iterator[ById]:
         """All points, so many at a time: not even the first needs the memory of all."""
-        if self._shown or not self._leading:
+        if self._held is Held.WHOLE or not self._leading:
             yield from super().pieces()
             return
         for first, end in self.ranges():
@@ -223,7 +235,7 @@ class Ranks(Leading):
 
     def node_pieces(self, names: Iterable[str]) -> Iterator[NodeRows]:
         """All nodes, so many at a time: not even the first needs the memory of all."""
-        if self._shown or not self._leading:
+        if self._held is Held.WHOLE or not self._leading:
             yield from super().node_pieces(names)
             return
         self.show_on_nodes()
@@ -253,7 +265,7 @@ class Ranks(Leading):
 
     def stored(self) -> Iterator[Stored]:
         """What a file to go on from holds: not even the first needs the memory of all."""
-        return super().stored() if self._shown or self._bare else stored(self)
+        return stored(self) if self.apart else super().stored()
 
     def take_stored(self, path: Path) -> None:
         """Take the state that a file holds: each process reads its own share."""
@@ -284,13 +296,12 @@ class Ranks(Leading):
             self.present[:] = state["present"][()]
         if not self.crew.leads:
             self.control.totals[WORK] = 0
-        self._bare = False
         self._let_go()
 
     @property
     def apart(self) -> bool:
         """Whether the parts alone have the present state, between two runs."""
-        return not (self._shown or self._bare)
+        return self._held is Held.PARTS
 
     def together(self, what: str, *arguments: Any) -> Any:
         """What methods of all processes find, for the first."""
@@ -449,7 +460,7 @@ class Ranks(Leading):
             function(self._whole)
         except BaseException:
             self.crew.told(None)
-            self._joint = False  # the others know
+            self._at = At.LEADING  # the others know
             raise
         self._stepping = True
         now = self.control.values, self.control.clock.view(np.ndarray)
@@ -498,7 +509,7 @@ class Ranks(Leading):
             super().restore(snapshot)
             return
         self._together("go_back")
-        self._shown = False
+        self._held = Held.PARTS
         self.version += 1
         self._handed_out = self.version
 

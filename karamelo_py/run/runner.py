@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.step import DONE, STOPPED
-from karamelo_py.run import diagnosis, foresight, restart
+from karamelo_py.run import diagnosis, foresight, large_steps, restart
 from karamelo_py.run.crew import ENDING
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
@@ -73,7 +73,7 @@ class Runner:
         check_scene(hub)
         self._check_condition()
         if hub.rehearsing:
-            hub.later.append(foresight.step_of(hub, self.halve))
+            hub.later.append(large_steps.step_of(hub, self.halve))
             return
         if hub.pausing:
             raise Pause
@@ -152,7 +152,7 @@ class Runner:
             hub.restart = hub.interpreter.replay = None
             simulation.go_on(self.end_time, self.halvings)
             if not self.halvings:  # else the step is not that of the script
-                foresight.warn_about_steps(hub, simulation, self.halve, again=True)
+                large_steps.warn_about_steps(hub, simulation, self.halve, again=True)
             self._tell_of_no_step_left(file, simulation, first_step)
         else:
             simulation.begin(self.end_time)

@@ -119,7 +119,7 @@ class Hub:
     runs
         The published values at the end of each run so far.
     later
-        What the runs ask for that a rehearsal came to (`run.foresight.Step`).
+        What the runs ask for that a rehearsal came to (`run.large_steps.Step`).
     restart
         What the script goes on from, until it is where that was written.
     rehearsing

@@ -4,7 +4,7 @@ A view hands out arrays with a row for each node or point of the group. What a h
 by assignment or in place, is written back when it returns; what cannot be changed is read-only.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -234,30 +234,34 @@ class PointsView(View):
             has (positions, or reference positions where `moves` is False); `step` is a length that
             is small beside a cell. It is not called where no point keeps such a thing.
         """
-        simulation = self._simulation
-        s, d = simulation.setup, simulation.setup.kin.dimension
-        if simulation.declared(Moment) is None:
-            return
-        step = simulation.hub.domain.h / 16
-        rows = np.zeros((d * d, simulation.count))
-        first = component * d
-        rows[first : first + d, self.ids] = np.nan_to_num(gradient(s.frame.moves, step)).T
-        chosen = np.zeros(simulation.count, np.bool_)
-        chosen[self.ids] = True
-        for block in s.blocks:
-            points = block.points
-            kept = field(points.fields, Moment)
+        simulation, slopes = self._simulation, None
+        s, d = simulation.stepped, simulation.kin.dimension
+        here = slice(component * d, component * d + d)
+        for block, rows, own in self._at_hand():
+            points, kept = block.points, field(block.points.fields, Moment)
             if kept is None:
                 continue
-            given = np.ascontiguousarray(rows[:, points.id], kept.dtype)
+            if slopes is None:
+                slopes = np.nan_to_num(gradient(s.frame.moves, simulation.hub.domain.h / 16)).T
+            given = np.zeros((d * d, len(rows)), kept.dtype)
+            given[here] = slopes[:, own]
             if not s.transfer.keeps_gradient:
                 # B = D grad v, as the nodes would show it
-                where = points.x[simulation.now] if points.home is None else points.home
-                moment = np.zeros_like(kept)
-                export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, given, moment)
-                given = moment
-            here = chosen[points.id]
-            kept[first : first + d, here] = given[first : first + d, here]
+                places = points.x[simulation.now] if points.home is None else points.home
+                where = np.ascontiguousarray(places[:, rows])
+                shown, grid = given, points.grid[rows]
+                given = np.zeros_like(shown)
+                export_velocity_moment(s.basis, s.kin, s.grids, grid, where, shown, given)
+            kept[here, rows] = given[here]
+
+    def _at_hand(self) -> Iterator[tuple]:
+        """The points of the view: blocks, rows of them, and which of the view these are."""
+        place = np.full(self._simulation.count, -1)
+        place[self.ids] = np.arange(len(self.ids))
+        for block in self._simulation.stepped.blocks:
+            of_block = place[block.points.id]
+            rows = np.flatnonzero(of_block >= 0)
+            yield block, rows, of_block[rows]
 
     @Shown
     def mass(self) -> np.ndarray:
@@ -342,21 +346,5 @@ class PieceView(PointsView):
         """(n, d) positions before the first step; read only."""
         return self._simulation.x0_of(self.ids)
 
-    def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
-        """See `PointsView.set_velocity_gradient`."""
-        simulation, points, rows = self._simulation, self._block.points, self._rows
-        s, d = simulation.stepped, simulation.kin.dimension
-        kept = field(points.fields, Moment)
-        if kept is None:
-            return
-        step = simulation.hub.domain.h / 16
-        given = np.zeros((d * d, len(rows)), kept.dtype)
-        here = slice(component * d, component * d + d)
-        given[here] = np.nan_to_num(gradient(s.frame.moves, step)).T
-        if not s.transfer.keeps_gradient:
-            places = points.x[simulation.now] if points.home is None else points.home
-            where = np.ascontiguousarray(places[:, rows])
-            moment = np.zeros_like(given)
-            export_velocity_moment(s.basis, s.kin, s.grids, points.grid[rows], where, given, moment)
-            given = moment
-        kept[here, rows] = given[here]
+    def _at_hand(self) -> Iterator[tuple]:
+        yield self._block, self._rows, slice(None)

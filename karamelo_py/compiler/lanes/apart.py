@@ -23,7 +23,7 @@ from karamelo_py.compiler.compile import (
     lanes_of,
     largest,
 )
-from karamelo_py.compiler.lanes.numbers import I64, Lanes, element, known, lane, vector_of
+from karamelo_py.compiler.lanes.registers import I64, Lanes, element, known, lane, vector_of
 
 
 def _of_leaves(kind: Any, change: Callable) -> Any:

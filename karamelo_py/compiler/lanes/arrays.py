@@ -19,7 +19,8 @@ from karamelo_py.compiler.compile import (
     of_present,
     real,
 )
-from karamelo_py.compiler.lanes.numbers import (
+from karamelo_py.compiler.lanes.numbers import select
+from karamelo_py.compiler.lanes.registers import (
     I32,
     I64,
     Lanes,
@@ -27,7 +28,6 @@ from karamelo_py.compiler.lanes.numbers import (
     known,
     lane,
     pack,
-    select,
     shape,
     shuffle,
     splat,

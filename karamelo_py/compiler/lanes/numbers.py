@@ -9,10 +9,9 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.core.imputils import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, models, register_model
+from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import (
     by_type,
@@ -26,83 +25,7 @@ from karamelo_py.compiler.compile import (
     real,
     round_off,
 )
-
-I32, I64 = ir.IntType(32), ir.IntType(64)
-
-
-class Lanes(types.Type):
-    """`width` numbers of a scalar type in a register."""
-
-    def __init__(self, scalar: types.Type, width: int):
-        self.scalar, self.width = scalar, width
-        super().__init__(name=f"Lanes({scalar}, {width})")
-
-
-def element(scalar: types.Type) -> ir.Type:
-    """How a number lies in a register."""
-    if isinstance(scalar, types.Boolean):
-        return ir.IntType(1)
-    if isinstance(scalar, types.Integer):
-        return ir.IntType(scalar.bitwidth)
-    return {64: ir.DoubleType(), 32: ir.FloatType()}[scalar.bitwidth]
-
-
-def vector_of(lanes: Lanes) -> ir.VectorType:
-    return ir.VectorType(element(lanes.scalar), lanes.width)
-
-
-@register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, lanes: Lanes):
-        super().__init__(manager, lanes, vector_of(lanes))
-
-
-def constant(values: list[int], bits: ir.Type = I32) -> ir.Constant:
-    return ir.Constant(ir.VectorType(bits, len(values)), values)
-
-
-def splat(builder: Any, value: Any, lanes: Lanes) -> Any:
-    """The same number in all lanes."""
-    vector = vector_of(lanes)
-    if isinstance(lanes.scalar, types.Boolean) and value.type != ir.IntType(1):
-        value = builder.trunc(value, ir.IntType(1))
-    one = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(I32, 0))
-    return builder.shuffle_vector(
-        one, ir.Constant(vector, ir.Undefined), constant([0] * lanes.width)
-    )
-
-
-def lane(builder: Any, value: Any, k: int) -> Any:
-    return builder.extract_element(value, ir.Constant(I32, k))
-
-
-def pack(builder: Any, values: list, lanes: Lanes) -> Any:
-    out = ir.Constant(vector_of(lanes), ir.Undefined)
-    for k, value in enumerate(values):
-        out = builder.insert_element(out, value, ir.Constant(I32, k))
-    return out
-
-
-def shape(lanes: Lanes) -> str:
-    """What LLVM's intrinsics call a vector: v4f64."""
-    kind = "f" if isinstance(lanes.scalar, types.Float) else "i"
-    return f"v{lanes.width}{kind}{lanes.scalar.bitwidth}"
-
-
-def shuffle(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
-    return builder.shuffle_vector(a, b, constant(order))
-
-
-def known(function: Callable, made: Callable) -> None:
-    """Let `function` know lanes: where an argument has some, it is the intrinsic `made`."""
-
-    @by_type(function)
-    def chosen(*arguments):
-        if not lanes_of(arguments):
-            return None
-        names = ", ".join(f"a{k}" for k in range(len(arguments)))
-        return define(names, f"return made({names})", made=made)
-
+from karamelo_py.compiler.lanes.registers import I32, Lanes, call_vector, known, splat, vector_of
 
 # --- arithmetic -------------------------------------------------------------------------------
 
@@ -135,28 +58,37 @@ def _both(builder: Any, sig: Any, arguments: Any, lanes: Lanes) -> list:
     return out
 
 
-def _binary(operation: Any, of_floats: str | None, of_ints: str | None) -> None:
+def _operator(operation: Any, result: Callable, code: Callable) -> None:
+    """Let an operator know lanes: `result` says of which kind, `code` makes them."""
+
     @infer_global(operation)
     class Template(AbstractTemplate):
         def generic(self, arguments, keywords):
-            if len(arguments) != 2:
-                return None
-            lanes = _wider(*arguments)
-            if lanes is None:
-                return None
-            if not (of_floats if isinstance(lanes.scalar, types.Float) else of_ints):
+            lanes = _wider(*arguments) if len(arguments) == 2 else None
+            made = None if lanes is None else result(lanes)
+            if made is None:
                 return None
             return signature(
-                lanes, *(a if isinstance(a, Lanes) else lanes.scalar for a in arguments)
+                made, *(a if isinstance(a, Lanes) else lanes.scalar for a in arguments)
             )
 
     def lower(context, builder, sig, arguments):
-        lanes = sig.return_type
-        of = of_floats if isinstance(lanes.scalar, types.Float) else of_ints
-        return getattr(builder, of)(*_both(builder, sig, arguments, lanes))
+        lanes = _wider(*sig.args)
+        return code(builder, lanes, *_both(builder, sig, arguments, lanes))
 
     for a, b in ((Lanes, Lanes), (Lanes, types.Any), (types.Any, Lanes)):
         lower_builtin(operation, a, b)(lower)
+
+
+def _binary(operation: Any, of_floats: str | None, of_ints: str | None) -> None:
+    def name(lanes):
+        return of_floats if isinstance(lanes.scalar, types.Float) else of_ints
+
+    _operator(
+        operation,
+        lambda lanes: lanes if name(lanes) else None,
+        lambda builder, lanes, a, b: getattr(builder, name(lanes))(a, b),
+    )
 
 
 for _operations, _floats, _ints in (
@@ -172,27 +104,13 @@ for _operations, _floats, _ints in (
 
 
 def _comparison(operation: Any, sign: str) -> None:
-    @infer_global(operation)
-    class Template(AbstractTemplate):
-        def generic(self, arguments, keywords):
-            lanes = _wider(*arguments)
-            if lanes is None:
-                return None
-            mask = Lanes(types.boolean, lanes.width)
-            return signature(
-                mask, *(a if isinstance(a, Lanes) else lanes.scalar for a in arguments)
-            )
-
-    def lower(context, builder, sig, arguments):
-        lanes = _wider(*sig.args)
-        a, b = _both(builder, sig, arguments, lanes)
+    def compared(builder, lanes, a, b):
         if isinstance(lanes.scalar, types.Float):
             compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
             return compare(sign, a, b)
         return builder.icmp_signed(sign, a, b)
 
-    for a, b in ((Lanes, Lanes), (Lanes, types.Any), (types.Any, Lanes)):
-        lower_builtin(operation, a, b)(lower)
+    _operator(operation, lambda lanes: Lanes(types.boolean, lanes.width), compared)
 
 
 for _operation, _sign in (
@@ -220,25 +138,6 @@ def _negated(builder: Any, scalar: types.Type, value: Any) -> Any:
 
 _unary(operator.neg, _negated)
 _unary(operator.not_, lambda builder, scalar, value: builder.not_(value))
-
-
-def call_vector(name: str, lanes: Lanes) -> Callable:
-    """Code that calls an LLVM intrinsic of vectors, such as sqrt."""
-
-    def codegen(context, builder, sig, arguments):
-        vector = vector_of(lanes)
-        values = [
-            value if isinstance(kind, Lanes) else splat(builder, value, lanes)
-            for kind, value in zip(sig.args, arguments, strict=True)
-        ]
-        function = cgutils.get_or_insert_function(
-            builder.module,
-            ir.FunctionType(vector, [vector] * len(values)),
-            f"llvm.{name}.{shape(lanes)}",
-        )
-        return builder.call(function, values)
-
-    return codegen
 
 
 def _operands(*arguments: Any) -> tuple[Lanes, list]:

@@ -12,7 +12,7 @@ from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import accumulate, by_type, lanes_of
 from karamelo_py.compiler.lanes.arrays import Beside, at_lane, pointer_to
-from karamelo_py.compiler.lanes.numbers import (
+from karamelo_py.compiler.lanes.registers import (
     Lanes,
     element,
     lane,

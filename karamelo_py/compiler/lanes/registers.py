@@ -1,0 +1,108 @@
+"""Numbers that lie side by side in a vector register: their type, and how they get there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import models, register_model
+
+from karamelo_py.compiler.compile import by_type, define, lanes_of
+
+I32, I64 = ir.IntType(32), ir.IntType(64)
+
+
+class Lanes(types.Type):
+    """`width` numbers of a scalar type in a register."""
+
+    def __init__(self, scalar: types.Type, width: int):
+        self.scalar, self.width = scalar, width
+        super().__init__(name=f"Lanes({scalar}, {width})")
+
+
+def element(scalar: types.Type) -> ir.Type:
+    """How a number lies in a register."""
+    if isinstance(scalar, types.Boolean):
+        return ir.IntType(1)
+    if isinstance(scalar, types.Integer):
+        return ir.IntType(scalar.bitwidth)
+    return {64: ir.DoubleType(), 32: ir.FloatType()}[scalar.bitwidth]
+
+
+def vector_of(lanes: Lanes) -> ir.VectorType:
+    return ir.VectorType(element(lanes.scalar), lanes.width)
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, lanes: Lanes):
+        super().__init__(manager, lanes, vector_of(lanes))
+
+
+def constant(values: list[int], bits: ir.Type = I32) -> ir.Constant:
+    return ir.Constant(ir.VectorType(bits, len(values)), values)
+
+
+def splat(builder: Any, value: Any, lanes: Lanes) -> Any:
+    """The same number in all lanes."""
+    vector = vector_of(lanes)
+    if isinstance(lanes.scalar, types.Boolean) and value.type != ir.IntType(1):
+        value = builder.trunc(value, ir.IntType(1))
+    one = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(I32, 0))
+    return builder.shuffle_vector(
+        one, ir.Constant(vector, ir.Undefined), constant([0] * lanes.width)
+    )
+
+
+def lane(builder: Any, value: Any, k: int) -> Any:
+    return builder.extract_element(value, ir.Constant(I32, k))
+
+
+def pack(builder: Any, values: list, lanes: Lanes) -> Any:
+    out = ir.Constant(vector_of(lanes), ir.Undefined)
+    for k, value in enumerate(values):
+        out = builder.insert_element(out, value, ir.Constant(I32, k))
+    return out
+
+
+def shape(lanes: Lanes) -> str:
+    """What LLVM's intrinsics call a vector: v4f64."""
+    kind = "f" if isinstance(lanes.scalar, types.Float) else "i"
+    return f"v{lanes.width}{kind}{lanes.scalar.bitwidth}"
+
+
+def shuffle(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
+    return builder.shuffle_vector(a, b, constant(order))
+
+
+def known(function: Callable, made: Callable) -> None:
+    """Let `function` know lanes: where an argument has some, it is the intrinsic `made`."""
+
+    @by_type(function)
+    def chosen(*arguments):
+        if not lanes_of(arguments):
+            return None
+        names = ", ".join(f"a{k}" for k in range(len(arguments)))
+        return define(names, f"return made({names})", made=made)
+
+
+def call_vector(name: str, lanes: Lanes) -> Callable:
+    """Code that calls an LLVM intrinsic of vectors, such as sqrt."""
+
+    def codegen(context, builder, sig, arguments):
+        vector = vector_of(lanes)
+        values = [
+            value if isinstance(kind, Lanes) else splat(builder, value, lanes)
+            for kind, value in zip(sig.args, arguments, strict=True)
+        ]
+        function = cgutils.get_or_insert_function(
+            builder.module,
+            ir.FunctionType(vector, [vector] * len(values)),
+            f"llvm.{name}.{shape(lanes)}",
+        )
+        return builder.call(function, values)
+
+    return codegen

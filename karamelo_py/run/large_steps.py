@@ -1,0 +1,90 @@
+"""Steps above the stable limit, of this run and of later ones, told before they are taken."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from karamelo_py.kernels.watch import BORNE
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.stable import (
+    own_step_instead,
+    what_follows,
+)
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+
+
+class Step(NamedTuple):
+    """The step that a run asks for, where that is, and what its stable limit depends on."""
+
+    place: Any
+    fixed_dt: float | None
+    dt_factor: float | None
+    halves: bool
+    scene: tuple
+
+    @property
+    def command(self) -> str:
+        """What the script asks for it by."""
+        return "set_dt" if self.fixed_dt else "dt_factor"
+
+
+def step_of(hub: Hub, halves: bool) -> Step:
+    """The step that a run asks for here, which goes back and halves it in trouble or not."""
+    update = hub.update
+    method, scheme, transfer = update.method, update.scheme, update.transfer
+    scene = (
+        *(hub.domain.h, *hub.solids.values(), method, update.thermal),
+        *(type(scheme), scheme, type(transfer), transfer),
+    )
+    return Step(hub.place, update.fixed_dt, update.dt_factor, halves, scene)
+
+
+def warn_about_steps(
+    hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
+) -> None:
+    """Say so, once, where the step of this run or of a later one is above the stable limit.
+
+    Who goes on from a file is told `again`.
+
+    Raises
+    ------
+    ScriptError
+        See `foresight.warn`.
+    """
+    present = step_of(hub, halves)
+    _warn_about_step(hub, simulation, present, again=again)
+    for step in hub.later[len(hub.runs) :]:
+        if step.scene == present.scene:
+            _warn_about_step(hub, simulation, step, later=True)
+    hub.later.clear()
+
+
+def _warn_about_step(
+    hub: Hub, simulation: Simulation, step: Step, *, later: bool = False, again: bool = False
+) -> None:
+    limit = simulation.limit_moving
+    asked = step.fixed_dt or (step.dt_factor or 0) * limit
+    if not asked > limit * (1 + 1e-12):
+        return
+    of_heat = float(simulation.control.clock[0].heat_limit)
+    words = f"the step {asked:.4g} of {step.command} is "
+    hint = own_step_instead(hub, step.command)
+    if asked > BORNE * of_heat and not step.halves:
+        words += (
+            f"{asked / of_heat:.3g} times the stable one of conduction: temperatures would swing"
+        )
+        if not later:
+            raise ScriptError(words, hint=hint)
+    else:
+        words += f"above the stable limit {limit:.4g}"
+        words += (
+            f" of conduction; beyond {BORNE:g} times that temperatures swing"
+            if limit == of_heat
+            else what_follows(hub, simulation, asked)
+        )
+    name = f"{step.command} {step.fixed_dt or step.dt_factor}"
+    told = hub.update.foreseen
+    if again or name not in told:
+        told += [name] * (name not in told)
+        hub.warn(words, place=step.place, hint=hint)
