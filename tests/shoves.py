@@ -15,6 +15,21 @@ def brake(nodes):
     return float(np.abs(nodes.velocity_update).sum())
 
 
+def sway(view):
+    """Points or nodes are a bit faster where they are high."""
+    view.velocity[:, 0] *= 1 + 0.01 * np.sin(9 * view.position[:, 1])
+    return view.velocity.sum(axis=0)
+
+
+def warm(view):
+    """Nodes are a bit warmer where they are far, or points are heated there."""
+    far = 1 + 0.01 * np.sin(9 * view.position[:, 0])
+    if hasattr(view, "heat_supply"):
+        view.heat_supply[:] += far
+    else:
+        view.velocity[:, 0] *= far
+
+
 def carry(points):
     """Points go a bit further at the start of each step, by themselves, some beyond their tile."""
     points.position[:, 0] += 0.02 * (1 + np.sin(9 * points.position[:, 1]))

@@ -211,6 +211,55 @@ def test_a_signal(tmp_path):
     assert (tmp_path / "run" / f"d.{last}.txt").exists()
 
 
+SLOW = """
+import pathlib
+import time
+pathlib.Path("begun").touch()
+time.sleep(60)
+"""
+
+
+@needs_mpi
+@pytest.mark.parametrize("ranks", ["1", "2"])
+def test_a_signal_before_the_run(tmp_path, ranks):
+    """One message, and nothing is left behind."""
+    (tmp_path / "slow.py").write_text(SLOW, encoding="utf-8")
+    path = moving(tmp_path, "fix(s, python, all, slow.down)", "run(2)")
+    process = started(tmp_path / "run", *PROGRAM, str(path), "--ranks", ranks)
+    while not (tmp_path / "run" / "begun").exists():
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert not out and err == "error: ended by SIGTERM\n"
+
+
+SOON = """
+from karamelo_py.app import launch
+launch.LOOK, launch.STANDS = 0.1, 0.5
+"""
+
+
+@needs_mpi
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+def test_a_process_is_stopped(tmp_path):
+    """All wait: the user is told which; a signal ends them with the last state, that one too."""
+    (tmp_path / "sitecustomize.py").write_text(SOON, encoding="utf-8")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    process = running(tmp_path, PYTHONPATH=folders)
+    pid = _pids(process.pid)[1]
+    os.kill(pid, signal.SIGSTOP)
+    stands = f"process 2 of 2 (pid {pid}) is stopped"
+    while stands not in (said := process.stderr.readline()):
+        assert said, "it ended"
+    process.send_signal(signal.SIGTERM)
+    _out, err = process.communicate(timeout=120)
+    assert process.returncode == 128 + signal.SIGTERM, err
+    assert err.count("interrupted: the log and the dumps are complete") == 1
+    assert "stopped" not in err
+
+
 @needs_mpi
 @pytest.mark.parametrize("rank", [pytest.param(0, marks=pytest.mark.full), 1])
 def test_a_process_is_killed(tmp_path, rank):
@@ -267,6 +316,7 @@ import json
 import os
 import re
 from karamelo_py.run import ranks, shares, tiles
+from karamelo_py.styles.computes import linear_momentum
 tiles.DIRECT_UP_TO = 0
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
     def out_of_memory(*_):
@@ -278,16 +328,61 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
 @needs_mpi
 @pytest.mark.parametrize(
     "function",
-    [pytest.param("ranks.Ranks._advance", marks=pytest.mark.full), "shares.SharedTiles.give"],
+    [
+        pytest.param("ranks.Ranks._advance", marks=pytest.mark.full),
+        "shares.SharedTiles.give",
+        "linear_momentum.LinearMomentum.terms",
+    ],
 )
 def test_only_one_fails(tmp_path, function):
-    """In its steps, and in what kernels ask for: the others end, too."""
+    """In its steps, in what kernels ask for, in what a compute adds up: the others end, too."""
     (tmp_path / "sitecustomize.py").write_text(BREAKS.format(function), encoding="utf-8")
-    path = moving(tmp_path, "run(20)")
+    path = moving(tmp_path, "compute(p, linear_momentum, all)", "run(20)")
     folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     status, _, err = by_ranks(tmp_path / "run", path, 2, PYTHONPATH=folders)
     assert status == 1
     assert err.count("error: ") == 1 and "memory" in err and "in process 2 of 2" in err
+
+
+READ_ONLY = """
+import errno
+import os
+from karamelo_py.run import tiles
+tiles.DIRECT_UP_TO = 0
+if os.environ.get("OMPI_COMM_WORLD_RANK") == "0":
+    from karamelo_py.output import files
+    replace, done = os.replace, []
+    def once(*names):
+        if done:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+        done.append(replace(*names))
+    files.os = type("", (), {"replace": once})
+"""
+FAILS = "def push(points):\n    if points.time > 0.01:\n        points.force[99999] = 0\n"
+
+
+@needs_mpi
+@pytest.mark.parametrize(
+    "line, says",
+    [
+        ("dump(d, all, particle, 5, d.*.txt, x)", "Read-only file system"),
+        ("dump(d, all, vtk, 5, d.*.vtu)", "Read-only file system"),
+        ("restart(5, r.*.h5)", "Read-only file system"),
+        ("fix(f, python, all, fails.push)", "index 99999 is out of bounds"),
+    ],
+)
+def test_the_first_fails(tmp_path, line, says):
+    """The folder becomes read-only; a fix in Python raises in the midst of a step."""
+    if "python" in line:
+        (tmp_path / "fails.py").write_text(FAILS, encoding="utf-8")
+    else:
+        (tmp_path / "sitecustomize.py").write_text(READ_ONLY, encoding="utf-8")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    path = moving(tmp_path, line, "run(20)")
+    status, _, err = by_ranks(tmp_path / "run", path, 2, PYTHONPATH=folders)
+    assert status == 1, err
+    assert err.count("error: ") == 1 and says in err
+    assert not list((tmp_path / "run").glob("*.part"))
 
 
 # --- before anything is started -----------------------------------------------------------------

@@ -13,6 +13,7 @@ from combinations import MESHED, scene, write_mesh
 from going_on import CURVE, SCENES, same_files, with_files
 from scenes import SCHEMES, block
 from states import same_bits
+from test_heat import HOT, slab
 from test_restart import ways
 
 from karamelo_py.language.interpreter import Interpreter
@@ -254,6 +255,33 @@ def test_points_moved_by_python(state_interpreted, tmp_path, method):
         2, "fix(c, python, all, shoves.carry)", *DUMPS, *MOVING, "run(14)", ppc=3, size=(0.3, 0.2)
     ).replace("method(ulmpm,", f"method({method},")
     assert shared(state_interpreted, tmp_path, with_files(script, "restart(5, r.*.h5)\n"), ranks=3)
+
+
+SWAYING = """\
+region(everywhere, block, INF, INF, INF, INF)
+group(nodes, nodes, region, everywhere, all)
+fix(a, python, nodes, shoves.sway, post_particles_to_grid)
+fix(b, python, nodes, shoves.sway, post_velocities_to_grid)
+fix(c, python, all, shoves.sway, post_grid_to_point)
+fix(d, python, all, shoves.sway, post_advance_particles)
+fix(e, python, all, shoves.sway, final_integrate)
+log_modify(custom, step, a_x, b_y, c_x, d_y, e_x)
+"""
+WARMING = """
+    fix(a, python, end, shoves.warm, post_heat_to_grid)
+    fix(b, python, end, shoves.warm, post_update_grid_heat)
+    fix(c, python, all, shoves.warm, supply_heat)
+"""
+
+
+@pytest.mark.parametrize("script", ["sways", "warms"])
+def test_python_at_every_moment(state_interpreted, tmp_path, script):
+    scripts = {
+        "sways": block(2, SWAYING, MOVING[0], *MOVING[3:], "set_output(3)", "run(7)",
+                       size=(0.3, 0.2)),
+        "warms": slab(HOT.format(301) + WARMING, ", hot_s", "run(6)"),
+    }  # fmt: skip
+    assert shared(state_interpreted, tmp_path, with_files(scripts[script]), ranks=3)
 
 
 def test_a_load_by_a_reaction(state_interpreted, tmp_path):

@@ -7,13 +7,14 @@ import re
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
 from karamelo_py import __version__
 from karamelo_py.app.launch import launch
-from karamelo_py.app.leaving import INTERRUPTED, leaving_at_once
+from karamelo_py.app.leaving import INTERRUPTED, SIGNALLED, leaving_at_once, telling_of_the_end
 from karamelo_py.app.options import (
     VARIABLE,
     add_output_options,
@@ -28,7 +29,6 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
 
 ERROR = 1
-SIGNALLED = 128  # as a shell reports a program that a signal ended: this and its number
 
 RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
 CHECK = """\
@@ -53,7 +53,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     keep_to_oneself()
-    status, text = outcome_of(lambda: _dispatch(arguments), debugging="--debug" in arguments)
+    # Where there are several, their launcher tells of it.
+    with nullcontext() if launched()[0] > 1 else telling_of_the_end():
+        status, text = outcome_of(lambda: _dispatch(arguments), debugging="--debug" in arguments)
     if text:
         _complain(text)
     return status

@@ -21,6 +21,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from karamelo_py.app.leaving import SIGNALLED
 from karamelo_py.run.crew import ENDING, INSTALL
 from karamelo_py.script.errors import ScriptError, render_message
 
@@ -35,10 +36,10 @@ OPEN_MPI = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
-SIGNALLED = 128
 PAUSE = 0.05  # seconds between two looks at mpiexec
 GRACE = 2.0  # seconds that processes have to end after it
 LONGEST = 15.0  # ... after one of them has failed; twice that where mpiexec does not heed
+LOOK, STANDS = 1.0, 10.0  # seconds between two looks at processes, and until one is told of
 AT_ONCE = 3  # so many signals end all without waiting for the step
 LONGEST_NAME = 90  # of a socket
 A_CORE = 16  # processes at most: who asks for more means another number
@@ -98,6 +99,9 @@ class Launcher:
         self.failed = 0.0  # when one has told that it failed
         self.signals: list[int] = []
         self.heeded: list[int] = []
+        self.stopped: dict[int, float] = {}  # since when
+        self.told: set[int] = set()  # of these
+        self.looked = 0.0
         self.process: Any = None
 
     def run(self) -> int:
@@ -113,6 +117,7 @@ class Launcher:
             )  # fmt: skip
             while self.process.poll() is None:
                 self._listen()
+                self._tell_of_those_that_stand()
                 self._end_those_that_stay()
             end = time.monotonic() + GRACE
             while self.links and time.monotonic() < end:
@@ -146,6 +151,8 @@ class Launcher:
     def _pass_on(self, number: int, _: Any) -> None:
         self.signals.append(number)
         first = next((link for link, one in self.links.items() if one["rank"] == 0), None)
+        for pid in self._stopped():  # the run ends with their part of its last state
+            os.kill(pid, signal.SIGCONT)
         if first is not None and 0 not in self.reports and len(self.signals) < AT_ONCE:
             with suppress(OSError):
                 first.sendall(bytes([number]))
@@ -161,6 +168,29 @@ class Launcher:
                 self.process.kill()
             elif late > LONGEST:
                 self.process.terminate()
+
+    def _stopped(self) -> list[int]:
+        """Processes that somebody has stopped, as far as the system tells."""
+        found = []
+        for one in self.links.values():
+            with suppress(OSError):
+                state = Path(f"/proc/{one['pid']}/stat").read_text().rpartition(")")[2].split()[0]
+                found += [one["pid"]] * (state == "T")
+        return found
+
+    def _tell_of_those_that_stand(self) -> None:
+        """Say so where all wait for a process that somebody has stopped."""
+        now = time.monotonic()
+        if now < self.looked + LOOK:
+            return
+        self.looked, stopped = now, self._stopped()
+        self.stopped = {pid: self.stopped.get(pid, now) for pid in stopped}
+        for pid, since in self.stopped.items():
+            if now - since > STANDS and pid not in self.told:
+                self.told.add(pid)
+                rank = next(one["rank"] for one in self.links.values() if one["pid"] == pid)
+                text = f"process {rank + 1} of {self.ranks} (pid {pid}) is stopped: all wait for it"
+                self._say(render_message("warning", text, hint=f"kill -CONT {pid}"))
 
     def _listen(self) -> None:
         ready, *_ = select.select([self.door, *self.unknown, *self.links], [], [], PAUSE)
@@ -203,8 +233,9 @@ class Launcher:
         if first is not None:
             return 0
         if self.signals:
-            if self.signals[0] == signal.SIGINT:
-                self._say(render_message("error", "interrupted"))
+            first = signal.Signals(self.signals[0])
+            what = "interrupted" if first == signal.SIGINT else f"ended by {first.name}"
+            self._say(render_message("error", what))
             return SIGNALLED + self.signals[0]
         self._say(self._loss() if self.lost else self._no_start())
         status = self.process.returncode

@@ -281,14 +281,14 @@ class Ranks(Leading):
             tilings = tilings_of(tiles, len(blocks), state)
             whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
             tiles.share_out(work_of(tiles.loads(whole), self.part.work.costs))
-        self._together("read", path, tiles.cuts)
+        self._together("read", path, tiles.owner)
         self._handed_out = self.version
 
-    def read(self, path: Path, cuts: np.ndarray) -> None:
+    def read(self, path: Path, owner: np.ndarray) -> None:
         """Take the own share of the state that a file holds."""
         part = self.part
         with opened(path) as state:
-            part.tiles.cut(cuts)
+            part.tiles.owner = owner
             part.tiles.empty_nodes(part.setup)
             part.put(own_share(part, state))
             reached = zip(*self.crew.everyone(part.tiles.reached), strict=True)

@@ -113,7 +113,7 @@ def tilings_of(tiles: SharedTiles, blocks: int, state: Mapping) -> list[Tiling]:
 
 
 def own_share(part: Any, state: Mapping) -> dict[str, np.ndarray]:
-    """Points and tiles of a part, as its tiles are cut."""
+    """Points and tiles of a part, in the tiles that it owns."""
     blocks, found = part.setup.blocks, {}
     own = part.tiles.owner == part.crew.rank
     for k, tiling in enumerate(tilings_of(part.tiles, len(blocks), state)):
