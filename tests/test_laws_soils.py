@@ -419,3 +419,37 @@ def test_single_precision():
         assert float(plastic_strain(single, kin, state)) == pytest.approx(
             plastic_strain(law, kin, double), rel=1e-2
         )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_opening_is_told_by_the_elastic_volume(seed):
+    """Beside the return of Tampubolon et al. 2017 (section 4.3.4), on a path at random.
+
+    Their logarithmic elastic strain takes part in the increment, and what the tip takes of its
+    trace is added to it in the next step, until it is used up. Strains are small, so that their
+    stress and ours differ by strains squared.
+    """
+    law, kin = drucker(c=0, psi=0), Space()
+    rng = np.random.default_rng(seed)
+    state, elastic, apart = start(law, kin), np.zeros((3, 3)), 0.0
+    opened, most = 0, 0.0
+    for _ in range(300):
+        shear = rng.normal(size=(3, 3))
+        step = 1e-5 * (shear + shear.T - np.trace(shear + shear.T) / 3 * np.eye(3))
+        step += rng.choice((1e-4, -1e-4)) / 3 * np.eye(3) - 1e-7 * opened * np.eye(3)
+        state = stretched(law, kin, state, step, 1)
+        trial = elastic + step + apart / 3 * np.eye(3)
+        volume = np.trace(trial)
+        if volume >= 0:
+            elastic, apart = np.zeros((3, 3)), volume
+        else:
+            s = trial - volume / 3 * np.eye(3)
+            size = 2 * G * sqrt(np.sum(s * s) / 2)
+            borne = -law.strength.friction * K * volume
+            elastic, apart = s * min(1, borne / max(size, 1e-300)) + volume / 3 * np.eye(3), 0.0
+        wanted = 2 * G * elastic + (K - 2 * G / 3) * np.trace(elastic) * np.eye(3)
+        opened += apart > 0
+        most = max(most, np.abs(wanted).max())
+        assert np.abs(stress(law, kin, state) - wanted).max() < 2e-3 * max(most, 1e-4 * K)
+    assert 20 < opened < 280
+    assert most > 3e-4 * K

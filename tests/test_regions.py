@@ -7,6 +7,7 @@ import pytest
 from hubs import SmallHub, arguments
 from hypothesis import given
 from hypothesis import strategies as st
+from meshed import grid_mesh, sphere_surface, write
 
 from karamelo_py.commands import domain as commands
 from karamelo_py.scene.domain import Domain
@@ -16,7 +17,9 @@ from karamelo_py.styles.regions.block import Block
 from karamelo_py.styles.regions.cylinder import Cylinder
 from karamelo_py.styles.regions.difference import Difference
 from karamelo_py.styles.regions.intersection import Intersection
+from karamelo_py.styles.regions.mesh import MeshRegion
 from karamelo_py.styles.regions.sphere import Sphere
+from karamelo_py.styles.regions.stl import STL
 from karamelo_py.styles.regions.union import Union
 
 
@@ -345,3 +348,33 @@ def test_a_region_lies_in_its_box(seed):
         if len(found):
             assert (found >= region.lo[:2] - 1e-9).all()
             assert (found <= region.hi[:2] + 1e-9).all()
+
+
+@pytest.mark.parametrize("exterior", [(), ("exterior",)])
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_distances_tell_inside_from_outside_and_are_none_too_long(dimension, exterior, tmp_path):
+    """No function that changes by at most the way gone is more than the distance of its zeros."""
+    hub = SmallHub(dimension)
+    block = hub.region("b", Block, *[-0.2, 0.13] * dimension, *exterior)
+    ball = hub.region("s", Sphere, *[0.1] * dimension, 0.2)
+    regions = [block, ball]
+    if dimension == 3:
+        regions.append(hub.region("c", Cylinder, "z", 0.1, 0, 0.2, -0.1, "INF", *exterior))
+        points, triangles = sphere_surface(0.25, 8, 6)
+        path = write(tmp_path / "ball.stl", points, {"triangle": triangles}, binary=True)
+        regions.append(hub.regions.add("stl", STL(hub, path)))
+    nodes, cells = grid_mesh(("line", "quad", "tetra")[dimension - 1], (2,) * dimension)
+    nodes[:, :dimension] -= 0.7
+    path = write(tmp_path / "m.vtu", nodes, {("line", "quad", "tetra")[dimension - 1]: cells})
+    regions.append(hub.regions.add("mesh", MeshRegion(hub, path)))
+    if dimension == 2:
+        regions.append(hub.region("c", Cylinder, 0.1, 0, 0.2, *exterior))
+    for k, style in enumerate((Union, Intersection, Difference)):
+        regions.append(hub.combine(f"r{k}", style, *regions[-2:]))
+    rng = np.random.default_rng(3)
+    x = rng.uniform(-0.4, 0.4, (300, dimension))
+    y = x + rng.normal(0, 0.02, x.shape)
+    for region in regions:
+        depth, beside = region.depth(x, 0.3), region.depth(y, 0.3)
+        np.testing.assert_array_equal(depth > 0, region.inside(x))
+        assert (np.abs(depth - beside) <= np.linalg.norm(x - y, axis=1) * (1 + 1e-9)).all()

@@ -8,12 +8,14 @@ import pytest
 from hubs import DENSITY, SmallHub
 from hypothesis import given
 from hypothesis import strategies as st
+from meshed import cube_surface, write
 
 from karamelo_py.commands import solids as commands
 from karamelo_py.points.basis.cpdi.parallel import R4
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.scene.placement import cell_pattern
+from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method, OwnGrids
 from karamelo_py.styles.methods.ulcpdi import ULCPDI
@@ -21,7 +23,9 @@ from karamelo_py.styles.regions.block import Block
 from karamelo_py.styles.regions.cylinder import Cylinder
 from karamelo_py.styles.regions.difference import Difference
 from karamelo_py.styles.regions.intersection import Intersection
+from karamelo_py.styles.regions.mesh import MeshRegion
 from karamelo_py.styles.regions.sphere import Sphere
+from karamelo_py.styles.regions.stl import STL
 from karamelo_py.styles.regions.union import Union
 
 
@@ -160,7 +164,7 @@ CUT = {
 @pytest.mark.parametrize("ppc", [1, 2, 3])
 @pytest.mark.parametrize("shape", CUT)
 def test_what_a_region_cuts_has_its_area(shape, ppc):
-    """Lengths in cells. Edges along the axes but within the box are known to 1/200 of h/ppc."""
+    """Lengths in cells."""
     hub = SmallHub(2, -10, 10, 1.0)
     region, exact, tolerance = CUT[shape]
     solid = hub.solid("s", region(hub), ppc=ppc, points="cut")
@@ -180,18 +184,61 @@ def test_a_part_that_bounds_the_region_may_be_thin():
     assert not hub.warnings
 
 
+def slanted(hub, tmp_path, width, thickness):
+    """A plate of this size that leans, in the plane."""
+    turn = np.array([[0.8, 0.6], [-0.6, 0.8]])
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * (width, thickness)
+    nodes = np.zeros((4, 3))
+    nodes[:, :2] = corners @ turn + (0.31, 0.17)
+    path = write(tmp_path / "plate.vtu", nodes, {"quad": np.array([[0, 1, 2, 3]])})
+    return hub.regions.add("plate", MeshRegion(hub, path))
+
+
+@pytest.mark.parametrize(("thickness", "tolerance"), [(0.08, 0.03), (0.3, 0.01)])
+def test_a_thin_part_that_leans_has_its_area(tmp_path, thickness, tolerance):
+    """Lengths in boxes of points; tolerances are those that the documentation says."""
+    hub = SmallHub(2, -10, 10, 1.0)
+    plate = slanted(hub, tmp_path, 5, thickness)
+    solid = hub.solid("s", plate, ppc=1, points="cut")
+    assert solid.volume0.sum() == pytest.approx(5 * thickness, rel=tolerance)
+    assert not hub.warnings
+
+
 @pytest.mark.parametrize("style", [Union, Difference])
-def test_parts_too_thin_to_be_seen_are_told(style):
+def test_parts_too_thin_to_be_seen_are_told(style, tmp_path):
     hub = SmallHub(2, -10, 10, 1.0)
-    hub.solid("s", thin(hub, style, Block, 3, 6, 1.01, 1.05), points="cut")
-    assert "thinner than points=cut sees, 0.05" in hub.warnings[0]
+    thin = slanted(hub, tmp_path, 5, 0.01)
+    block = hub.region("block", Block, 0, 4, 0, 2)
+    hub.solid("s", hub.combine("r", style, block, thin), ppc=1, points="cut")
+    assert "thinner than points=cut sees, 0.0312" in hub.warnings[0]
 
 
-def test_a_ring_too_thin_to_be_seen_is_told():
+def test_a_thin_sheet_in_space_is_told(tmp_path):
+    """A surface of triangles, of which the mass would be missing."""
+    hub = SmallHub(3, -2, 2, 1.0)
+    nodes, triangles = cube_surface(-0.5, 0.5)
+    turn = np.linalg.qr(np.array([(1, 2, 3), (4, 1, -1), (0.3, -1, 2.0)]))[0]
+    path = write(tmp_path / "s.stl", (nodes * (0.9, 0.9, 0.004)) @ turn, {"triangle": triangles})
+    hub.solid("s", hub.regions.add("sheet", STL(hub, path)), ppc=1, points="cut")
+    assert "thinner than points=cut sees, 0.0312" in hub.warnings[0]
+
+
+def test_a_thin_ring_has_its_area():
     hub = SmallHub(2, -10, 10, 1.0)
-    disks = [hub.region(f"d{k}", Cylinder, 0.1, 0.1, r) for k, r in enumerate((2.5, 2.46))]
-    hub.solid("s", hub.combine("ring", Difference, *disks), ppc=1, points="cut")
-    assert "thinner than points=cut sees, 0.1" in hub.warnings[0]
+    disks = [hub.region(f"d{k}", Cylinder, 0.1, 0.1, r) for k, r in enumerate((2.5, 2.4))]
+    solid = hub.solid("s", hub.combine("ring", Difference, *disks), ppc=1, points="cut")
+    assert solid.volume0.sum() == pytest.approx(np.pi * (2.5**2 - 2.4**2), rel=0.03)
+
+
+def test_a_region_that_knows_no_distance_is_cut():
+    """As those of plug-ins, which only say what they contain."""
+
+    class Plain(Cylinder):
+        distance = Region.distance
+
+    hub = SmallHub(2, -1, 1, 0.1)
+    solid = hub.solid("s", hub.region("r", Plain, 0.013, 0.021, 0.61), points="cut")
+    assert solid.volume0.sum() == pytest.approx(np.pi * 0.61**2, rel=1e-3)
 
 
 def test_domains_with_corners_are_not_cut():

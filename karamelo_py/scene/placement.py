@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.scene.cut import Pieces, cut, join, missed
+from karamelo_py.scene.cut import Pieces, cut, join
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice, chunks, positions
 from karamelo_py.scene.region import Region
@@ -38,7 +38,7 @@ class Placement(NamedTuple):
     corners : ndarray (n, c, d) or None
         Corners of the initial domains that are no boxes.
     missed : float
-        Parts of the region thinner than that may be missing, see `cut.missed`.
+        Parts of the region thinner than that may be missing, see `Pieces.missed`.
     """
 
     x0: "np.ndarray | Filled"
@@ -66,6 +66,13 @@ class Filled:
         self._corner, self._h, self._places = corner, h, places
         self._kept: list[np.ndarray | None] = []
         self._ends = [0]
+        self._moved = np.empty(0, np.int64), np.empty((0, len(corner)))
+        # Where equally spaced places are within their cell, and which one is where.
+        self._counts = tuple(b - a + 1 for a, b in zip(first, last, strict=True))
+        self._ppc = round(len(places) ** (1 / len(corner)))
+        self._subs = np.rint((places / h + 0.5) * self._ppc - 0.5).astype(np.int64)
+        self._number = np.empty((self._ppc,) * len(corner), np.int64)
+        self._number[tuple(self._subs.T)] = np.arange(len(places))
 
     def candidates(self, k: int) -> np.ndarray:
         """All places (m, d) in the k-th chunk of cells."""
@@ -82,6 +89,30 @@ class Filled:
         self._kept.append(np.packbits(kept) if 0 < count < len(kept) else None)
         self._ends.append(self._ends[-1] + count)
 
+    def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Numbers (n,) of places so many (n, d) further along each axis; -1 beyond the cells.
+
+        Places stand at equal distances. They are numbered through all cells.
+        """
+        cell, place = np.divmod(number, len(self._places))
+        index = np.array(np.unravel_index(cell, self._counts)).T * self._ppc + self._subs[place]
+        index += step
+        counts = np.array(self._counts)
+        none = ((index < 0) | (index >= counts * self._ppc)).any(axis=1)
+        cell, place = np.divmod(np.where(none[:, None], 0, index), self._ppc)
+        number = np.ravel_multi_index(tuple(cell.T), self._counts) * len(self._places)
+        return np.where(none, -1, number + self._number[tuple(place.T)])
+
+    def middles(self, number: np.ndarray) -> np.ndarray:
+        """Where places with these numbers are, (n, d)."""
+        cell, place = np.divmod(number, len(self._places))
+        index = np.array(np.unravel_index(cell, self._counts)).T + np.array(self._cells[0])
+        return self._corner + (index + 0.5) * self._h + self._places[place]
+
+    def move(self, rows: np.ndarray, x: np.ndarray) -> None:
+        """Put points with the numbers `rows`, in order, to other places (n, d)."""
+        self._moved = rows, x
+
     def __len__(self) -> int:
         return self._ends[-1]
 
@@ -95,6 +126,9 @@ class Filled:
             low, high = max(first, begin), min(last, end)
             if low < high:
                 out[low - begin : high - begin] = self._some(k, low - first, high - first)
+        moved, x = self._moved
+        some = slice(*np.searchsorted(moved, [begin, end]))
+        out[moved[some] - begin] = x[some]
         return out
 
     def _some(self, k: int, low: int, high: int) -> np.ndarray:
@@ -226,16 +260,19 @@ def fill(
     places = pattern.places * h
     x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
     numbers: list[np.ndarray] = []  # which point of the pattern each one is
-    left: list[Pieces] = []
+    left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
-    for k in range(len(x0.chunks)):
+    for k, (begin, _) in enumerate(x0.chunks):
         x = x0.candidates(k)
+        if rule == "cut":
+            left.append(cut(region, x, h / ppc, begin * len(places)))
+        if rule == "cut" and not counted:
+            continue
         kept = region.inside(x)
         in_domain = domain.contains(x)
         if counted:
             outside += _beyond_closed_sides(x[kept & ~in_domain], lo, hi, domain)
         if rule == "cut":
-            left.append(cut(region, x, h / ppc))
             continue
         kept &= in_domain
         x0.keep(kept)
@@ -245,14 +282,40 @@ def fill(
         outside = math.inf
     placed = placed._replace(x0=x0, outside=outside)
     if left:
-        pieces = join(Pieces.all_of(left), h / ppc)
-        half = placed.half_size * pieces.share[:, None] ** (1 / dimension)
-        placed = placed._replace(x0=pieces.middle, volume=placed.volume * pieces.share)
-        return placed._replace(half_size=half, missed=missed(region, pieces, h / ppc))
+        return _cut_off(placed, region, h / ppc, left)
     if even:
         return placed
     sizes = pattern.sizes[np.concatenate(numbers)] * h if numbers else np.empty((0, dimension))
     return placed._replace(volume=sizes.prod(axis=1), half_size=sizes / 2)
+
+
+def _cut_off(
+    placed: Placement, region: Region, size: float, left: list[tuple[np.ndarray, Pieces]]
+) -> Placement:
+    """With what is left at the edge of the region in place of whole boxes, see `cut`."""
+    x0, d = placed.x0, region.dimension
+    pieces = join(region, x0, Pieces.all_of([piece for _, piece in left]))
+    begin, rows = 0, []
+    for kept, _ in left:
+        some = slice(*np.searchsorted(pieces.number, [begin, begin + len(kept)]))
+        number = pieces.number[some] - begin
+        kept[number] = pieces.share[some] > 0
+        if len(number):
+            rows.append(len(x0) - 1 + np.cumsum(kept)[number[kept[number]]])
+        x0.keep(kept)
+        begin += len(kept)
+    held = pieces.share > 0
+    row = np.concatenate(rows) if rows else np.empty(0, np.int64)
+    x0.move(row, pieces.middle[held])
+    share = np.ones((len(x0), 1))
+    share[row, 0] = pieces.share[held]
+    half = np.ones((len(x0), 1))
+    half[row, 0] = pieces.share[held] ** (1 / d)
+    return placed._replace(
+        volume=placed.volume * share[:, 0],
+        half_size=size / 2 * half,
+        missed=pieces.missed(size),
+    )
 
 
 def _beyond_closed_sides(x: np.ndarray, lo: np.ndarray, hi: np.ndarray, domain: Domain) -> int:

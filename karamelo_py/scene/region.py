@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,7 @@ from karamelo_py.scene.domain import require_domain
 from karamelo_py.script.errors import Place, ScriptError
 
 EXTERIOR = "exterior"
+HALVINGS = 12  # of the way on which a surface is looked for
 
 
 class Region:
@@ -92,6 +94,32 @@ class Region:
         inside = self.contains(x)
         return ~inside if self.exterior else inside
 
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        """How far in the shape positions `x` (n, >= dimension) lie, below 0 outside: (n,).
+
+        At most the distance from its surface, as far as it is below `reach`; near a plane part of
+        the surface a linear function of `x`. `exterior` plays no part here. What follows from
+        `contains` alone, along the axes, does not see what is thinner than `reach`.
+        """
+        d = self.dimension
+        reach *= math.sqrt(d)
+        inside = self.contains(x)
+        near = np.full((len(x), 2 * d), reach)
+        for k, way in enumerate(np.concatenate([np.eye(d), -np.eye(d)])):
+            other = np.flatnonzero(self.contains(x[:, :d] + reach * way) != inside)
+            low, high = np.zeros(len(other)), np.full(len(other), reach)
+            for _ in range(HALVINGS):
+                middle = (low + high) / 2
+                same = self.contains(x[other, :d] + middle[:, None] * way) == inside[other]
+                low, high = np.where(same, middle, low), np.where(same, high, middle)
+            near[other, k] = high
+        return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
+
+    def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
+        """How far in the region positions lie, see `distance`: (n,)."""
+        depth = self.distance(x, reach)
+        return -depth if self.exterior else depth
+
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Region:
         """The region that `argument` names."""
@@ -123,9 +151,19 @@ def check_radius(radius: float, place: Place | None) -> None:
 
 def within(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):
     """Which positions are at most `radius` from `centre`, measured along `axes` only: (n,) bool."""
+    return _square(x, centre, axes) <= radius * radius
+
+
+def below(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):
+    """How far positions lie below the surface of such a ball or cylinder: (n,)."""
+    square = _square(x, centre, axes)
+    return radius - np.sqrt(square, out=square)
+
+
+def _square(x: np.ndarray, centre: Sequence[float], axes: Sequence[int]) -> np.ndarray:
     square = np.zeros(len(x))
     for axis, middle in zip(axes, centre, strict=True):
         distance = x[:, axis] - middle
         distance *= distance
         square += distance
-    return square <= radius * radius
+    return square

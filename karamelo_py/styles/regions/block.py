@@ -64,3 +64,13 @@ class Block(Region):
             if hi < np.inf:
                 inside &= x[:, axis] <= hi + self.tolerance
         return inside
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        """How far positions lie between the faces, see `Region.distance`."""
+        depth = np.full(len(x), reach)
+        for axis, (lo, hi) in enumerate(zip(self.corner_lo, self.corner_hi, strict=True)):
+            if lo > -np.inf:
+                np.minimum(depth, x[:, axis] - lo, out=depth)
+            if hi < np.inf:
+                np.minimum(depth, hi - x[:, axis], out=depth)
+        return depth

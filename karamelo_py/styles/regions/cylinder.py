@@ -8,7 +8,14 @@ from karamelo_py.language.by_dimension import Forms, place_of
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.region import Region, check_order, check_radius, split_exterior, within
+from karamelo_py.scene.region import (
+    Region,
+    below,
+    check_order,
+    check_radius,
+    split_exterior,
+    within,
+)
 
 FORMS = Forms(
     "region(ID, cylinder, {names}[, exterior])",
@@ -76,3 +83,11 @@ class Cylinder(Region):
             inside &= x[:, self.along] >= self.ends[0] - self.tolerance
             inside &= x[:, self.along] <= self.ends[1] + self.tolerance
         return inside
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        """How far positions lie below the surface, see `Region.distance`."""
+        depth = below(x, self.centre, self.across, self.radius)
+        if self.along is not None:
+            depth = np.minimum(depth, x[:, self.along] - self.ends[0])
+            depth = np.minimum(depth, self.ends[1] - x[:, self.along])
+        return depth

@@ -38,3 +38,8 @@ class Difference(Region):
         inside = first.inside(x)
         inside &= ~second.inside(x)
         return inside
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        """How far positions lie in it, see `Region.distance`."""
+        first, second = (part.depth(x, reach) for part in self.parts)
+        return np.minimum(first, -second)

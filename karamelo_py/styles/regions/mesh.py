@@ -1,5 +1,6 @@
 """Region style mesh."""
 
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.meshes.elements import elements_of
 from karamelo_py.scene.meshes.reading import MeshFile, read
 from karamelo_py.scene.meshes.simplices import Simplices, split
+from karamelo_py.scene.meshes.skin import Skin, outer_faces
 from karamelo_py.scene.region import EXTERIOR, Region
 
 
@@ -61,8 +63,21 @@ class MeshRegion(Region):
         super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
         # Meshes are written with fewer digits than numbers have.
         tolerance = max(self.tolerance, RELATIVE_TOLERANCE * float((hi - lo).max()))
+        self.corners = corners
         self.simplices = Simplices(corners, tolerance)
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Which positions lie in an element, see `Region.contains`."""
         return self.simplices.contain(np.asarray(x)[:, : self.dimension])
+
+    @cached_property
+    def skin(self) -> Skin:
+        """Its surface."""
+        return Skin(outer_faces(self.corners))
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        """How far positions lie below the surface, see `Region.distance`."""
+        if self.simplices.flat:
+            return np.full(len(x), -reach)  # nothing lies in a surface or a line
+        distance = self.skin.distance(x[:, : self.dimension], reach)
+        return np.where(self.contains(x), distance, -distance)

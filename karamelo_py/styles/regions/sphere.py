@@ -6,7 +6,7 @@ from karamelo_py.language.by_dimension import Forms, place_of
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.region import Region, check_radius, split_exterior, within
+from karamelo_py.scene.region import Region, below, check_radius, split_exterior, within
 
 FORMS = Forms(
     "region(ID, sphere, {names}[, exterior])",
@@ -47,3 +47,7 @@ class Sphere(Region):
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Which positions lie in the sphere, see `Region.contains`."""
         return within(x, self.centre, range(self.dimension), self.radius + self.tolerance)
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        """How far positions lie below the surface, see `Region.distance`."""
+        return below(x, self.centre, range(self.dimension), self.radius)

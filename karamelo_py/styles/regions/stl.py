@@ -1,5 +1,6 @@
 """Region style stl."""
 
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.meshes.reading import MeshFile, read
+from karamelo_py.scene.meshes.skin import Skin
 from karamelo_py.scene.meshes.surface import Surface
 from karamelo_py.scene.region import EXTERIOR, Region
 from karamelo_py.script.errors import ScriptError
@@ -64,3 +66,13 @@ class STL(Region):
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Which positions the surface encloses, see `Region.contains`."""
         return self.surface.encloses(np.asarray(x)[:, :3])
+
+    @cached_property
+    def skin(self) -> Skin:
+        """Its surface."""
+        return Skin(self.surface.corners)
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        """How far positions lie below the surface, see `Region.distance`."""
+        distance = self.skin.distance(x[:, :3], reach)
+        return np.where(self.contains(x), distance, -distance)

@@ -39,9 +39,11 @@ class RegionSolid(Solid):
         domains tile the cell. ``cut``: at equal distances, and what the region cuts of the boxes of
         the points at its edge is left out: these have the volume and stand in the middle of what
         is left; less than a tenth of a box goes to the nearest point beside it. Round bodies so
-        have their volume (to 0.1 %) and no steps of h/ppc at the rim, which contact would feel.
-        Parts of a region (fins, slots) are seen from a tenth of h/ppc on in 2D, a fifth in 3D; the
-        region itself may be thinner along an axis. The domains that ugimp and cpgimp give to cut
+        have their volume (to 0.01 %) and no steps of h/ppc at the rim, which contact would feel.
+        Parts of a region (fins, slots) as thin as a tenth of h/ppc have their mass to 3 %, whatever
+        their direction; where that of thinner ones may be missing, a message says so. A region of a
+        plug-in without a `distance` is looked at along the axes, where thin parts may be missed.
+        The domains that ugimp and cpgimp give to cut
         points are squares or cubes of the right volume, which do not tile the body at its edge;
         cpdi refuses them. For edge_pressure and edge_traction points are whole boxes: they refuse
         these.
