@@ -63,7 +63,7 @@ class Far(NamedTuple):
 
 JUMPS = Far((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # functions whose gradients jump
 BOXES = Far((18, 18), 6, (inf, inf), (60, 25), (inf, inf))
-QUADRATIC = Far((54, 27), 6, (inf, inf), (inf, 25), (inf, inf))
+QUADRATIC = Far((54, 20), 6, (inf, inf), (inf, 25), (inf, inf))
 CUBIC = Far((135, 70), 6, (inf, inf), (inf, inf), (inf, inf))
 
 
