@@ -256,5 +256,10 @@ def _from_to(numbers: np.ndarray, first: int, end: int) -> np.ndarray:
 
 def _like(nodes: Nodes) -> Nodes:
     """Nodes of the same kind, zero."""
-    fields = tuple(type(one)(np.zeros_like(one.array)) for one in nodes.fields)
-    return Nodes(*(np.zeros_like(array) for array in nodes[:-1]), fields)
+
+    def zeros(array: np.ndarray) -> np.ndarray:
+        return np.zeros(array.shape, array.dtype)  # touches nothing, unlike zeros_like
+
+    return Nodes(
+        *map(zeros, nodes[:-1]), tuple(type(one)(zeros(one.array)) for one in nodes.fields)
+    )

@@ -81,6 +81,9 @@ class SharedTiles(Tiles):
             ]
         )
         self.owner = np.zeros(self.count, np.int64)
+        # Memory of the points by block and field, and what is free by shape and type.
+        self._rooms: dict[tuple[int, str], np.ndarray] = {}
+        self._spare: dict[tuple, np.ndarray] = {}
         self.foreign = np.zeros(int(self._first_node[-1] + self._nodes[-1].prod()), np.uint8)
         self._marked = np.empty(0, np.int64)
         self.given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
@@ -142,12 +145,38 @@ class SharedTiles(Tiles):
         come = self.crew.traded({rank: parts(rank) for rank in others})
         if not come:
             return s
-        found = [parts(me), *come.values()]
+        found = zip(s.blocks, own, *come.values(), strict=True)
         blocks = tuple(
-            block._replace(points=joined(block.points, list(of_all)))
-            for block, *of_all in zip(s.blocks, *found, strict=True)
+            block._replace(points=self._with(k, block.points, np.flatnonzero(to == me), parts))
+            for k, (block, to, *parts) in enumerate(found)
         )
         return s._replace(blocks=blocks)
+
+    def _with(
+        self, k: int, points: Points, stay: np.ndarray, come: list[list[np.ndarray]]
+    ) -> Points:
+        """Those of the points of block `k` that stay, and what has come.
+
+        They take the place of what was there at the sort before: fresh memory for all of them would
+        cost more than all else that a sort does.
+        """
+        count = len(stay) + sum(parts[0].shape[-1] for parts in come)
+        arrays = []
+        for (name, old), *new in zip(arrays_of(points), *come, strict=True):
+            shape = (*old.shape[:-1], count)
+            kind, size = (shape[:-1], old.dtype), int(np.prod(shape))
+            room = self._spare.pop(kind, np.empty(0, old.dtype))
+            if room.size < size:
+                room = np.empty(size + size // 8, old.dtype)
+            array = room[:size].reshape(shape)
+            for c in np.ndindex(shape[:-1]):
+                np.take(old[c], stay, out=array[c][: len(stay)], mode="clip")
+                array[c][len(stay) :] = np.concatenate([part[c] for part in new])
+            if (k, name) in self._rooms:
+                self._spare[kind] = self._rooms[k, name]
+            self._rooms[k, name] = room
+            arrays.append(array)
+        return made_of(points, arrays)
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
         return float(self.crew.largest(np.array([super()._reach(s, block, x)]))[0])
@@ -341,7 +370,12 @@ def sized(points: Points, count: int) -> Points:
 
 def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
     """Points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
-    arrays = (np.concatenate(same, axis=-1) for same in zip(*parts, strict=True))
+    return made_of(points, [np.concatenate(same, axis=-1) for same in zip(*parts, strict=True)])
+
+
+def made_of(points: Points, found: Sequence[np.ndarray]) -> Points:
+    """Points of the kind of `points` with such arrays as `arrays_of` has given."""
+    arrays = iter(found)
     own = {
         name: None if array is None else next(arrays)
         for name, array in points._asdict().items()
