@@ -36,6 +36,9 @@ OPEN_MPI = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
+# Large pages for what the processes reserve, where Linux gives them to who asks: NumPy asks for the
+# arrays that it makes, not for those that grow. Four processes of a million points: a tenth faster.
+PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 PAUSE = 0.05  # seconds between two looks at mpiexec
 GRACE = 2.0  # seconds that processes have to end after it
 LONGEST = 15.0  # ... after one of them has failed; twice that where mpiexec does not heed
@@ -109,7 +112,7 @@ class Launcher:
         with socket.socket(socket.AF_UNIX) as self.door, self._hearing():
             self.door.bind(self.name)
             self.door.listen(self.ranks)
-            environment = {**OPEN_MPI, **os.environ, SOCKET: self.name}
+            environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}
             # A session of its own: Ctrl-C comes to this process alone.
             self.process = subprocess.Popen(
                 self.command, env=environment, stdin=subprocess.DEVNULL, stdout=self.said,
