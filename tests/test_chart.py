@@ -147,9 +147,12 @@ def test_words_along_the_axes(table, capsys):
     text = (table / "chart.svg").read_text(encoding="utf-8")
     assert "cells, in all" in text and "basis of N" in text
     assert main([*draw, "N,err", "-x", "N"]) == 0
-    assert main([*draw, "N,err", "-versus", "basis"]) == 1
+    two = ["-versus", "basis", "-where", "basis != linear"]
+    assert main([*draw, "relative error (1),", *two]) == 0
+    text = (table / "chart.svg").read_text(encoding="utf-8")
+    assert "relative error (1)" in text and " over " in text
     assert main(["chart", "sweep.csv", "-accuracy", "err", "-axes", "N,err"]) == 1
-    assert capsys.readouterr().err.count("expected: -curve, or -accuracy with -o") == 2
+    assert capsys.readouterr().err.count("expected: -curve, or -accuracy with -o") == 1
     assert main([*draw, "N"]) == 1
     assert "two, such as -axes" in capsys.readouterr().err
 

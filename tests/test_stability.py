@@ -44,7 +44,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_the_courant_limit_of_a_bar_is_found(folder, capsys):
-    words = ["-var", "factor=1:3:21", "-var", "push=0", "-o", "map.svg"]
+    words = ["-var", "factor=1:3:21", "-var", "push=0", "-o", "map.svg", "-axes", "c dt/h (1),"]
     assert main(["stability", "in.bar", *words]) == 0
     table = pandas.read_csv(folder / "map.csv")
     assert len(table) == 21 and (table["run"] == "yes").sum() < 12
@@ -52,7 +52,8 @@ def test_the_courant_limit_of_a_bar_is_found(folder, capsys):
     assert (np.diff(unstable.astype(int)) >= 0).all()  # one edge
     edge = table["factor"][unstable].min()
     assert 2.0 <= edge < 2.15
-    assert (folder / "map.svg").read_text().startswith("<?xml")
+    text = (folder / "map.svg").read_text(encoding="utf-8")
+    assert text.startswith("<?xml") and "c dt/h (1)" in text
     out = capsys.readouterr().out
     assert "of 21 cells were run" in out
     assert "times the program's stable step" in out
@@ -257,7 +258,8 @@ def test_the_own_step_is_stable_and_not_far_from_the_edge(run_interpreted, basis
     options = [w for name, value in words.items() for w in ("-var", name, str(value))]
 
     own = run_interpreted(SHAKEN.format(step=""), *options, folder="own", status=None)
-    assert settled(own)
+    # usl is told beforehand of what jumps at cell faces.
+    assert settled(own) or (drift and which == "usl" and "points that cross cells" in own.err)
     step = f"dt_factor({farthest(basis, which, kind, drift, ppc)})"
     far = run_interpreted(SHAKEN.format(step=step), *options, folder="far", status=None)
     assert not settled(far)

@@ -1,6 +1,5 @@
 """karamelo-py chart: what accuracy costs, how errors fall, where two variables lead."""
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ import numpy as np
 
 from karamelo_py.app.studies import histories, keeping, look, pictures, records, versus
 from karamelo_py.app.studies.curves import Family, missing, order
-from karamelo_py.app.studies.options import new_parser, out_file
+from karamelo_py.app.studies.options import add_axes, along, new_parser, out_file, split
 from karamelo_py.app.studies.study import shown, terminal
 from karamelo_py.app.studies.variables import holds
 from karamelo_py.script.errors import ScriptError
@@ -57,12 +56,7 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("-exact", metavar="COLUMN", help="of -curve: the exact log column")
     parser.add_argument("-names", default="", help="of -curve: what to call the runs, with commas")
-    parser.add_argument(
-        "-axes",
-        metavar="X,Y",
-        help="what to write along them, such as 'time (s),F (N)'; an empty one stays as it is, "
-        "one with commas stands in double quotes",
-    )
+    add_axes(parser)
     parser.add_argument("-log", default="log.mpm", metavar="FILE", help="of -curve: another log")
     parser.add_argument("-where", action="append", default=[], help="rows that fulfil a condition")
     parser.add_argument("-title", help="heads the chart (the name of the script)")
@@ -74,8 +68,8 @@ def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     costs = bool(options.cost) or not options.x
     options.cost = options.cost or "seconds"
-    if options.axes and (options.versus or options.keeps or not (options.o or options.curve)):
-        raise ScriptError("-axes", expected="-curve, or -accuracy with -o and without -versus")
+    if options.axes and (options.keeps or not (options.o or options.curve)):
+        raise ScriptError("-axes", expected="-curve, or -accuracy with -o")
     if options.versus:
         return side_by_side(options)
     if len(options.tables) > 1:
@@ -123,19 +117,6 @@ def run(options: Any) -> int:
     return 0
 
 
-def along(options: Any, x: str, y: str) -> tuple[str, str]:
-    """What to write along the axes: as the options say, else `x` and `y`."""
-    words = split(options.axes or ",")
-    if len(words) != 2:
-        raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
-    return words[0] or x, words[1] or y
-
-
-def split(text: str) -> list[str]:
-    """Words with commas between them; one in double quotes may have commas of its own."""
-    return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
-
-
 def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
     """The rows of a table that fulfil the conditions, its variables, and how it was made.
 
@@ -178,7 +159,11 @@ def side_by_side(options: Any) -> int:
         found += some
     versus.tell(found, known, options.accuracy, options.cost)
     if out is not None:
-        versus.draw(found, known, out, options.accuracy, options.cost, options.title or "")
+        cost = look.label(options.cost).removesuffix(" (s)")
+        words = along(
+            options, look.label(options.accuracy), f"{cost},\n{known[1]} over {known[0]} (1)"
+        )
+        versus.draw(found, known, out, words, options.accuracy, options.title or "")
         print(f"drawn: {out}")
     return 0
 

@@ -1,6 +1,7 @@
 """Options that the subcommands of studies share."""
 
 import argparse
+import csv
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,29 @@ def add_family(parser: Any) -> None:
         "-again", action="store_true", help="run also what is known from an earlier study"
     )
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+
+
+def add_axes(parser: Any) -> None:
+    """The option of words along the axes of a picture."""
+    parser.add_argument(
+        "-axes",
+        metavar="X,Y",
+        help="what to write along them, such as 'time (s),F (N)'; an empty one stays as it is, "
+        "one with commas stands in double quotes",
+    )
+
+
+def along(options: Any, x: str, y: str) -> tuple[str, str]:
+    """What to write along the axes: as the options say, else `x` and `y`."""
+    words = split(options.axes or ",")
+    if len(words) != 2:
+        raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
+    return words[0] or x, words[1] or y
+
+
+def split(text: str) -> list[str]:
+    """Words with commas between them; one in double quotes may have commas of its own."""
+    return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
 
 
 def add_combinations(parser: Any) -> None:

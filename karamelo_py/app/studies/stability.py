@@ -16,7 +16,9 @@ from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.frontier import Cell, explore, unseen
 from karamelo_py.app.studies.options import (
+    add_axes,
     add_family,
+    along,
     family,
     new_parser,
     out_file,
@@ -65,6 +67,7 @@ def add_parser(subparsers: Any) -> None:
         help="growing: energy above this times the largest of the first tenth of the log (2)",
     )  # fmt: skip
     parser.add_argument("-stride", type=positive, default=6, help="cells between first runs (6)")
+    add_axes(parser)
     parser.add_argument("-o", type=Path, default=Path("map.png"), help="the picture (map.png)")
 
 
@@ -84,6 +87,7 @@ def run(options: Any) -> int:
     for name in axes:
         values[name].sort(key=float)
     energy = energy_column(options.energy, logged(options.script), options.script)
+    words = along(options, axes[0], axes[1] if len(axes) > 1 else "")
     table = out.with_suffix(".csv")
     items = [records.Recorded(f"max:{energy}")]
     study = Study(launch, out.with_suffix(""), items, jobs, again=options.again, strict=True)
@@ -95,7 +99,7 @@ def run(options: Any) -> int:
     known, inferred = explore(chart.shape, chart.classify, options.stride)
     rows = chart.rows(known, inferred)
     records.write(table, rows)
-    chart.draw(known, inferred, out, options.script.name)
+    chart.draw(known, inferred, out, options.script.name, words)
     chart.tell(known, inferred)
     width = unseen(chart.shape, options.stride)
     if inferred and width:
@@ -277,9 +281,14 @@ class Map:
             print(f"the largest stable first step is {ends} times the program's stable step")
 
     def draw(
-        self, known: Mapping[Cell, Any], inferred: Mapping[Cell, Any], path: Path, title: str
+        self,
+        known: Mapping[Cell, Any],
+        inferred: Mapping[Cell, Any],
+        path: Path,
+        title: str,
+        words: tuple[str, str],
     ) -> None:
-        """Draw the map."""
+        """Draw the map, with `words` along its axes."""
         from matplotlib.colors import ListedColormap
         from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
@@ -337,8 +346,7 @@ class Map:
             handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
             fontsize=8, borderaxespad=0,
         )  # fmt: skip
-        axes.set_xlabel(self.axes[0])
-        axes.set_ylabel(self.axes[1] if two else "")
+        axes.set(xlabel=words[0], ylabel=words[1])
         fixed = [f"{n} = {v[0]}" for n, v in self.values.items() if len(v) == 1]
         axes.set_title(", ".join([title, *fixed]), loc="left", fontsize=10)
         if len(y) <= FEW:

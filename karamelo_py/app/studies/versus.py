@@ -108,9 +108,17 @@ def tell(found: Sequence[Pair], values: Sequence[str], accuracy: str, cost: str)
 
 
 def draw(
-    found: Sequence[Pair], values: Sequence[str], path: Path, accuracy: str, cost: str, title: str
+    found: Sequence[Pair],
+    values: Sequence[str],
+    path: Path,
+    words: Sequence[str],
+    accuracy: str,
+    title: str,
 ) -> None:
-    """Draw errors of both values on the left, and the ratio of their costs on the right."""
+    """Draw errors of both values on the left, and the ratio of their costs on the right.
+
+    `words` stand along these axes.
+    """
     figure = blank_figure(9.0, 1.1 + 0.3 * len(found))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     errors = np.array([pair.error for pair in found])
@@ -134,8 +142,8 @@ def draw(
     right.set_xlim(0, 1.15 * max(1.0, float(np.nanmax(ratios, initial=1.0))))
     left.set_yticks(up, [pair.label for pair in found])
     left.set_ylim(-0.7, len(found) - 0.3)
-    left.set_xlabel(look.label(accuracy))
-    right.set_xlabel(f"{look.label(cost)},\n{values[1]} over {values[0]}")
+    left.set_xlabel(words[0])
+    right.set_xlabel(words[1])
     left.set_title(title, loc="left", fontsize=10)
     # Above the axes: within them it would hide points.
     left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=9)
