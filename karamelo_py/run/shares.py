@@ -6,7 +6,7 @@ by each of them, from the same boxes in the same order.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from karamelo_py.run.tiles import (
     buffers_of,
     chosen_of,
     extents,
+    give_up,
     one_after_another,
     ragged,
     rows_of,
@@ -139,15 +140,21 @@ class SharedTiles(Tiles):
                 for block, to in zip(s.blocks, own, strict=True)
             ]
 
-        come = self.crew.traded({rank: parts(rank) for rank in others})
+        come = list(self.crew.traded({rank: parts(rank) for rank in others}).values())
         if not come:
             return s
-        found = [parts(me), *come.values()]
-        blocks = tuple(
-            block._replace(points=joined(block.points, list(of_all)))
-            for block, *of_all in zip(s.blocks, *found, strict=True)
-        )
-        return s._replace(blocks=blocks)
+        blocks = []
+        for block, to, *others in zip(s.blocks, own, *come, strict=True):
+            arrays, here = [], to == me
+            for k, (_, array) in enumerate(arrays_of(block.points)):
+                own_ones = np.compress(here, array, axis=-1)
+                give_up(array)  # no two of the fields are there twice at a time
+                found = [one[k] for one in others]
+                arrays.append(np.concatenate([own_ones, *found], axis=-1))
+                for one in others:
+                    one[k] = None
+            blocks.append(block._replace(points=of_arrays(block.points, arrays)))
+        return s._replace(blocks=tuple(blocks))
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
         return float(self.crew.largest(np.array([super()._reach(s, block, x)]))[0])
@@ -336,12 +343,17 @@ def sized(points: Points, count: int) -> Points:
     if points.mass.size == count:
         return points
     empty = [np.empty((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
-    return joined(points, [empty])
+    return of_arrays(points, empty)
 
 
 def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
     """Points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
-    arrays = (np.concatenate(same, axis=-1) for same in zip(*parts, strict=True))
+    return of_arrays(points, [np.concatenate(same, axis=-1) for same in zip(*parts, strict=True)])
+
+
+def of_arrays(points: Points, found: Iterable[np.ndarray]) -> Points:
+    """Points of the kind of `points` from such arrays as `arrays_of` gives."""
+    arrays = iter(found)
     own = {
         name: None if array is None else next(arrays)
         for name, array in points._asdict().items()
