@@ -16,6 +16,7 @@ from karamelo_py.run.shares import SharedTiles, nodes_of, occupied, work_of
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.state import (
     changing,
+    copied,
     go_back,
     of_nodes,
     remembered_at,
@@ -237,9 +238,8 @@ class Part:
 
     def keep(self) -> dict[str, np.ndarray]:
         """Copy every array that a step changes."""
-        self._kept = {name: array.copy() for name, array in changing(self)}
-        values = self.setup.control.values.copy()
-        self._kept |= {"values": values, "owner": self.tiles.owner}
+        self._kept = copied(changing(self), self.setup.control, self._kept)
+        self._kept["owner"] = self.tiles.owner
         return self._kept
 
     def go_back(self) -> None:
@@ -255,11 +255,6 @@ def _from_to(numbers: np.ndarray, first: int, end: int) -> np.ndarray:
 
 
 def _like(nodes: Nodes) -> Nodes:
-    """Nodes of the same kind, zero."""
-
-    def zeros(array: np.ndarray) -> np.ndarray:
-        return np.zeros(array.shape, array.dtype)  # touches nothing, unlike zeros_like
-
-    return Nodes(
-        *map(zeros, nodes[:-1]), tuple(type(one)(zeros(one.array)) for one in nodes.fields)
-    )
+    """Nodes of the same kind, zero: the system gives memory to pages only when touched."""
+    fields = tuple(type(one)(np.zeros(one.array.shape, one.array.dtype)) for one in nodes.fields)
+    return Nodes(*(np.zeros(array.shape, array.dtype) for array in nodes[:-1]), fields)

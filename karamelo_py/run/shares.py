@@ -23,6 +23,7 @@ from karamelo_py.run.tiles import (
     buffers_of,
     chosen_of,
     extents,
+    give_up,
     one_after_another,
     ragged,
     rows_of,
@@ -142,10 +143,10 @@ class SharedTiles(Tiles):
                 for block, to in zip(s.blocks, own, strict=True)
             ]
 
-        come = self.crew.traded({rank: parts(rank) for rank in others})
+        come = list(self.crew.traded({rank: parts(rank) for rank in others}).values())
         if not come:
             return s
-        found = zip(s.blocks, own, *come.values(), strict=True)
+        found = zip(s.blocks, own, *come, strict=True)
         blocks = tuple(
             block._replace(points=self._with(k, block.points, np.flatnonzero(to == me), parts))
             for k, (block, to, *parts) in enumerate(found)
@@ -174,6 +175,8 @@ class SharedTiles(Tiles):
                 array[c][len(stay) :] = np.concatenate([part[c] for part in new])
             if (k, name) in self._rooms:
                 self._spare[kind] = self._rooms[k, name]
+            else:
+                give_up(old)  # no two of the fields are there twice at a time
             self._rooms[k, name] = room
             arrays.append(array)
         return made_of(points, arrays)
@@ -365,7 +368,7 @@ def sized(points: Points, count: int) -> Points:
     if points.mass.size == count:
         return points
     empty = [np.empty((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
-    return joined(points, [empty])
+    return made_of(points, empty)
 
 
 def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
