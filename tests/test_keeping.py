@@ -156,3 +156,28 @@ def test_what_gains_is_told_beforehand(tmp_path, monkeypatch, capsys):
             "affine noise|strain before the forces|points that cross", captured.out + captured.err
         )
         assert told, (transfer, basis, scheme, strain)
+
+
+def drifting() -> list[tuple[str, str, str]]:
+    """Variables of disks on finer grids in docs/energy.md, their energy, and when that is told."""
+    text = (ROOT / "docs" / "energy.md").read_text(encoding="utf-8")
+    lines = text.partition("| variables |")[2].partition("## Bodies")[0].splitlines()
+    rows = [[cell.strip() for cell in line.split("|")] for line in lines if "| n =" in line]
+    return [(row[1], row[3], row[4]) for row in rows if "moving" not in row[1]]
+
+
+@pytest.mark.parametrize(("variables", "energy", "told"), drifting())
+def test_what_drifts_is_told_as_the_table_says(run_interpreted, variables, energy, told):
+    values = {"n": variables[4], "basis": "linear"}
+    for word in variables.split(", ")[1:]:
+        name, _, value = word.rpartition(" ")
+        if word == "one point a cell":
+            values["ppc"] = "1"
+        elif name == "strain":
+            values["strain"] = value
+        elif not name:
+            values["basis"] = word
+    words = [word for pair in values.items() for word in ("-var", *pair)]
+    said = run_interpreted(ROOT / "inputs" / "in.energy_disk", *words, command="check").err
+    assert ("noise of a drift" in said) == ("before" in told)
+    assert float(energy) <= 1.1 or told
