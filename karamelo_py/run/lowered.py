@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.by_id import ById
 from karamelo_py.run.by_number import ByNumber
 from karamelo_py.run.lowering import State, chosen, lower, thread_count, warms_by_friction
-from karamelo_py.run.state import Stored, changing, go_back, opened, stored, take_arrays
+from karamelo_py.run.state import Stored, changing, copied, go_back, opened, stored, take_arrays
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.run.trial import try_parts
 from karamelo_py.scene.hub import Hub
@@ -223,19 +223,12 @@ class Lowered(ById, ByNumber):
         sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
         show_heat(s.heat, s, self.mode)
 
-    def snapshot(self, before: Mapping[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
+    def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
         """Copies of every array that a step changes, and of the published values.
 
         The copies of the snapshot `before`, which is lost, are used again where they fit.
         """
-        found = {}
-        for name, array in (*changing(self), ("values", self.control.values)):
-            copy = (before or {}).get(name)
-            if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
-                copy = np.empty_like(array)
-            copy[...] = array
-            found[name] = copy
-        return found
+        return copied(changing(self), self.control, before or {})
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot."""

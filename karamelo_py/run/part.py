@@ -16,6 +16,7 @@ from karamelo_py.run.shares import SharedTiles, nodes_of, occupied, work_of
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.state import (
     changing,
+    copied,
     go_back,
     of_nodes,
     remembered_at,
@@ -237,9 +238,8 @@ class Part:
 
     def keep(self) -> dict[str, np.ndarray]:
         """Copy every array that a step changes."""
-        self._kept = {name: array.copy() for name, array in changing(self)}
-        values = self.setup.control.values.copy()
-        self._kept |= {"values": values, "owner": self.tiles.owner}
+        self._kept = copied(changing(self), self.setup.control, self._kept)
+        self._kept["owner"] = self.tiles.owner
         return self._kept
 
     def go_back(self) -> None:

@@ -23,6 +23,7 @@ from karamelo_py.run.tiles import (
     buffers_of,
     chosen_of,
     extents,
+    give_up,
     one_after_another,
     ragged,
     rows_of,
@@ -162,7 +163,8 @@ class SharedTiles(Tiles):
         """
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
         arrays = []
-        for (name, old), *new in zip(arrays_of(points), *come, strict=True):
+        for i, (name, old) in enumerate(arrays_of(points)):
+            new = [parts[i] for parts in come]
             shape = (*old.shape[:-1], count)
             kind, size = (shape[:-1], old.dtype), int(np.prod(shape))
             room = self._spare.pop(kind, np.empty(0, old.dtype))
@@ -176,6 +178,9 @@ class SharedTiles(Tiles):
                 self._spare[kind] = self._rooms[k, name]
             self._rooms[k, name] = room
             arrays.append(array)
+            give_up(old)  # no two of the fields are there twice at a time
+            for parts in come:
+                parts[i] = None
         return made_of(points, arrays)
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
@@ -365,7 +370,7 @@ def sized(points: Points, count: int) -> Points:
     if points.mass.size == count:
         return points
     empty = [np.empty((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
-    return joined(points, [empty])
+    return made_of(points, empty)
 
 
 def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:

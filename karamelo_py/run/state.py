@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.fields import name_of
-from karamelo_py.kernels.arrays import TIMESTEP, Block, Nodes, Points, Tiling, arrays_of
+from karamelo_py.kernels.arrays import TIMESTEP, Block, Control, Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.run.tiles import in_use, numbers, used
 from karamelo_py.script.errors import ScriptError
@@ -36,6 +36,24 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
             yield f"points/{k}/{name}", array[now] if name == "x" else array
     for k, rows in enumerate(remembered_at(simulation, used(s.spans)[1:])):
         yield f"contact/{k}", rows
+
+
+def copied(
+    arrays: Iterable[tuple[str, np.ndarray]], control: Control, before: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Copies of arrays and of the published values; those `before`, which are lost, are used again.
+
+    One array after another: where points have come or gone none is there twice.
+    """
+    found = {}
+    for name, array in (*arrays, ("values", control.values)):
+        copy = before.pop(name, None)
+        if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
+            del copy
+            copy = np.empty_like(array)
+        copy[...] = array
+        found[name] = copy
+    return found
 
 
 def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:

@@ -472,6 +472,13 @@ def steps_of(shapes: np.ndarray) -> np.ndarray:
     return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
 
 
+def give_up(array: np.ndarray) -> None:
+    """Let an array, which is of no use any more, have no memory."""
+    if array.flags.owndata:
+        forget(array)
+        array.resize((0,) * array.ndim, refcheck=False)
+
+
 def grow(array: np.ndarray, rows: int) -> None:
     """See that an array has so many rows; in place, since setups hold it."""
     if len(array) < rows:
