@@ -163,7 +163,8 @@ class SharedTiles(Tiles):
         """
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
         arrays = []
-        for (name, old), *new in zip(arrays_of(points), *come, strict=True):
+        for i, (name, old) in enumerate(arrays_of(points)):
+            new = [parts[i] for parts in come]
             shape = (*old.shape[:-1], count)
             kind, size = (shape[:-1], old.dtype), int(np.prod(shape))
             room = self._spare.pop(kind, np.empty(0, old.dtype))
@@ -179,6 +180,9 @@ class SharedTiles(Tiles):
                 give_up(old)  # no two of the fields are there twice at a time
             self._rooms[k, name] = room
             arrays.append(array)
+            give_up(old)  # no two of the fields are there twice at a time
+            for parts in come:
+                parts[i] = None
         return made_of(points, arrays)
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
