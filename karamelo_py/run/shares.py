@@ -176,8 +176,6 @@ class SharedTiles(Tiles):
                 array[c][len(stay) :] = np.concatenate([part[c] for part in new])
             if (k, name) in self._rooms:
                 self._spare[kind] = self._rooms[k, name]
-            else:
-                give_up(old)  # no two of the fields are there twice at a time
             self._rooms[k, name] = room
             arrays.append(array)
             give_up(old)  # no two of the fields are there twice at a time
