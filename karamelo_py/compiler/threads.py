@@ -18,6 +18,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 from llvmlite import ir
 from numba import prange, types
@@ -209,6 +210,7 @@ _LEFT = (1 << 32) - 1  # of a ticket: how many numbers are left; above them the 
 
 def new_team(threads: int) -> np.ndarray:
     """What a team of so many threads shares; its address is that in `Threaded`."""
+    numba.get_num_threads()  # which starts what loops from the cache need before they are loaded
     words = np.zeros((_TICKETS // 64 + threads, 8), np.int64)
     words[_SIZE // 64, 0] = threads
     return words
