@@ -6,9 +6,9 @@ is a function of where that is, and a number.
 
 Threads that sleep between two loops take as long to wake up as a small loop takes. A kernel of many
 loops is therefore run by a *team* (`by_team`): its first thread leads, and goes through the kernel;
-the others wait for loops of it, and whoever has time takes the next number of a loop. The leader
-waits for numbers that were taken, never for threads: one that another program keeps from running
-holds nobody up.
+the others wait for loops of it. Each has its part of the numbers of a loop, the same in each step,
+and takes those of a thread that does not go on. The leader waits for numbers that were taken, never
+for threads: one that another program keeps from running holds nobody up.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 from llvmlite import ir
 from numba import prange, types
@@ -202,45 +203,54 @@ _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64
 _FAILED, _LED, _RESULT, _TICKETS = range(7 * 64, 11 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
 _SHORT = 3000  # pauses, some 0.1 ms; then threads sleep, since others may need their cores
+_APART, _LOOKS = 10, 64  # pauses between looks at what is left of another's part; looks, 30 us
 _PATIENCE = 6000  # pauses until a thread does not wait for a leader any more
 _LEFT = (1 << 32) - 1  # of a ticket: how many numbers are left; above them the loop
 
 
 def new_team(threads: int) -> np.ndarray:
     """What a team of so many threads shares; its address is that in `Threaded`."""
+    numba.get_num_threads()  # which starts what loops from the cache need before they are loaded
     words = np.zeros((_TICKETS // 64 + threads, 8), np.int64)
     words[_SIZE // 64, 0] = threads
     return words
 
 
 @subkernel
-def _taken(ticket):
-    """Take one of the numbers that are left on a ticket: how many were left, 0 if none."""
-    while True:
-        word = _read(ticket)
-        if word & _LEFT == 0:
-            return 0
-        if _replaced(ticket, word, word - 1):
-            return word & _LEFT
-
-
-@subkernel
 def _take_part(team, k):
-    """Do what thread `k` gets of the loop of now, its own part first; how many numbers."""
+    """Do what thread `k` gets of the loop of now, its own part first; how many numbers.
+
+    What a thread works on is in its caches, and to get it from there may take longer than the work:
+    others take of its part when that gets no smaller for a while.
+    """
     size = _read(team + _SIZE)
+    epoch = _read(team + _TICKETS + 64 * k) >> 32
     mine = 0
-    for j in range(size):
-        part = (k + j) % size
-        ticket = team + _TICKETS + 64 * part
-        left = _taken(ticket)
-        while left > 0:
+    looks = 0
+    seen = 0
+    while True:
+        part = k
+        word = _read(team + _TICKETS + 64 * k)
+        for other in range(0 if word & _LEFT > 0 else size):
+            found = _read(team + _TICKETS + 64 * other)
+            if found & _LEFT > word & _LEFT:
+                part, word = other, found
+        left = word & _LEFT
+        if word >> 32 != epoch or left == 0:
+            return mine
+        if word != seen:
+            seen, looks = word, 0
+        if part != k and looks < _LOOKS:
+            looks += 1
+            for _ in range(_APART):
+                _pause(False)
+        elif _replaced(team + _TICKETS + 64 * part, word, word - 1):
             # As long as a number is not done, the loop stays that of now.
             end = _read(team + _COUNT) * (part + 1) // size
             task, arguments = _read(team + _TASK_AT), _read(team + _ARGUMENTS)
             _call(task, arguments, end - left, team + _FAILED)
             mine += 1
-            left = _taken(ticket)
-    return mine
+            seen = word - 1
 
 
 @subkernel

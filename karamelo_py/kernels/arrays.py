@@ -125,8 +125,8 @@ class Buffers(NamedTuple):
     """
 
     nodes: Nodes  # the fields that points give to
-    count: np.ndarray  # (2,) int64: number of tiles of nodes in use; whether boxes are the nodes
-    first: np.ndarray  # (T + 2,) int64: parts of the k-th of them are first[k]:first[k + 1]
+    count: np.ndarray  # (2,) int64: number of shares of the nodes; whether boxes are the nodes
+    first: np.ndarray  # (S + 1,) int64: parts of the k-th share are first[k]:first[k + 1]
     parts: np.ndarray  # (p, 10) int64
     number: int  # of these among the buffers of a scene
 
@@ -317,6 +317,8 @@ class Setup(NamedTuple):
     buffers: Buffers
     blocks: tuple  # of Block, one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
+    ranges: np.ndarray  # (S + rows, 2) int64: which of the rows that follow each share of the nodes
+    #                     has; then the ranges of node numbers in use, share after share
     control: Control
 
 

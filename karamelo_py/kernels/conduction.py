@@ -126,7 +126,7 @@ def show_heat(heat, s, mode):
 @show_heat.on(Conducting)
 def _(heat, s, mode):
     map_heat(heat, s, mode, False, True)
-    sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.spans, step_size(s))
+    sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.ranges, step_size(s))
 
 
 @conduct.on(Conducting)
@@ -135,13 +135,13 @@ def _(heat, s, mode, hooks):
     nodes = heat.nodes
     kin = Line()
     map_heat(heat, s, mode, False, True)
-    sweep_nodes(mode, SumsToVelocity(), kin, nodes, s.spans, dt)
-    sweep_nodes(mode, TakeMean(), kin, nodes, s.spans, dt)
+    sweep_nodes(mode, SumsToVelocity(), kin, nodes, s.ranges, dt)
+    sweep_nodes(mode, TakeMean(), kin, nodes, s.ranges, dt)
     at_heat_nodes(hooks, POST_HEAT_TO_GRID, ON_VELOCITY, s)
     at_heated_points(hooks, s)
     flow = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
     visit_for_heat(heat, s, mode, flow, True, True)
-    sweep_nodes(mode, Update(), kin, nodes, s.spans, dt)
+    sweep_nodes(mode, Update(), kin, nodes, s.ranges, dt)
     at_heat_nodes(hooks, POST_UPDATE_GRID_HEAT, ON_UPDATE, s)
     map_heat(heat, s, mode, True, False)
     # What `Warming` reports as a rate is by what factor conduction has become faster.

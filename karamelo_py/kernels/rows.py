@@ -116,11 +116,11 @@ def sum_series(transfer, s, mode):
 def _(transfer, s, mode):
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
     dt = step_size(s)
-    sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.spans, dt)
+    sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.ranges, dt)
     for k in range(transfer.order - 1):
         visit = Visit((SeriesTerm(k),), (SeriesBack(),), OldWeights())
         visit_here(s, mode, visit, dt, True, True)
-        sweep_nodes(mode, ExtendSeries(), s.kin, s.nodes, s.spans, dt)
+        sweep_nodes(mode, ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
     hold_axis(s.kin, s)
 
 
@@ -132,7 +132,7 @@ def average_volumes(averaging, s, mode, dt):
 @average_volumes.on(FBar)
 def _(averaging, s, mode, dt):
     visit_here(s, mode, Visit((TrialStrain(),), (Volumes(),), OldWeights()), dt, True, True)
-    sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.spans, dt)
+    sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.ranges, dt)
 
 
 @point_function(otherwise=True)
@@ -143,7 +143,7 @@ def average_stress(averaging, s, mode):
 @average_stress.on(FBar)
 def _(averaging, s, mode):
     dt = step_size(s)
-    sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.spans, dt)
+    sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
     visit_here(s, mode, Visit((AverageStress(),), (AveragedForce(),), OldWeights()), dt, True, True)
 
 
@@ -151,9 +151,9 @@ def _(averaging, s, mode):
 def sum_loss(s, mode):
     """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
     if field(s.nodes.fields, Rubbed) is not None:
-        sweep_nodes(mode, ClearRubbed(), s.kin, s.nodes, s.spans, step_size(s))
+        sweep_nodes(mode, ClearRubbed(), s.kin, s.nodes, s.ranges, step_size(s))
     if field(s.nodes.fields, Lost) is not None:
-        sweep_nodes(mode, KeepLoss(), s.kin, s.nodes, s.spans, step_size(s))
+        sweep_nodes(mode, KeepLoss(), s.kin, s.nodes, s.ranges, step_size(s))
 
 
 @shared

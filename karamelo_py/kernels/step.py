@@ -67,7 +67,7 @@ def _take(row, s, mode, hooks, more):
         row.function(s, mode, hooks)
     elif isinstance(row, table.Nodes):
         task = row.task(s) if callable(row.task) else row.task
-        sweep_nodes(mode, task, s.kin, s.nodes, s.spans, kick(s))
+        sweep_nodes(mode, task, s.kin, s.nodes, s.ranges, kick(s))
     elif isinstance(row, table.Check):
         return check_moves(s)
     else:

@@ -71,11 +71,11 @@ def _clear_record(quantities, kin, nodes, n):
 
 
 @subkernel
-def sum_tile(quantities, kin, nodes, buffers, t):
-    """Sum the quantities at the t-th tile of nodes in use, box after box."""
+def sum_share(quantities, kin, nodes, buffers, share):
+    """Sum the quantities at the nodes of a share, tile after tile, box after box."""
     nodes, buffers = at_hand(nodes), at_hand(buffers)
     first, parts = buffers.first, buffers.parts
-    for part in range(first[t], first[t + 1]):
+    for part in range(first[share], first[share + 1]):
         what, count = parts[part, 9], parts[part, 4]
         for i in range(parts[part, 2]):
             for j in range(parts[part, 3]):

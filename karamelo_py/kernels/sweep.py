@@ -34,7 +34,7 @@ from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
-from karamelo_py.kernels.sums import sum_tile
+from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.visit import Work, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
 from karamelo_py.points.basis.product import Stencil, sees_same_nodes, with_one_node
@@ -321,18 +321,19 @@ def visit_share(visit, s, block, then, gathers, scatters, dt, first, k):
 
 
 @subkernel
-def visit_nodes(task, kin, nodes, spans, dt, t):
-    """Do `task` at the nodes of the t-th span."""
+def visit_nodes(task, kin, nodes, ranges, dt, k):
+    """Do `task` at the nodes of the k-th share."""
     nodes = at_hand(nodes)
-    for n in range(spans[1 + t, 0], spans[1 + t, 1]):
-        at_node(task, kin, nodes, index(n), dt)
+    for r in range(ranges[k, 0], ranges[k, 1]):
+        for n in range(ranges[r, 0], ranges[r, 1]):
+            at_node(task, kin, nodes, index(n), dt)
 
 
 # --- threads ----------------------------------------------------------------------------------
 
 _visit_shares = shared_out(visit_share, "visit, s, block, then, gathers, scatters, dt, first")
-_sum_tiles = shared_out(sum_tile, "quantities, kin, nodes, buffers")
-_visit_spans = shared_out(visit_nodes, "task, kin, nodes, spans, dt")
+_sum_shares = shared_out(sum_share, "quantities, kin, nodes, buffers")
+_visit_shares_of_nodes = shared_out(visit_nodes, "task, kin, nodes, ranges, dt")
 
 
 @point_function()
@@ -373,7 +374,7 @@ def sum_buffers(mode, quantities, s, due):
 @entered
 def _sum_all(mode, quantities, kin, nodes, buffers, due):
     count = buffers.count[0] if due else 0
-    _sum_tiles(mode, count, quantities, kin, nodes, buffers)
+    _sum_shares(mode, count, quantities, kin, nodes, buffers)
 
 
 @sum_buffers.on(Serial)
@@ -383,16 +384,16 @@ def _(mode, quantities, s, due):
 
 
 @point_function()
-def sweep_nodes(mode, task, kin, nodes, spans, dt):
+def sweep_nodes(mode, task, kin, nodes, ranges, dt):
     """Do `task` at every node in use."""
 
 
 @entered
-def _visit_all_spans(mode, task, kin, nodes, spans, dt):
-    _visit_spans(mode, spans[0, 0], task, kin, nodes, spans, dt)
+def _visit_all_nodes(mode, task, kin, nodes, ranges, dt):
+    _visit_shares_of_nodes(mode, ranges[0, 0], task, kin, nodes, ranges, dt)
 
 
 @sweep_nodes.on(Serial)
 @sweep_nodes.on(Threaded)
-def _(mode, task, kin, nodes, spans, dt):
-    _visit_all_spans(mode, task, kin, nodes, spans, dt)
+def _(mode, task, kin, nodes, ranges, dt):
+    _visit_all_nodes(mode, task, kin, nodes, ranges, dt)

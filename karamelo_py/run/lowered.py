@@ -220,7 +220,7 @@ class Lowered(ById, ByNumber):
         dt = step_size(s)
         visit = Visit((), SUMS.quantities, SUMS.weights)
         sweep(s, self.mode, visit, dt, False, True, False)
-        sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.spans, dt)
+        sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.ranges, dt)
         show_heat(s.heat, s, self.mode)
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:

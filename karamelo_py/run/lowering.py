@@ -49,7 +49,7 @@ from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import Moment, lost_shares
 from karamelo_py.run.stable import sparse
-from karamelo_py.run.tiles import Tiles
+from karamelo_py.run.tiles import Tiles, no_nodes
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table
@@ -230,7 +230,7 @@ def lower(
             real,
             previous,
         ),
-        spans=np.zeros((1, 2), np.int64),
+        **no_nodes(),
         control=control,
     )
     return setup, tiles

@@ -24,7 +24,7 @@ from karamelo_py.run.state import (
     take_tiling,
 )
 from karamelo_py.run.storing import points_of_tiles
-from karamelo_py.run.tiles import in_use, numbers
+from karamelo_py.run.tiles import in_use, no_nodes, numbers
 from karamelo_py.run.work import Work
 from karamelo_py.scene.hub import Hub
 
@@ -62,8 +62,7 @@ class Part:
         control = s.control._replace(ranks=Linked(self.answers.address, tiles.foreign))
         self.setup = s._replace(
             blocks=tuple(block._replace(tiling=tiles.empty_tiling()) for block in s.blocks),
-            nodes=nodes, heat=heat, buffers=buffers, spans=np.zeros((1, 2), np.int64),
-            control=control,
+            nodes=nodes, heat=heat, buffers=buffers, **no_nodes(), control=control,
         )  # fmt: skip
         self._kept: dict[str, np.ndarray] = {}
         self._ordered: list[Ordered] = []  # points by id, while pieces of all are looked at

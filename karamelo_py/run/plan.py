@@ -15,7 +15,7 @@ from karamelo_py.run.shares import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.sizes import memory_of
 from karamelo_py.run.stable import sparse
-from karamelo_py.run.tiles import SHARES, Boxes, buffers_of, chosen_of, numbers, summed
+from karamelo_py.run.tiles import SHARES, Boxes, buffers_of, chosen_of, no_nodes, numbers, summed
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 
@@ -55,7 +55,7 @@ def _(mode, visit, s, block, then, gathers, scatters, dt):
 
 
 @sweep_nodes.on(_Sums)
-def _(mode, task, kin, nodes, spans, dt):
+def _(mode, task, kin, nodes, ranges, dt):
     return None
 
 
@@ -147,7 +147,7 @@ def _part(s: Setup, own: np.ndarray) -> Setup:
             "share": np.zeros(2 * SHARES + 1, np.int64),
         }
         blocks.append(block._replace(tiling=tiling._replace(**rows)))
-    return s._replace(blocks=tuple(blocks), spans=np.zeros((1, 2), np.int64), heat=None)
+    return s._replace(blocks=tuple(blocks), **no_nodes(), heat=None)
 
 
 def told(simulation: Simulation, ranks: int) -> list[str]:

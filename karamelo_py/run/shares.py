@@ -203,8 +203,10 @@ class SharedTiles(Tiles):
             self.crew.unlink(link)
         self._links.clear()
         super().lay_out(s)
-        if not self.direct:
-            self._border_first(s)
+
+    def _shares(self, s: Setup) -> np.ndarray:
+        self._border_first(s)
+        return super()._shares(s)
 
     def _border_first(self, s: Setup) -> None:
         """Let the tiles that others wait for be visited first."""

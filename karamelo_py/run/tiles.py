@@ -33,7 +33,7 @@ NODES = {1: 64, 2: 8, 3: 8}
 LONGER = 16  # times, along the rows of nodes in space, where cells have one point: boxes have more
 #             nodes than points then, and few tiles would have few points
 SHARES = 64  # of the points of a block, nearly equal: threads share them out
-SPAN = 256  # nodes of a span at most: threads share out spans
+SPAN = 256  # nodes of a span at most
 DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
 DRIFT = 1.0  # cells that points may go at most before they are sorted again
 # By dimension, the least they may go: boxes are smaller then, and more points beside each other see
@@ -243,21 +243,16 @@ class Tiles:
 
         Everything follows from the boxes of the tiles.
         """
-        if self.direct:
-            spans, firsts, parts = self._rows_to_clear(s)
-        else:
-            spans, firsts, parts = self._parts_to_sum(s)
-        grow(s.spans, 1 + len(spans))
-        s.spans[0, 0] = len(spans)
-        s.spans[1 : 1 + len(spans)] = spans
-        count, *rooms = s.buffers[1:4]
-        count[:] = len(firsts) - 1, self.direct
-        for room, found in zip(rooms, (firsts, parts), strict=True):
-            grow(room, len(found))
-            room[: len(found)] = found
+        spans, *found = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
+        s.buffers.count[:] = len(found[1]) - 1, self.direct
+        spans = np.concatenate([[[len(spans), 0]], spans])
+        rooms = s.spans, s.ranges, *s.buffers[2:4]
+        for room, rows in zip(rooms, (spans, *found), strict=True):
+            grow(room, len(rows))
+            room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Spans of the nodes in the boxes; a part for each, the first parts, where they are direct.
+        """The same as `_parts_to_sum` where points are few: one share, a part for each span.
 
         Boxes have the numbers of the grids.
         """
@@ -268,14 +263,23 @@ class Tiles:
         parts = np.ones((len(spans), 10), np.int64)
         parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
         parts[:, 9] = CLEAR
-        return spans, np.arange(len(spans) + 1), parts
+        return spans, _shared(spans, np.zeros(len(spans), np.int64), 1), [0, len(spans)], parts
 
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Spans of the nodes in tiles that boxes reach; the parts, and the first of each tile."""
+        """Spans and ranges of the nodes in tiles that boxes reach; first of each share, and parts.
+
+        Nodes are of the share of points that have most of them: what a thread has given to is in
+        its caches, and to get it from those of another takes longer than to sum it.
+        """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
         # The largest part first: mostly it has all the nodes that others reach.
         order = np.lexsort((boxes.order[reached.box], -reached.size, reached.tile))
+        shares = self._shares(s)
+        own = order[reached.box[order] < len(shares)][::-1]  # the largest last
+        owner = np.zeros(self._first_of_nodes[-1], np.int64)
+        owner[reached.tile[own]] = shares[reached.box[own]]
+        order = order[np.argsort(owner[reached.tile[order]], kind="stable")]
         box, tile, begin, end, _ = (array[order] for array in reached)
         starts = np.flatnonzero(np.diff(tile, prepend=-1))
         grid = boxes.grid[box]
@@ -287,7 +291,11 @@ class Tiles:
         own = self._parts(grid[starts], own_begin, own_end, 0, 0)
         parts = np.insert(parts, starts[more], own[more], axis=0)
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
-        return _spans(own), np.append(starts + np.cumsum(more) - more, len(parts)), parts
+        owner = owner[tile[starts]]
+        firsts = np.append(starts + np.cumsum(more) - more, len(parts))
+        rows = np.stack(rows_of(own), axis=1)
+        ranges = _shared(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
+        return _spans(own), ranges, firsts[np.searchsorted(owner, np.arange(SHARES + 1))], parts
 
     def spans_of(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
         """(k, 2) spans of nodes in use, from boxes of them (n, d) in tiles of nodes (n,)."""
@@ -295,6 +303,17 @@ class Tiles:
         starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
         grid = np.searchsorted(self._first_of_nodes, tile[order][starts], side="right") - 1
         return _spans(self._parts(grid, *extents(starts, begin[order], end[order]), 0, 0))
+
+    def _shares(self, s: Setup) -> np.ndarray:
+        """The share of the points of its block that each own tile is in."""
+        found = []
+        for block in s.blocks:
+            tiles, shares, _ = block.tiling.count
+            share = np.empty(tiles, np.int64)
+            sizes = np.diff(block.tiling.share[: shares + 1])
+            share[block.tiling.order[:tiles]] = np.repeat(np.arange(shares) % SHARES, sizes)
+            found.append(share)
+        return np.concatenate(found)
 
     def _boxes(self, s: Setup) -> Boxes:
         """The boxes of the tiles of all blocks."""
@@ -385,6 +404,18 @@ def _spans(boxes: np.ndarray) -> np.ndarray:
     return np.stack([begin, np.minimum(begin + SPAN, end[of])], axis=1)
 
 
+def _shared(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
+    """`Setup.ranges`: rows (k, 2) of `count` owners, joined where one ends at another."""
+    order = np.lexsort((rows[:, 0], owner))
+    rows, owner = rows[order], owner[order]
+    apart = (rows[1:, 0] != rows[:-1, 1]) | (owner[1:] != owner[:-1])
+    first, last = (edge[: len(rows)] for edge in (np.append(True, apart), np.append(apart, True)))
+    ends = count + np.searchsorted(owner[first], np.arange(count + 1))
+    return np.concatenate(
+        [np.stack([ends[:-1], ends[1:]], axis=1), np.stack([rows[first, 0], rows[last, 1]], axis=1)]
+    )
+
+
 def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First nodes of the rows of boxes of nodes (see `Buffers`), and those behind their last."""
     row, left = ragged(boxes[:, 2] * boxes[:, 3])
@@ -420,6 +451,11 @@ def one_after_another(ranges: np.ndarray) -> np.ndarray:
 def in_tiles(tiling: Tiling) -> int:
     """Number of the points in the tiles."""
     return int(tiling.range[: tiling.count[0], 1].max(initial=0))
+
+
+def no_nodes() -> dict[str, np.ndarray]:
+    """Room for the nodes in use of a setup, where none are yet."""
+    return {name: np.zeros((1, 2), np.int64) for name in ("spans", "ranges")}
 
 
 def used(spans: np.ndarray) -> np.ndarray:

@@ -126,10 +126,10 @@ def _(mode, visit, s, block, then, gathers, scatters, dt):
 
 
 @sweep_nodes.on(Timed)
-def _(mode, task, kin, nodes, spans, dt):
-    nothing = np.zeros_like(spans)
+def _(mode, task, kin, nodes, ranges, dt):
+    nothing = np.zeros_like(ranges)
     with _noted(mode.of_nodes, _name(task)):
-        sweep_nodes(mode.mode, task, kin, nodes, spans, dt)
+        sweep_nodes(mode.mode, task, kin, nodes, ranges, dt)
     with _noted(mode.of_nodes, _name(task)):
         sweep_nodes(mode.mode, task, kin, nodes, nothing, dt)
 
@@ -271,7 +271,7 @@ def _(mode, visit, s, block, then, gathers, scatters, dt):
 
 
 @sweep_nodes.on(_Recorder)
-def _(mode, task, kin, nodes, spans, dt):
+def _(mode, task, kin, nodes, ranges, dt):
     mode.nodes.extend(task.goes_through)
     mode.regions.append(1)
 
