@@ -11,8 +11,6 @@ waits for numbers that were taken, never for threads: one that another program k
 holds nobody up.
 """
 
-from __future__ import annotations
-
 import platform
 import sys
 from collections.abc import Callable

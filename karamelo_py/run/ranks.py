@@ -6,8 +6,6 @@ between two steps by what knows nothing of parts (most computes, pictures, files
 first gathers into the arrays of a whole scene, and hands out anew where something has changed them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any

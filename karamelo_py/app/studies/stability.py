@@ -15,12 +15,7 @@ from karamelo_py.app.logs import read_log
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.frontier import Cell, explore, unseen
-from karamelo_py.app.studies.options import (
-    add_family,
-    family,
-    new_parser,
-    out_file,
-)
+from karamelo_py.app.studies.options import add_family, family, new_parser, out_file
 from karamelo_py.app.studies.study import Study
 from karamelo_py.app.studies.variables import logged
 from karamelo_py.output.files import savefig
