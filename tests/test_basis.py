@@ -22,12 +22,7 @@ from karamelo_py.points.basis import (
     support,
 )
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
-from karamelo_py.points.basis.cpgimp import (
-    CPGIMPCorners,
-    CPGIMPDet,
-    CPGIMPDiagonal,
-    CPGIMPStretch,
-)
+from karamelo_py.points.basis.cpgimp import CPGIMPCorners, CPGIMPDet, CPGIMPDiagonal, CPGIMPStretch
 from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import along

@@ -6,15 +6,7 @@ import inspect
 import numba
 import pytest
 from numba import config, njit, types
-from numba.core import (
-    base,
-    caching,
-    callconv,
-    ccallback,
-    codegen,
-    compiler,
-    dispatcher,
-)
+from numba.core import base, caching, callconv, ccallback, codegen, compiler, dispatcher
 from numba.core.typing import context, templates
 
 from karamelo_py.compiler import inlining

@@ -7,15 +7,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from karamelo_py.compiler.compile import (
-    accumulate,
-    choose,
-    fma,
-    in_all,
-    of_present,
-    real,
-    shared,
-)
+from karamelo_py.compiler.compile import accumulate, choose, fma, in_all, of_present, real, shared
 from karamelo_py.compiler.fields import field, load, store
 from karamelo_py.compiler.lanes import Eights, Fours, group
 from karamelo_py.compiler.loops import kernel
@@ -45,12 +37,7 @@ from karamelo_py.points.basis.cpdi import SQUARE
 from karamelo_py.points.basis.cpdi.parallel import R4
 from karamelo_py.points.basis.cpdi.quadrilateral import Q4
 from karamelo_py.points.basis.cpdi.simplex import T3
-from karamelo_py.points.basis.cpgimp import (
-    CPGIMPCorners,
-    CPGIMPDet,
-    CPGIMPDiagonal,
-    CPGIMPStretch,
-)
+from karamelo_py.points.basis.cpgimp import CPGIMPCorners, CPGIMPDet, CPGIMPDiagonal, CPGIMPStretch
 from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline

@@ -14,13 +14,7 @@ from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_on, law_table
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
-from karamelo_py.points.laws import (
-    advance,
-    columns_of,
-    dissipated_energy,
-    plastic_strain,
-    shown,
-)
+from karamelo_py.points.laws import advance, columns_of, dissipated_energy, plastic_strain, shown
 from karamelo_py.points.laws.eos.linear import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.numbers import Numbers

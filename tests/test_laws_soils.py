@@ -7,13 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import TURN, start, stress, stretched, worked
-from tensors import (
-    every_kinematics,
-    flat,
-    symmetric_flat,
-    symmetric_matrix,
-    symmetric_tensors,
-)
+from tensors import every_kinematics, flat, symmetric_flat, symmetric_matrix, symmetric_tensors
 
 from karamelo_py.points.kinematics import (
     Axisymmetric,

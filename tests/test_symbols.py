@@ -5,14 +5,7 @@ import pytest
 from numba import njit
 
 from karamelo_py.compiler.compile import choose
-from karamelo_py.compiler.symbols import (
-    Symbol,
-    add_product,
-    call,
-    cofactor,
-    determinant,
-    written,
-)
+from karamelo_py.compiler.symbols import Symbol, add_product, call, cofactor, determinant, written
 
 a, b, c = Symbol("a"), Symbol("b"), Symbol("c")
 COUNTED = []

@@ -17,14 +17,7 @@ import numpy as np
 
 from karamelo_py.app.options import make_folder
 from karamelo_py.app.shown import Picture, Table
-from karamelo_py.app.told import (
-    Quiet,
-    SimulationError,
-    refuse_copies,
-    said,
-    threads_of,
-    told,
-)
+from karamelo_py.app.told import Quiet, SimulationError, refuse_copies, said, threads_of, told
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.language.meanings import shown

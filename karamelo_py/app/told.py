@@ -1,7 +1,5 @@
 """What Python says to a scene, in the words of a script, and what it is told."""
 
-from __future__ import annotations
-
 import re
 import sys
 import warnings

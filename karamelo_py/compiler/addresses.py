@@ -1,7 +1,5 @@
 """Functions that kernels call by their address, and do not contain."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 

@@ -6,8 +6,6 @@ tells whether it is whole. Whatever is wrong with a file or the folder, the kern
 it were not there, and the user told once.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json
@@ -31,14 +29,7 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
 from karamelo_py.compiler import held, inlining
-from karamelo_py.compiler.choices import (
-    WHOLE,
-    Choice,
-    Unknown,
-    contents,
-    keep_choices,
-    name_of,
-)
+from karamelo_py.compiler.choices import WHOLE, Choice, Unknown, contents, keep_choices, name_of
 from karamelo_py.compiler.fingerprint import describe, fingerprint
 
 VARIANTS = 4  # of a kernel for the same types: as many states of the sources are kept

@@ -1,7 +1,5 @@
 """What was chosen by type for compiled code: that is in the key of a kernel, and nothing else."""
 
-from __future__ import annotations
-
 import functools
 import sys
 import types as python

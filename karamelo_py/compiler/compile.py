@@ -1,7 +1,5 @@
 """How the package compiles: kernels, and point functions that are chosen by type."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any

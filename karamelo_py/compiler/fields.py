@@ -26,8 +26,6 @@ A part names its fields in ``point_fields`` or ``node_fields``. Arrays of points
 (components, points), those of nodes (nodes, components).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from typing import Any, NamedTuple

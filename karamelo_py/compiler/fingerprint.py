@@ -7,8 +7,6 @@ functions, only the implementations that were chosen for the types at hand. Thos
 Numba compiles. An edited comment, or another basis, is in no hash of a kernel without it.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import inspect

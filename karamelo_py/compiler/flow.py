@@ -1,7 +1,5 @@
 """Ways through a function that is written down: where they part, where they meet, and loops."""
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -7,8 +7,6 @@ carry the mark `UNIFORM`, and a `SPREAD` makes a row of the result where points 
 formula needs more than once is computed once and kept in a row behind the stack.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -8,8 +8,6 @@ a pointer, too. The type of a held tuple is a tuple's (its items can be read by 
 point functions are chosen by its class); tuples without arrays stay values.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable
 from typing import Any

@@ -10,8 +10,6 @@ inside of Numba: pyproject.toml names the versions that it was written for, and 
 text. The text of this file is in the key of every kernel on disk.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import uuid

@@ -1,7 +1,5 @@
 """Kernels: loops that Python and other loops call, kept on disk."""
 
-from __future__ import annotations
-
 import functools
 import gc
 import inspect

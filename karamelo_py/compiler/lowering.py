@@ -1,7 +1,5 @@
 """Code of what meets a value: what an operation on numbers, lanes and arrays is, Numba says."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

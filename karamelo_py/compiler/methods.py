@@ -1,15 +1,11 @@
 """Functions of tags that nothing follows, so that no kernel may contain them."""
 
-from __future__ import annotations
-
 import functools
 import types as python
 from collections import namedtuple
 from collections.abc import Iterable
 
-from karamelo_py.compiler.values import (
-    Untraceable,
-)
+from karamelo_py.compiler.values import Untraceable
 
 _GENERATED = {*vars(namedtuple("_", ())), "__orig_bases__", "__annotations__", "__annotate_func__"}
 

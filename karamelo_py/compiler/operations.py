@@ -1,7 +1,5 @@
 """The operations of formulas: their numbers, and what they do in kernels and in NumPy."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

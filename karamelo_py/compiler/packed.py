@@ -5,8 +5,6 @@ kernel anew and is longer than many kernels. Here Python writes the arguments in
 hold them (:mod:`karamelo_py.compiler.held`), and a kernel is called with its address.
 """
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 import struct

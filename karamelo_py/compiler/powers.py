@@ -6,8 +6,6 @@ is about that of two operations; of powers, |y ln x| times as much where that is
 Interpreted, they are Python's.
 """
 
-from __future__ import annotations
-
 import math
 from math import factorial, inf, nan
 from typing import Any

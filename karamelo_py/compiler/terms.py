@@ -1,7 +1,5 @@
 """Expressions of functions that are walked through (`karamelo_py.compiler.walk`)."""
 
-from __future__ import annotations
-
 import ast
 import operator
 from collections.abc import Callable

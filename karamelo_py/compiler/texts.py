@@ -1,7 +1,5 @@
 """The text of functions that Python has read."""
 
-from __future__ import annotations
-
 import ast
 import linecache
 import os

@@ -11,8 +11,6 @@ and takes those of a thread that does not go on. The leader waits for numbers th
 for threads: one that another program keeps from running holds nobody up.
 """
 
-from __future__ import annotations
-
 import platform
 import sys
 from collections.abc import Callable

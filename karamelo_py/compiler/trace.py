@@ -15,8 +15,6 @@ way. Only what the key of a kernel on disk follows may be run
 a closure, as methods do, are Numba's to compile, or to refuse.
 """
 
-from __future__ import annotations
-
 import dis
 import functools
 import inspect

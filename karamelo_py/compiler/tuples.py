@@ -4,8 +4,6 @@ Comprehensions, which Numba does not know of tuples: kernels run them (`compiler
 are of lists, which Python makes in two thirds of the time where all is interpreted.
 """
 
-from __future__ import annotations
-
 from karamelo_py.compiler.compile import choose, fma, lanes_of, shared
 
 

@@ -4,8 +4,6 @@ See :mod:`karamelo_py.compiler.trace`: Python runs a function on these, and ever
 meets one becomes code of the function that is compiled.
 """
 
-from __future__ import annotations
-
 import builtins
 import operator
 import sys

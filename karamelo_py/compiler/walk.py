@@ -6,8 +6,6 @@ decides, code is written for all ways, and where ways meet, a variable is what i
 that was taken. A loop over a range that is known is written out, any other one becomes a loop.
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 import inspect

@@ -1,7 +1,5 @@
 """F-bar: changes of volume and mean stresses averaged over the surroundings, where a scene asks."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import fma, point_function, real

@@ -1,17 +1,10 @@
 """How long steps are, and what ends one."""
 
-from __future__ import annotations
-
 from math import inf
 
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.loops import entered
-from karamelo_py.kernels.arrays import (
-    DT,
-    MASS,
-    TIME,
-    TIMESTEP,
-)
+from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP
 from karamelo_py.points.kinematics import vector_at
 
 

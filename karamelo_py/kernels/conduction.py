@@ -14,8 +14,6 @@ It comes before the momentum update, at the places of the points then:
   without conduction nothing is.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.compiler.compile import over_blocks, point_function, shared

@@ -17,8 +17,6 @@ node sees (`karamelo_py.points.basis.surface`). Bodies may approach until the ga
 stopped where it would be less than nothing at the end of the step.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two bodies at a place of the grid: normal, gap, approach and friction (see `kernels.contact`)."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import NamedTuple
 

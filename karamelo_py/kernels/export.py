@@ -1,7 +1,5 @@
 """What follows from the state of the points, for output: stress, strain, volume, stored energy."""
 
-from __future__ import annotations
-
 from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.held import at_hand

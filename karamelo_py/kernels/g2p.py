@@ -4,19 +4,11 @@ A task names, for `karamelo-py check` and `bench`, the fields of points and of n
 through.
 """
 
-from __future__ import annotations
-
 from math import inf, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, fma, in_all, point_function, real, shared
-from karamelo_py.compiler.fields import (
-    field,
-    increase,
-    load_vector,
-    store,
-    store_from,
-)
+from karamelo_py.compiler.fields import field, increase, load_vector, store, store_from
 from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
 from karamelo_py.kernels.arrays import of_change
 from karamelo_py.kernels.averaging import (
@@ -30,14 +22,7 @@ from karamelo_py.kernels.averaging import (
     no_ratio,
 )
 from karamelo_py.kernels.loss import Rubbed, in_company, reflect, warm, warm_by_friction
-from karamelo_py.kernels.visit import (
-    deformation_of,
-    for_tags,
-    in_turn,
-    law_of,
-    place_at,
-    state_of,
-)
+from karamelo_py.kernels.visit import deformation_of, for_tags, in_turn, law_of, place_at, state_of
 from karamelo_py.points.basis import carried, carrier, carriers, carry, deformed, entry, extent
 from karamelo_py.points.boundary import Bounces, reflected
 from karamelo_py.points.frames import (

@@ -9,8 +9,6 @@ gradient along; Tao et al. 2016, "A generalized interpolation material point met
 thermo-mechanical processes", for heat.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import (

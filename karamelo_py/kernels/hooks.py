@@ -22,8 +22,6 @@ Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply,
 The node functions of heat see capacity, temperature before and after the step, and heat flow.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

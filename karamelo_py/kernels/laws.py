@@ -4,8 +4,6 @@ A law is a NamedTuple of numbers, rows of numbers, or parts that are NamedTuples
 (:mod:`karamelo_py.points.laws`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -20,16 +20,7 @@ Beside the time integration, what is left is that moments are mapped a little di
 move (not with splines), and that usl strains by dv, which may only cost.
 """
 
-from __future__ import annotations
-
-from karamelo_py.compiler.compile import (
-    accumulate,
-    choose,
-    looping,
-    real,
-    round_off,
-    shared,
-)
+from karamelo_py.compiler.compile import accumulate, choose, looping, real, round_off, shared
 from karamelo_py.compiler.fields import (
     StepField,
     SummedField,

@@ -1,15 +1,7 @@
 """When fixes act: on nodes, and on points."""
 
-from __future__ import annotations
-
-from karamelo_py.compiler.compile import (
-    over_blocks,
-    point_function,
-    shared,
-)
-from karamelo_py.kernels.arrays import (
-    Hooks,
-)
+from karamelo_py.compiler.compile import over_blocks, point_function, shared
+from karamelo_py.kernels.arrays import Hooks
 from karamelo_py.kernels.clock import kick, step_size
 from karamelo_py.kernels.node_hooks import node_hooks
 from karamelo_py.kernels.point_hooks import Motion, clear_totals, point_hooks, publish_totals

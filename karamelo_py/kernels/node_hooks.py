@@ -1,7 +1,5 @@
 """Compiled hooks of fixes on nodes, those of heat too (`karamelo_py.kernels.hooks`)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from karamelo_py.compiler.addresses import caller_of

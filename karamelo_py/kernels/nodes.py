@@ -1,7 +1,5 @@
 """What is done at the nodes between two visits of the points."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real, shared

@@ -1,32 +1,12 @@
 """Points to grid: what a visit of the points scatters to the nodes."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import accumulate, of_present, point_function, real, shared
-from karamelo_py.compiler.fields import (
-    StepField,
-    SummedField,
-    field,
-    load,
-    load_vector,
-    vector,
-)
-from karamelo_py.compiler.tuples import (
-    add_optional,
-    leading,
-    scale,
-    subtract,
-)
+from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, vector
+from karamelo_py.compiler.tuples import add_optional, leading, scale, subtract
 from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, VELOCITY_WIDTH, of_force
-from karamelo_py.kernels.averaging import (
-    AveragedStress,
-    FBar,
-    NodalMean,
-    NodalStress,
-    VolumeRatio,
-)
+from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.g2p import zero_vector
 from karamelo_py.kernels.loss import Lost, bring_energy
 from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, state_of

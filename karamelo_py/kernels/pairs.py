@@ -4,8 +4,6 @@ Everything here is in the order of the points' ids and runs on one thread: the s
 threads nor on how the points are sorted. It takes double precision throughout.
 """
 
-from __future__ import annotations
-
 from math import inf, sqrt
 from typing import NamedTuple
 

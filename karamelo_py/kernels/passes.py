@@ -1,16 +1,11 @@
 """Visits of all points, and what their tiles report."""
 
-from __future__ import annotations
-
 from karamelo_py.compiler.compile import over_blocks, point_function, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels.sums import adds
-from karamelo_py.kernels.sweep import (
-    sum_buffers,
-    sweep_points,
-)
+from karamelo_py.kernels.sweep import sum_buffers, sweep_points
 from karamelo_py.kernels.totals import agree_on_reports, take_over
 from karamelo_py.points.frames import follows
 from karamelo_py.points.grid import inside

@@ -1,7 +1,5 @@
 """Compiled hooks of fixes on points: velocities, places, heat (`karamelo_py.kernels.hooks`)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +9,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK
 from karamelo_py.compiler.loops import entered, subkernel
-from karamelo_py.kernels.arrays import (
-    BEFORE,
-    TIME,
-    VALUE,
-)
+from karamelo_py.kernels.arrays import BEFORE, TIME, VALUE
 from karamelo_py.kernels.hooks import (
     HEAT_FUNCTION,
     NONE,

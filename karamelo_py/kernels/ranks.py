@@ -4,8 +4,6 @@ They call a function of Python by its address. Whatever it gets from the other p
 in the arrays that the kernels know.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ are of the other solids alone, whatever the density of a rigid body. Where a nod
 its velocity is theirs; what that takes is the force that they put on the others.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

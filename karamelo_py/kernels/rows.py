@@ -1,7 +1,5 @@
 """Rows of the tables of schemes, and what only some scenes have."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -49,11 +47,7 @@ from karamelo_py.kernels.p2g import (
     Volumes,
 )
 from karamelo_py.kernels.passes import visit_here
-from karamelo_py.kernels.sweep import (
-    OldWeights,
-    Visit,
-    sweep_nodes,
-)
+from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
 from karamelo_py.points.kinematics import Axisymmetric, dimension
 from karamelo_py.points.transfers.xpic import XPIC
 

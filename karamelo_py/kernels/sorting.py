@@ -1,7 +1,5 @@
 """Sorting the points by tile, and how far their domains reach."""
 
-from __future__ import annotations
-
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import loop

@@ -4,8 +4,6 @@ The same source serves two drivers: compiled, where many steps run in one call, 
 where hooks that are written in Python are called between the rows.
 """
 
-from __future__ import annotations
-
 import functools
 from math import sqrt
 from typing import Any, NamedTuple
@@ -17,19 +15,13 @@ from karamelo_py.compiler.loops import loop
 from karamelo_py.compiler.threads import by_team
 from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels import table
-from karamelo_py.kernels.arrays import (
-    DT,
-    TIME,
-    NoHooks,
-)
+from karamelo_py.kernels.arrays import DT, TIME, NoHooks
 from karamelo_py.kernels.clock import common_velocity, finish, kick, last_step_size, step_size
 from karamelo_py.kernels.g2p import STRAINS
 from karamelo_py.kernels.moments import at_nodes, at_points
 from karamelo_py.kernels.passes import check_moves, sweep
 from karamelo_py.kernels.rows import average_volumes
-from karamelo_py.kernels.sweep import (
-    sweep_nodes,
-)
+from karamelo_py.kernels.sweep import sweep_nodes
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared

@@ -5,8 +5,6 @@ end), the array a name in `Nodes` or the class of a field, which a scene may not
 ``adds = True`` it adds to what is there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 

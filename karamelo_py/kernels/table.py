@@ -10,8 +10,6 @@ A scheme names its rows once, stage by stage, as its class attribute ``rows``. F
 Averaged volumes, XPIC, heat and contact are calls that do nothing in scenes without them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 

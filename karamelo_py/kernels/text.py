@@ -9,8 +9,6 @@ Digits are written eight at a time, with what stands behind them overwritten lat
 cannot be foreseen cost more than bytes.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Sequence
 from fractions import Fraction

@@ -6,8 +6,6 @@ in any way. A published total is right within a unit of its last digit (Kulisch 
 "Fast exact summation using small and large superaccumulators").
 """
 
-from __future__ import annotations
-
 from math import frexp, ldexp
 from typing import NamedTuple
 

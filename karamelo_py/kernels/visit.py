@@ -6,8 +6,6 @@ A visit gathers from the nodes of the point's stencil and settles the point (gri
 loop (:mod:`karamelo_py.kernels.sweep`) serves every scheme, fused or stage by stage.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

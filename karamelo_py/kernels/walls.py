@@ -5,8 +5,6 @@ at most mu times as much, against the motion: as much as stops it, if that is le
 rest in the directions in which nothing is prescribed.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 from karamelo_py.compiler.fields import field

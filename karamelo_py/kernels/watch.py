@@ -9,21 +9,11 @@ Growth is measured by the energy that bodies have besides their drift, the motio
 of mass: large as that may be, from the start or by loads, it cannot hide what vibrates.
 """
 
-from __future__ import annotations
-
 from math import inf
 
 import numpy as np
 
-from karamelo_py.compiler.compile import (
-    added,
-    in_all,
-    index,
-    of_present,
-    over_blocks,
-    real,
-    shared,
-)
+from karamelo_py.compiler.compile import added, in_all, index, of_present, over_blocks, real, shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel

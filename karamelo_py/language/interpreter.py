@@ -13,11 +13,7 @@ from karamelo_py.language.further_mistakes import errors_of_text, further_errors
 from karamelo_py.language.meanings import Meanings
 from karamelo_py.language.presets import Presets
 from karamelo_py.language.replay import Record, Replay, spelled
-from karamelo_py.language.unknown import (
-    check_name,
-    unknown_call,
-    unknown_statement,
-)
+from karamelo_py.language.unknown import check_name, unknown_call, unknown_statement
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
 from karamelo_py.script.expressions import Value
 from karamelo_py.script.functions import FUNCTIONS

@@ -1,7 +1,5 @@
 """Fields of nodes for output, in the order of their numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from math import frexp

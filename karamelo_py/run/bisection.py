@@ -1,7 +1,5 @@
 """Tiles cut into compact parts of nearly as much work each."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

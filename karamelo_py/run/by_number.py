@@ -1,7 +1,5 @@
 """Nodes in the order of their numbers, so many at a time, for output."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The processes that share a scene, and how they talk to each other (MPI, through mpi4py)."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

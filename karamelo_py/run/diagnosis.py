@@ -1,7 +1,5 @@
 """What went wrong in a run: found, explained, and the last good state written."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """What rules that foresee failures ask of a scene before a run: how its solids move."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from math import isfinite
 from typing import Any

@@ -5,8 +5,6 @@ documentation has for the failure. `karamelo-py check` tells it, and a run befor
 once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -28,11 +26,7 @@ from karamelo_py.run.foreseen import Foreseen
 from karamelo_py.run.large_steps import warn_about_steps
 from karamelo_py.run.noise import ELASTIC, noises
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.stable import (
-    elastic_speed,
-    one_a_cell,
-    sparse,
-)
+from karamelo_py.run.stable import elastic_speed, one_a_cell, sparse
 from karamelo_py.run.velocities import warn_about_velocities
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub

@@ -1,7 +1,5 @@
 """Compiled hooks of the fixes of a scene, as the tables that kernels read."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

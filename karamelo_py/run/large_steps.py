@@ -1,15 +1,10 @@
 """Steps above the stable limit, of this run and of later ones, told before they are taken."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from karamelo_py.kernels.watch import BORNE
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.stable import (
-    own_step_instead,
-    what_follows,
-)
+from karamelo_py.run.stable import own_step_instead, what_follows
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 

@@ -4,8 +4,6 @@ Read once at the start of every run: kinematics, basis, transfer, scheme, laws a
 which fields exist (`karamelo-py check` prints them) and, by their types, what is compiled.
 """
 
-from __future__ import annotations
-
 import copy
 import os
 from collections.abc import Iterable

@@ -11,8 +11,6 @@ Classes add to what their bases name. After a part has got back what it remember
 ``resumed()`` is called where it has one.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Thresholds are measured with disks of rubber and of metal, 4 to 16 cells across 
 vibrate by 0.01 to 2 % while they drift or turn (docs/energy.md).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import inf
 from typing import Any, NamedTuple

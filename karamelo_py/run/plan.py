@@ -1,7 +1,5 @@
 """What several processes would have of a scene, and pass on in a step: their plan, made by one."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """karamelo-py check: what a scene needs, before it runs."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Any
 

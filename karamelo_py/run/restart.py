@@ -5,8 +5,6 @@ rest from what they remember (:mod:`karamelo_py.run.memory`). The set-up is not 
 makes it once more, and a file knows which statements had been carried out.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import zlib

@@ -1,7 +1,5 @@
 """One run command: steps in chunks, outputs when they are due, and an eye on what goes wrong."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time

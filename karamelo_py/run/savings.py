@@ -1,7 +1,5 @@
 """What a scene pays for and could leave out, each with the words to write instead."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from math import isinf

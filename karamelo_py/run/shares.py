@@ -4,8 +4,6 @@ Each process has the points of tiles that lie beside each other. Nodes that seve
 by each of them, from the same boxes in the same order.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """What a run spends its time on, and a word about compilation, which is most of a first one."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Which step is taken: the program's own share of the stable step, and what limits that."""
 
-from __future__ import annotations
-
 from math import inf, sqrt
 from typing import Any
 

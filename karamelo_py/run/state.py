@@ -1,7 +1,5 @@
 """All arrays of a simulation that a step changes, by name: to return to, to write, to read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path

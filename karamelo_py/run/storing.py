@@ -1,7 +1,5 @@
 """What a file to go on from holds, from the parts of all processes, so many points at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """The grids cut into tiles: which points lie in which, which nodes they give to or are in use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from typing import Any, NamedTuple

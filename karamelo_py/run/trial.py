@@ -3,8 +3,6 @@
 What is missing, or of the wrong length, so ends in a message about the part, not about a loop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

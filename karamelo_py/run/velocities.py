@@ -1,7 +1,5 @@
 """Fixes that give the same points several velocities: which of them decides is told beforehand."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations, product
 from typing import Any

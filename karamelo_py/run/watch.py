@@ -1,7 +1,5 @@
 """Whether a scene's energy can be watched, and what a gain of energy comes from."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What points and nodes cost a process, measured while it takes steps."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -1,7 +1,5 @@
 """MUSL: modified update stress last (Sulsky et al. 1995)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.kernels.arrays import (
@@ -11,14 +9,7 @@ from karamelo_py.kernels.arrays import (
     POST_VELOCITIES_TO_GRID,
 )
 from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.rows import (
-    ACCELERATE,
-    CONTACT_AFTER,
-    MOMENTUM_AGAIN,
-    MOVE,
-    SERIES,
-    SUMS,
-)
+from karamelo_py.kernels.rows import ACCELERATE, CONTACT_AFTER, MOMENTUM_AGAIN, MOVE, SERIES, SUMS
 from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 
 

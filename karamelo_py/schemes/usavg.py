@@ -1,7 +1,5 @@
 """USAVG: half of the stress update first, half last (Nairn 2003)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.kernels.arrays import (

@@ -1,7 +1,5 @@
 """USF: update stress first (Burgess, Sulsky & Brackbill 1992; Bardenhagen 2002)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.kernels.arrays import (

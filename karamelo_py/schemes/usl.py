@@ -1,7 +1,5 @@
 """USL: update stress last (Sulsky et al. 1994; Sinaie et al. 2017)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real, shared

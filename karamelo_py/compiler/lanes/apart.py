@@ -1,7 +1,5 @@
 """Functions of numbers in lanes: done for one lane after another."""
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Arrays of points and what is read at numbers in lanes."""
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -11,14 +9,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, register_model
 
-from karamelo_py.compiler.compile import (
-    beside,
-    by_type,
-    is_one,
-    lanes_of,
-    of_present,
-    real,
-)
+from karamelo_py.compiler.compile import beside, by_type, is_one, lanes_of, of_present, real
 from karamelo_py.compiler.lanes.numbers import select
 from karamelo_py.compiler.lanes.registers import (
     I32,

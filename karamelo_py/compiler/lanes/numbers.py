@@ -1,7 +1,5 @@
 """Lanes as a number type: arithmetic, comparisons, choices, conversions."""
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Records of nodes, (nodes, components), read and written in lanes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

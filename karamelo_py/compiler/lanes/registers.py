@@ -1,7 +1,5 @@
 """Numbers that lie side by side in a vector register: their type, and how they get there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

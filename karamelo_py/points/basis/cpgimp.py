@@ -13,14 +13,7 @@ from karamelo_py.points.basis.product import along, node_number, register
 from karamelo_py.points.basis.ugimp import averaged_hats, box
 from karamelo_py.points.frames import stretched_share
 from karamelo_py.points.grid import cells_along
-from karamelo_py.points.kinematics import (
-    deform,
-    diagonal,
-    dimension,
-    planar,
-    stretch,
-    volume_ratio,
-)
+from karamelo_py.points.kinematics import deform, diagonal, dimension, planar, stretch, volume_ratio
 from karamelo_py.points.kinematics.components import Number, Tensor, Vector, formula
 
 # Half sizes that weights are made with, in cells.

@@ -1,7 +1,5 @@
 """Cubic B-splines: four nodes a direction."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, in_all, real, shared

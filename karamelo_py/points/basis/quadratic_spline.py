@@ -1,7 +1,5 @@
 """Quadratic B-splines: three nodes a direction, smooth gradients."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, real, shared

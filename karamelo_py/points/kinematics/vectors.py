@@ -3,13 +3,7 @@
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.symbols import add_product, call
 from karamelo_py.compiler.tuples import row
-from karamelo_py.points.kinematics.components import (
-    Components,
-    Symmetric,
-    Tensor,
-    Vector,
-    formula,
-)
+from karamelo_py.points.kinematics.components import Components, Symmetric, Tensor, Vector, formula
 
 
 @shared

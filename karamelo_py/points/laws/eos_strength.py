@@ -88,15 +88,8 @@ from karamelo_py.points.laws.strengths import (
     shear_modulus,
     shear_strain,
 )
-from karamelo_py.points.laws.temperatures import (
-    heat_from,
-    heated,
-    initial_heat,
-    thermal_pressure,
-)
-from karamelo_py.points.laws.viscosity import (
-    initial_viscous_pressure,
-)
+from karamelo_py.points.laws.temperatures import heat_from, heated, initial_heat, thermal_pressure
+from karamelo_py.points.laws.viscosity import initial_viscous_pressure
 from karamelo_py.script.errors import ScriptError
 
 

@@ -1,7 +1,5 @@
 """XPIC: PIC of higher order, damping only what the grid cannot see (Hammerquist & Nairn 2017)."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, NamedTuple
 
 from karamelo_py.compiler.fields import StepField, SummedField, vector

@@ -1,7 +1,5 @@
 """A point of a material that goes along a load path, increment by increment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple

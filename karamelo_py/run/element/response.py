@@ -1,7 +1,5 @@
 """What a point answers: a table of its strains, stresses and energies, and a picture of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -7,12 +7,7 @@ from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws import column, damage, damage_initiation
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
-from karamelo_py.points.laws.damages import (
-    damage_after,
-    initial_damage,
-    initiation,
-    integrity,
-)
+from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
 from karamelo_py.points.laws.temperatures import Warm, homologous
 from karamelo_py.script.errors import ScriptError
 

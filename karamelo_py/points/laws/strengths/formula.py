@@ -1,7 +1,5 @@
 """strength formula: a flow stress that the script says."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np

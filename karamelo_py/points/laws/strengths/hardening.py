@@ -2,14 +2,7 @@
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import (
-    choose,
-    in_any,
-    point_function,
-    real,
-    round_off,
-    shared,
-)
+from karamelo_py.compiler.compile import choose, in_any, point_function, real, round_off, shared
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws.strengths import remembers, shear_response

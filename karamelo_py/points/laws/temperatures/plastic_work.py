@@ -6,12 +6,7 @@ from karamelo_py.compiler.compile import choose
 from karamelo_py.language.signature import In, NonNegative, Positive
 from karamelo_py.points.laws import column, conductivity, heat_capacity, temperature
 from karamelo_py.points.laws.checks import check_temperatures
-from karamelo_py.points.laws.temperatures import (
-    Warm,
-    heated,
-    initial_heat,
-    thermal_pressure,
-)
+from karamelo_py.points.laws.temperatures import Warm, heated, initial_heat, thermal_pressure
 
 
 class PlasticWork(NamedTuple):
