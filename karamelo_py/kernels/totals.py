@@ -18,6 +18,7 @@ LIMBS = 68
 LOST = LIMBS - 1  # counts terms that are no numbers
 DIGIT = (1 << 32) - 1
 MANTISSA = (1 << 52) - 1
+MANY = 1 << 10  # terms whose whole numbers can be added up before one overflows
 COARSE, FINE = 1e-200, 1e200  # largest terms that are added up as whole numbers
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # bits without the sign, which are in the order of the numbers
 WHOLE = 1.5 * 2.0**52
@@ -57,7 +58,7 @@ def add_to(totals, row, x):
 
 @subkernel
 def add_many(totals, row, terms, count):
-    """Add the first `count` of `terms`, at most 2^10, without rounding.
+    """Add the first `count` of `terms`, at most `MANY`, without rounding.
 
     They are sums of whole numbers of two sizes, but for terms 2^30 times smaller than the largest.
     A number added to 1.5 2^52 has its whole part in its last bits: both loops are sums of bits, in
@@ -136,8 +137,8 @@ def _round(totals, digits, answer, first, count):
 @entered
 def add_all(totals, row, terms):
     """Add all `terms` to a total, without rounding."""
-    for q in range(terms.size):
-        add_to(totals, row, terms[q])
+    for first in range(0, terms.size, MANY):
+        add_many(totals, row, terms[first:], min(MANY, terms.size - first))
 
 
 @entered
