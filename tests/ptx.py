@@ -25,7 +25,7 @@ from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient,
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all
 from karamelo_py.kernels.rows import Insulated
-from karamelo_py.kernels.sums import sum_tile
+from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.sweep import (
     Context,
     OldWeights,
@@ -158,10 +158,10 @@ def nodes_of(visit: Visit, setup: Setup) -> Nodes:
 
 
 def compiled_sum(visit: Visit, setup: Setup) -> Compiled:
-    """What sums at a tile of nodes what a visit gave to the tiles of points."""
+    """What sums at a share of the nodes what a visit gave to the tiles of points."""
     nodes = nodes_of(visit, setup)
     buffers = setup.buffers._replace(nodes=nodes)
-    return compiled(sum_tile, visit.quantities, setup.kin, nodes, buffers, 0)
+    return compiled(sum_share, visit.quantities, setup.kin, nodes, buffers, 0)
 
 
 def compiled_visit(visit: Visit, setup: Setup) -> Compiled:
@@ -169,7 +169,8 @@ def compiled_visit(visit: Visit, setup: Setup) -> Compiled:
     s, nodes = setup, nodes_of(visit, setup)
     real = s.nodes.sums.dtype.type
     context = Context(
-        s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, nodes, nodes, 0, real(0)
-    )
+        s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, nodes, nodes, 0, real(0),
+        (real(0),) * s.kin.dimension,
+    )  # fmt: skip
     report = np.zeros((1, 2), real)
     return compiled(visit_point, visit, context, s.blocks[0], 0, real(1), 0, report)

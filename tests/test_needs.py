@@ -24,6 +24,7 @@ from karamelo_py.output.console import Console
 from karamelo_py.run.report import bytes_per_point
 from karamelo_py.run.savings import savings
 from karamelo_py.run.sizes import node_fields, point_fields
+from karamelo_py.run.stable import own_weight_of_drift
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit
 
@@ -244,9 +245,12 @@ def advice(lowered):
 
     def say(script, dt=1.0, limit=1.0, **variables) -> str:
         hub = lowered(script, **variables)
-        clock = SimpleNamespace(spacing=limit, rate=1, heat_limit=inf)
+        weight = own_weight_of_drift(hub)
+        clock = SimpleNamespace(spacing=limit, rate=1, heat_limit=inf, weight=weight)
         control = SimpleNamespace(clock=[clock])
-        found = savings(hub, SimpleNamespace(dt=dt, limit=limit, control=control))
+        found = savings(
+            hub, SimpleNamespace(dt=dt, limit=limit, control=control, fastest=lambda: 0.0)
+        )
         return "\n".join(f"{saving.cost} / {saving.instead}" for saving in found)
 
     return say
