@@ -219,6 +219,7 @@ CLOCK = np.dtype(
         ("rate", np.float64),  # of the fastest point, c + max |v_i - common_i|
         ("common", np.float64, (1, 3)),  # velocity that speeds are measured from
         ("weight", np.float64),  # of what all drift by in that: 1, with which `common` is 0
+        ("wave", np.float64),  # speed of waves when `common` was measured
         ("speed", np.float64),  # of the point that goes furthest, in cells
         ("new_rate", np.float64),  # of the last sweep
         ("move", np.float64),  # of the point that went furthest in this step, in cells

@@ -47,7 +47,7 @@ ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
 # Points that go from cell to cell feed energy to a body, by so much a cell, and the more the longer
 # the step. Until they have gone so far, in cells, a scene takes the steps of bodies at rest.
 STILL = 0.25
-# Where a common drift does not count in the step, none moves a point by more cells.
+# Where a common drift counts otherwise than by itself in the step, none moves a point by more cells.
 STRIDE = 0.65
 
 
@@ -60,9 +60,12 @@ def choose_dt(control):
     forces (impulses over dt) would be many times what they are before.
     """
     clock = control.clock[0]
+    if clock.weight > 1:
+        # What all drift by may have turned since it was measured, and be taken from their speeds.
+        clock.rate = max(clock.rate, clock.wave + clock.speed * clock.spacing)
     limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     dt = min(clock.dt_factor * limit, clock.heat_factor * clock.heat_limit)
-    if clock.weight == 0 and clock.speed * dt > STRIDE:
+    if clock.weight != 1 and clock.speed * dt > STRIDE:
         dt = STRIDE / clock.speed
     dt = clock.fixed_dt if clock.fixed_dt > 0 else dt
     limit = min(limit, clock.heat_limit)

@@ -143,8 +143,11 @@ class Simulation(Lowered):
             # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
             clock = self.control.clock[0]
             clock.common[:] = common_velocity(self, float(clock.weight))
-            clock.speed = self.fastest() / clock.spacing if clock.weight == 0 else 0.0
             self.measure()
+            clock.wave = clock.speed = 0.0
+            if clock.weight != 1:
+                clock.wave = clock.rate - self.fastest(clock.common[0])
+                clock.speed = self.fastest() / clock.spacing
             self._measured = self.version
         choose_dt(self.control)
 

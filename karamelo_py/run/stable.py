@@ -162,7 +162,7 @@ def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
     rate = clock.rate if weight == clock.weight else simulation.rate_with(weight)
     limit = courant * clock.spacing / rate if rate > 0 else inf
     step = min(share * limit, USUAL * clock.heat_limit)
-    speed = simulation.fastest() if weight == 0 else 0.0
+    speed = simulation.fastest() if weight != 1 else 0.0
     return float(min(step, STRIDE * clock.spacing / speed) if speed > 0 else step)
 
 
@@ -235,7 +235,7 @@ def ruling_limit(simulation: Any) -> str:
         return "set_dt"
     waves = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     of_waves, of_heat = clock.dt_factor * waves, clock.heat_factor * clock.heat_limit
-    if clock.weight == 0 and clock.speed * control.values[DT] * (1 + 1e-9) >= STRIDE:
+    if clock.weight != 1 and clock.speed * control.values[DT] * (1 + 1e-9) >= STRIDE:
         return "speed"
     if control.values[DT] < min(of_waves, of_heat) * (1 - 1e-9):
         return "end"
