@@ -262,6 +262,11 @@ def test_scenes_without_waste_hear_nothing(advice):
         assert advice(INPUTS / script) == "", script
 
 
+@pytest.mark.parametrize(("script", "weight"), [("in.dam_break", 1), ("in.energy_disk", 0)])
+def test_what_flows_keeps_the_common_drift_in_its_step(lowered, script, weight):
+    assert own_weight_of_drift(lowered(INPUTS / script, basis="cubic-spline")) == weight
+
+
 def test_a_small_step(advice):
     said = advice(plane(more="set_dt(0.001)"), dt=0.001, limit=0.04)
     assert "set_dt(0.001): 16 times as many steps" in said

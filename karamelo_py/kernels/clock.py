@@ -47,7 +47,7 @@ ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
 # Points that go from cell to cell feed energy to a body, by so much a cell, and the more the longer
 # the step. Until they have gone so far, in cells, a scene takes the steps of bodies at rest.
 STILL = 0.25
-# Where a common drift counts otherwise than by itself in the step, none moves a point by more cells.
+# Where a common drift does not count as it is in the step, none moves a point by more cells.
 STRIDE = 0.65
 
 

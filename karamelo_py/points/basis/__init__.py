@@ -29,6 +29,9 @@ gradient_jumps
 courant_still, courant_total
     the stable step over h/c while points are where they were, in the updated frame, and in the
     total one (1, where a class does not say);
+courant_strained_first
+    the most of `courant_still` where the strain comes before the forces, as in usf (no bound, where
+    a class does not say);
 bears_drift
     whether bodies that drift keep their energy with the step of bodies at rest, with musl and usf
     too (not, where a class does not say);
