@@ -1,5 +1,6 @@
 """Charts of sweeps: orders, Pareto front, and pictures in which nothing hides anything."""
 
+import itertools
 import json
 import re
 import shutil
@@ -178,9 +179,24 @@ def test_no_two_lines_look_alike():
     assert len(set(look.styles(few))) == len(few)
 
 
+@pytest.mark.parametrize("span", [1.1, 1.5, 2.1, 4, 9.3, 30, 400, 1e8, 1e30])
+@pytest.mark.parametrize("low", [1, 0.0021, 5.7e7])
+def test_numbers_along_a_short_logarithmic_axis_do_not_touch(low, span):
+    """As drawn: no box of a number reaches into that of the next."""
+    figure = blank_figure(8.4, 5.2)
+    axes = figure.subplots()
+    look.log_axis(axes.xaxis, low, low * span)
+    look.direct_labels(axes, [(low, 1, "quadratic-spline", "k")])
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in axes.get_xticklabels() if text.get_text()]
+    assert len(boxes) >= 2
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
+
+
 def test_round_ticks():
     assert look.log_ticks(0.9, 55) == [1, 2, 5, 10, 20, 50]
     assert look.log_ticks(1e-7, 1) == pytest.approx([10.0**k for k in range(-7, 1)])
+    assert look.log_ticks(2.1e-3, 4.6e-3) == pytest.approx([2.5e-3, 3e-3, 3.5e-3, 4e-3, 4.5e-3])
     assert tick_text(0.02) == "0.02" and tick_text(1e-7) == "$10^{-7}$"
     # Linear axes, too, say what is there.
     for top, said in ((2e-5, r"$5\cdot10^{-6}$"), (4e8, "$10^{8}$"), (2, "0.5")):

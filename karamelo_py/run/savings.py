@@ -1,7 +1,7 @@
 """What a scene pays for and could leave out, each with the words to write instead."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import isinf
 from typing import Any, NamedTuple
 
@@ -11,6 +11,7 @@ from karamelo_py.points.laws import Absent, can, plastic_strain
 from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
 from karamelo_py.points.laws.thermoelastic import Thermoelastic
 from karamelo_py.run.stable import own_step
+from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.regions.cylinder import Cylinder
 
@@ -170,12 +171,14 @@ def _averaging(hub: Hub, simulation: Any) -> Iterator[Saving]:
 # --- dimensions ----------------------------------------------------------------------------------
 
 
-def _acts(hub: Hub) -> Iterator[tuple]:
-    """The formulas of each fix by direction; of fixes without, that they may do anything."""
-    for fix in hub.fixes.values():
-        if fix.hooks() or fix.for_method:
-            formulas = tuple(fix.formulas)
-            yield formulas if formulas else (np.nan,) * 3
+def _acting(hub: Hub) -> list[Any]:
+    """The fixes that do something in a run."""
+    return [fix for fix in hub.fixes.values() if fix.hooks() or fix.for_method]
+
+
+def _given(fix: Any) -> tuple:
+    """Its formulas by direction; of fixes without, that they may do anything."""
+    return tuple(fix.formulas) or (np.nan,) * 3
 
 
 def _is_zero(formula: Any) -> bool:
@@ -190,6 +193,30 @@ def _depends(formula: Any, axes: str) -> bool:
     return any(name in formula.names for axis in axes for name in (axis, axis + "0"))
 
 
+def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
+    """Whether all points (or nodes) of a grid with one key are in the group of `fix`, or none.
+
+    `key` makes one or two numbers of each of positions (n, 3).
+    """
+    group = fix.group
+    if group is None or group.all:
+        return group is not None
+    if isinstance(group, NodeGroup):
+        whole = [(lattice.first, lattice.positions()) for lattice in hub.lattices]
+        members = fix.nodes
+    else:
+        whole = [(solid.first_id, solid.x0) for solid in hub.solids.values() if solid.count]
+        members = group.members
+    for first, x in whole:
+        places = np.rint(key(x) * (1e6 / hub.domain.h)).astype(np.int64)
+        rows = places @ (1 << 32 * np.arange(places.shape[1]))  # sorted faster as one number
+        _, which = np.unique(rows, return_inverse=True)
+        found = np.bincount(which, np.isin(first + np.arange(len(x)), members))
+        if ((found > 0) & (found < np.bincount(which))).any():
+            return False
+    return True
+
+
 def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
     """Solids that are the same all along a direction in which nothing moves."""
     domain = hub.domain
@@ -198,13 +225,8 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
         return
     for k in range(d):
         rest = [axis for axis in range(d) if axis != k]
-        still = all(
-            len(act) > k and _is_zero(act[k])
-            and not any(_depends(act[axis], AXES[k]) for axis in rest if axis < len(act))
-            for act in _acts(hub)
-        )  # fmt: skip
-        layers = _layers(hub, k, rest) if still and _faces_prescribed(hub, k) else 0
-        if layers:
+        layers = _layers(hub, k, rest) if _moves_nothing(hub, k, rest) else 0
+        if layers and _acts_alike(hub, rest):
             given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             kept = " and ".join(AXES[axis] for axis in rest)
             named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
@@ -216,9 +238,32 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
             return
 
 
+def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
+    """Whether fixes say nothing that is not 0 along direction k, nor what depends on it."""
+    for fix in _acting(hub):
+        given = _given(fix)
+        if len(given) <= len(rest) or not _is_zero(given[k]):
+            return False
+        if any(_depends(act, AXES[k]) for act in (*(given[j] for j in rest), fix.wall_friction)):
+            return False
+    return True
+
+
+def _acts_alike(hub: Hub, rest: list[int]) -> bool:
+    """Whether fixes act on all that lies at one place in the directions `rest`, or on nothing."""
+    for fix in _acting(hub):
+        smooth_wall = fix.wall_friction is None and all(_given(fix)[j] is None for j in rest)
+        if not smooth_wall and not _alike(hub, fix, lambda x: x[:, rest]):
+            return False
+    return True
+
+
 def _layers(hub: Hub, k: int, rest: list[int]) -> int:
-    """In how many equal layers across direction k the points lie; 0 where these differ."""
-    most = 0
+    """In how many equal layers across direction k the points lie, between faces that are held.
+
+    0 where layers differ, where solids do not begin and end together, or a face is free.
+    """
+    most, ends = 0, set()
     for solid in hub.solids.values():
         if not solid.count:
             continue
@@ -228,27 +273,28 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
         if len(set(counts)) > 1 or len(columns) * len(across) != len(places):
             return 0
         most = max(most, len(across))
-    return most
+        first, last = solid.x0[:, k].min(), solid.x0[:, k].max()
+        apart = len(across) - 1
+        half = (last - first) / apart / 2 if apart else solid.h / getattr(solid, "ppc", 1) / 2
+        ends.add((round((first - half) / solid.h, 6), round((last + half) / solid.h, 6)))
+    return most if len(ends) == 1 and _faces_held(hub, k, *ends.pop()) else 0
 
 
-def _faces_prescribed(hub: Hub, k: int) -> bool:
-    """Whether the velocity of the nodes at both faces across direction k is prescribed in it."""
+def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
+    """Whether no node of the planes at `low` and `high` (in cells) moves along direction k."""
     lattice = hub.lattices[0]
-    found = []
+    held = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
-        if fix.prescribes_velocity and len(fix.formulas) > k and _is_zero(fix.formulas[k]):
-            if fix.formulas[k] is None:
-                continue
-            if fix.group.all:
-                return True
-            places = np.unravel_index(fix.group.nodes - lattice.first, lattice.shape)[k]
-            found += [places.min(), places.max()] if len(places) else []
-    if not found:
+        if fix.prescribes_velocity and len(fix.formulas) > k and fix.formulas[k] is not None:
+            held.ravel()[fix.nodes - lattice.first] = _is_zero(fix.formulas[k])
+    if held.all():
+        return True
+    planes = [(end * lattice.h - lattice.lo[k]) / lattice.spacing for end in (low, high)]
+    if any(abs(plane - round(plane)) > 1e-4 for plane in planes):
         return False
-    low, high = (lattice.lo[k] + place * lattice.spacing for place in (min(found), max(found)))
-    lo = min(float(solid.x0[:, k].min()) for solid in hub.solids.values())
-    hi = max(float(solid.x0[:, k].max()) for solid in hub.solids.values())
-    return low <= lo and high >= hi
+    numbers = [round(plane) for plane in planes]
+    inside = all(0 <= number < lattice.shape[k] for number in numbers)
+    return inside and bool(held.take(numbers, axis=k).all())
 
 
 def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
@@ -261,12 +307,22 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
     axes = {(region.along, region.centre) for region in regions}
     if len(axes) > 1:
         return
-    along, _ = axes.pop()
+    along, middle = axes.pop()
     across = [axis for axis in range(3) if axis != along]
-    for act in _acts(hub):
+    centre = np.zeros(3)
+    centre[across] = middle
+
+    def turned(x: np.ndarray) -> np.ndarray:
+        r = np.linalg.norm((x - centre)[:, across], axis=1)
+        return np.stack([r, x[:, along]], axis=1)
+
+    for fix in _acting(hub):
+        act = _given(fix)
         if len(act) < 3 or not all(_is_zero(act[axis]) for axis in across):
             return
         if _depends(act[along], "".join(AXES[axis] for axis in across)):
+            return
+        if not _alike(hub, fix, turned):
             return
     radius = max(region.radius for region in regions)
     lo, hi = hub.domain.lo[along], hub.domain.hi[along]

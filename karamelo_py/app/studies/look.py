@@ -30,6 +30,7 @@ PLOTLY_MARKERS = (
     "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
     "triangle-left", "triangle-right",
 )  # fmt: skip
+PART = 0.105  # of a logarithmic axis, that a number of six digits covers
 FAMILIES = (
     ("linear", "quadratic-spline", "cubic-spline", "Bernstein-quadratic", "ugimp", "cpgimp"),
     ("FLIP", "APIC", "PIC", "MLS", "TPIC", "TFLIP", "AFLIP", "ASFLIP", "XPIC"),
@@ -103,7 +104,8 @@ def label(name: str) -> str:
 def log_ticks(low: float, high: float) -> list[float]:
     """Round numbers on a logarithmic axis: at 1, 2 and 5, at 1, or at every so many decades.
 
-    At more leading digits where a short axis would have fewer than three.
+    At more leading digits where a short axis would have fewer than three; never so near to each
+    other that their numbers would touch.
     """
     decades = log10(high / low)
     every = 1 if decades < 9 else ceil(decades / 8)
@@ -113,6 +115,7 @@ def log_ticks(low: float, high: float) -> list[float]:
         (1,),
         (1, 2, 5),
         (1, 1.5, 2, 3, 4, 5, 6, 8),
+        [k / 2 for k in range(2, 20)],
         [k / 5 for k in range(5, 50)],
         finest,
     ):
@@ -120,7 +123,16 @@ def log_ticks(low: float, high: float) -> list[float]:
         ticks = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
         if len(ticks) >= 3:
             break
-    return ticks
+    return _thinned(ticks, low, high)
+
+
+def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
+    """Those of ascending ticks that are a `PART` of a logarithmic axis behind the one before."""
+    found: list[float] = []
+    for tick in ticks:
+        if not found or tick >= found[-1] * (high / low) ** PART:
+            found.append(tick)
+    return found
 
 
 def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None = None) -> None:
@@ -133,8 +145,9 @@ def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None 
     low, high = low / pad, high * pad
     (axes.set_xlim if axis.axis_name == "x" else axes.set_ylim)(low, high)
     distinct = sorted(set(values or ()))
+    few = 0 < len(distinct) <= 9
     axis.set_major_locator(
-        FixedLocator(distinct if 0 < len(distinct) <= 9 else log_ticks(low, high))
+        FixedLocator(_thinned(distinct, low, high) if few else log_ticks(low, high))
     )
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(tick_text))
