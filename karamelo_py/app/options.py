@@ -91,6 +91,11 @@ def make_folder(folder: Path, option: str) -> None:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise ScriptError(
+            f"{option.format(folder)}: {folder} is a file",
+            expected="a folder, or the name of one that can be made",
+        ) from error
     except OSError as error:
         name = "files" if Path(folder.name).exists() else folder.name
         raise ScriptError(

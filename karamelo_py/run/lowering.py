@@ -121,7 +121,8 @@ def thread_count(hub: Hub, points: int) -> int:
     available = int(config.NUMBA_NUM_THREADS)
     if hub.settings.threads is not None:
         if hub.settings.threads > available:
-            hub.warn(f"only {available} of {hub.settings.threads} threads can be had here")
+            asked = hub.settings.threads
+            hub.warn(f"--threads {asked}: only {available} threads can be had here")
         return max(1, min(hub.settings.threads, available))
     usable = min(available, os.cpu_count() or 1)
     if (crew := hub.settings.crew) is not None:

@@ -152,6 +152,15 @@ def _arguments(source: Source, name: str, parts: list) -> list[Raw]:
                 expected=f"something {where} this comma",
                 hint="leave the comma out, or write NULL where a component is not to be set",
             )
+        word = source.text[slice(*part)]
+        if word.startswith("'"):
+            bare = word.strip("'")
+            raise ScriptError(
+                f"{word} stands in single quotes",
+                place=source.place(*part),
+                expected="texts stand in double quotes",
+                hint=f'write "{bare}", or a word without quotes',
+            )
         raws.append(Raw(source, *part))
     return raws
 
