@@ -74,6 +74,20 @@ def test_mistakes_of_variables(run_interpreted, line, says):
     assert ("comes from" in said) == bool(says)
 
 
+def test_a_number_that_a_transfer_does_not_take_is_taken_away(run_interpreted):
+    """As docs/script.md has it."""
+    script = 'transfer = "FLIP"\nalpha = 1\nmethod(ulmpm, transfer, linear, alpha)\n'
+    chosen = "-var", "transfer", "APIC"
+    hint = "hint: -var alpha mechanical takes it away"
+    assert hint in run_interpreted(script, *chosen, status=1).err
+    assert "error" not in run_interpreted(script, *chosen, "-var", "alpha", "mechanical").err
+
+
+def test_threads_that_are_not_there_are_told_of_the_option(run_interpreted):
+    err = run_interpreted(block(2, "run(1)"), "--threads", "10000").err
+    assert err.startswith("warning: --threads 10000: only ")
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
