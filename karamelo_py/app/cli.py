@@ -46,10 +46,11 @@ karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [-log FILE]
                           [--trust-geometries] [--quiet] [--debug]
        karamelo-py COMMAND ..."""
 RESTART = ("-restart", "--restart")
-# Of mpirun, make and Karamelo's like; what they ask for is said otherwise here.
+# Of mpirun, make and LAMMPS; what they ask for is said otherwise here.
 MPI_OPTIONS = {
     "-np": "--ranks", "--np": "--ranks", "-n": "--ranks",
     "-j": "--threads", "-t": "--threads", "-nt": "--threads",
+    "-sf": "--threads", "-pk": "--threads",
 }  # fmt: skip
 RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 

@@ -129,8 +129,9 @@ def unknown_name(script: Names, name: str, place: Any) -> ScriptError:
         hint = f"{name[:3]} stands in front of a bound in fix velocity_nodes only"
     if name.upper() in WORDS:
         hint = f"write {name.upper()}"
-    if re.match("[vcf]_", name) and name[2:] in known:  # as in LAMMPS
-        hint = f"write {name[2:]}"
+    if re.match("[vcf]_", name):  # as in LAMMPS
+        own = [n for n in known if re.fullmatch(f"{name[2:]}(_[^_]+)?", n)]
+        hint = f"write {' or '.join(own)}" if own else hint
     if name.lower() in ("true", "false"):
         hint = f"write {int(name.lower() == 'true')}"
     return ScriptError(

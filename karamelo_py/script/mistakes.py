@@ -46,6 +46,10 @@ _PUNCTUATION = re.compile(
 )
 
 
+# A comment of C in the line that ends there.
+_SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
+
+
 def check_characters(text: str) -> None:
     """Refuse characters that no part of a script may contain outside quotes and comments.
 
@@ -108,7 +112,7 @@ def _open_quote(text: str, start: int) -> Mistake:
         start,
         len(text) if end < 0 else end,
         expected='a second " in the same line',
-        hint='add the missing "',
+        hint="comments begin with #" if _SLASHES.search(text, 0, start) else 'add the missing "',
     )
 
 

@@ -6,19 +6,7 @@ from pathlib import Path
 from karamelo_py.language.signature import OutputFile
 from karamelo_py.output.rhythm import Every, Rhythmic
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Place, unknown
-
-# Columns, and other words for what they are together.
-QUANTITIES = {
-    "s11 s22 s33 s12 s13 s23 seq": ("stress", "sigma", "sig"),
-    "seq": ("mises", "vonmises", "von_mises", "svm"),
-    "e11 e22 e33 e12 e13 e23": ("strain", "eps", "epsilon"),
-    "x y z": ("pos", "position", "positions", "coord", "coordinates"),
-    "vx vy vz": ("vel", "velocity", "v"),
-    "fx fy fz": ("force", "forces", "f"),
-    "x y z x0 y0 z0": ("u", "disp", "displacement"),
-    "T": ("temp", "temperature"),
-}
+from karamelo_py.script.errors import Place
 
 
 class Dump(Rhythmic):
@@ -81,24 +69,3 @@ class Dump(Rhythmic):
         empty = [name for name in dict.fromkeys(columns) if name in absent]
         if empty:
             self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} have no such field")
-
-    @staticmethod
-    def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
-        """Refuse names that are not `known`.
-
-        `first` is the place of the first column among the arguments of the style.
-
-        Raises
-        ------
-        ScriptError
-            Naming the nearest known column.
-        """
-        for index, name in enumerate(columns):
-            if name not in known:
-                error = unknown(f"unknown column '{name}'", name, known, argument=first + index)
-                quantity = next((q for q, words in QUANTITIES.items() if name.lower() in words), "")
-                if columns_of_it := [column for column in quantity.split() if column in known]:
-                    error.hint = f"did you mean {', '.join(columns_of_it)}?"
-                if name[:2] in ("v_", "c_"):  # as in LAMMPS
-                    error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"
-                raise error
