@@ -74,6 +74,20 @@ def test_mistakes_of_variables(run_interpreted, line, says):
     assert ("comes from" in said) == bool(says)
 
 
+def test_a_number_that_a_transfer_does_not_take_is_taken_away(run_interpreted):
+    """As docs/script.md has it."""
+    script = 'transfer = "FLIP"\nalpha = 1\nmethod(ulmpm, transfer, linear, alpha)\n'
+    chosen = "-var", "transfer", "APIC"
+    hint = "hint: -var alpha mechanical takes it away"
+    assert hint in run_interpreted(script, *chosen, status=1).err
+    assert "error" not in run_interpreted(script, *chosen, "-var", "alpha", "mechanical").err
+
+
+def test_threads_that_are_not_there_are_told_of_the_option(run_interpreted):
+    err = run_interpreted(block(2, "run(1)"), "--threads", "10000").err
+    assert err.startswith("warning: --threads 10000: only ")
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
@@ -85,6 +99,12 @@ def test_mistakes_of_variables(run_interpreted, line, says):
         ("in.a -var n 5*", "-var n:1:2: error: the expression ends after '*'"),
         ("in.a -var n 10 -v n 20", "-var n is given twice, 10 and 20"),
         ("in.a -var n ten", "-var n ten is a text, and the script has a number"),
+        ("in.a -np 4", "did you mean --ranks N?"),
+        ("in.a -j4", "did you mean --threads N?"),
+        ("in.a --threads abc", "1, 2, ... or auto)\nexpected: --threads N\n"),
+        ("in.a --ranks -1", "'-1' is not a whole number of at least 1\nexpected: --ranks N\n"),
+        ("in.a -var E", "-var: expected 2 arguments\nexpected: -var NAME VALUE\n"),
+        ("in.a -out in.b", "cannot write to in.b: it is a file\n"),
         ("in.a in.b", "one word too many: in.b"),
         ("in.a --ranks 100000", "--ranks 100000: this machine has"),
         ("check", "expected: karamelo-py check SCRIPT"),

@@ -139,6 +139,7 @@ def test_slips_in_a_plot(run_interpreted, line, hint):
         ),
         ("dimension(2, 0, 1, 0)\nregion(b, cilinder, 0, 0, 1)\nrun_tim(0.4)", [1, 2, 3]),
         ("R = 0.2 +\nmethod(ulmpm, FLIP, linear, 1)\nfoo(3)\nb = 2*\nc = R", [1, 3, 4]),
+        ("method(ULMPM, flip, Linear, 7)\nfoo(3)", [1, 1, 1, 2]),
         ("method(ulmpm, FLIP)\nfoo(3)\nquit\nrun_tim(0.4)", [1, 2]),
         ("method(ulmpm, FLIP)\nstyle = 3\ncompute(e, style, all)\nstyle(3)", [1]),
     ],

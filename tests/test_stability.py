@@ -195,7 +195,7 @@ def test_energies_by_name(tmp_path):
     [
         (["-var", "factor=a,b"], "not numbers"),
         (["-var", "factor=1"], "one or two"),
-        (["-var", "factor=0.5:1:3", "-energy", "Et"], "does not log 'Et'"),
+        (["-var", "factor=0.5:1:3", "-energy", "Et"], "-energy Et: in.bar does not log 'Et'"),
         (["-var", "factor=0.5:1:3", "-o", "map.csv"], "unknown kind of file"),
         (["-var", "factr=0.5:1:3"], "did you mean 'factor'?"),
     ],

@@ -46,6 +46,12 @@ karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [-log FILE]
                           [--trust-geometries] [--quiet] [--debug]
        karamelo-py COMMAND ..."""
 RESTART = ("-restart", "--restart")
+# Of mpirun, make and LAMMPS; what they ask for is said otherwise here.
+MPI_OPTIONS = {
+    "-np": "--ranks", "--np": "--ranks", "-n": "--ranks",
+    "-j": "--threads", "-t": "--threads", "-nt": "--threads",
+    "-sf": "--threads", "-pk": "--threads",
+}  # fmt: skip
 RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 
 
@@ -185,6 +191,8 @@ def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError
             expected="--ranks for a script (karamelo-py SCRIPT --ranks N), check or bench",
         )
     close = nearest(option, parser.options()) if option else None
+    if (same := MPI_OPTIONS.get((option or "").rstrip("0123456789"))) in parser.options():
+        close = f"{same} N"
     usage = USAGE if command == "run" else parser.format_usage().removeprefix("usage: ").rstrip()
     return ScriptError(
         f"there is no option {option}" if option else f"one word too many: {words[0]}",
@@ -205,7 +213,14 @@ class CommandLine(argparse.ArgumentParser):
         return [word for action in self._actions for word in action.option_strings]
 
     def error(self, message: str) -> NoReturn:
-        raise ScriptError(message, expected=self.format_usage().removeprefix("usage: ").rstrip())
+        expected = self.format_usage().removeprefix("usage: ").rstrip()
+        if of := re.match(r"argument (-\S+): ", message):
+            spelled = of[1].split("/")
+            action = next(a for a in self._actions if spelled[0] in a.option_strings)
+            values = action.metavar or action.dest.upper()
+            expected = " ".join([spelled[0], *([values] if isinstance(values, str) else values)])
+            message = f"{spelled[0]}: {message[of.end() :]}"
+        raise ScriptError(message, expected=expected)
 
 
 def _parser(command: str) -> tuple[CommandLine, Any]:

@@ -94,7 +94,7 @@ def make_folder(folder: Path, option: str) -> None:
     except OSError as error:
         name = "files" if Path(folder.name).exists() else folder.name
         raise ScriptError(
-            f"cannot write to {folder}: {error.strerror}",
+            f"cannot write to {folder}: {'it is a file' if folder.is_file() else error.strerror}",
             expected="a folder, or the name of one that can be made",
             hint=f"{option.format(name)} is a folder in this one",
         ) from error

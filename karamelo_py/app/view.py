@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.output.columns import unknown_column
 from karamelo_py.output.files import picture_format, unwarned, whole
 from karamelo_py.output.movies import Frames, movie_format
 from karamelo_py.output.snapshots import Snapshot, read
-from karamelo_py.script.errors import ScriptError, unknown
+from karamelo_py.script.errors import ScriptError
 
 SUMMARY = "Draw pictures or a movie of dumps of points."
 TEXT = """\
@@ -109,7 +110,7 @@ def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace
 
     if options.column is not None and options.column not in first.columns:
         said = f"the dump has no column '{options.column}'"
-        raise unknown(said, options.column, first.columns)
+        raise unknown_column(said, options.column, first.columns)
     dimension, column = _dimension(first), _coloured_by(first, options.column)
     limits = (options.vmin, options.vmax)
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []

@@ -166,7 +166,7 @@ class _Call:
         self.variant = ""
         domain = hub.domain
         self.dimension = domain.dimension if domain is not None else hub.announced_dimension
-        self.styles = {f: registry.find(f, self.names[f]) for f in ("method", "transfer")}
+        self.styles = self._found()
         # Domains have a shape, which chooses the class of the basis.
         self.shapes = _variants(self.styles["method"])
         self.variants = {"method": {}, "transfer": _variants(self.styles["transfer"])}
@@ -181,6 +181,23 @@ class _Call:
             )
         self.styles["basis"] = registry.find("basis", basis)
         self.variants["basis"] = self.shapes or _variants(self.styles["basis"])
+
+    def _found(self) -> dict[str, type]:
+        """Method and transfer; of all names that are not known, all are told."""
+        styles: dict[str, type] = {}
+        errors: list[ScriptError] = []
+        for family, name in self.names.items():
+            if family == "basis" and not errors:
+                break  # It may be the shape of domains.
+            try:
+                styles[family] = registry.find(family, name)
+            except ScriptError as error:
+                error.argument = "kind" if family == "method" else family
+                errors.append(error)
+        if errors:
+            first, *first.others = errors
+            raise first
+        return styles
 
     def parts(self) -> dict[str, Any]:
         """Transfer, basis and method, made with the options that are theirs."""
@@ -305,7 +322,10 @@ class _Call:
             takes = f"{', '.join(asking)} and no further number" if asking else "no number"
             chosen = next((a.text for a in self.options if _word(a, self.variants["basis"])), None)
             return ScriptError(
-                f"{who} takes {takes}", place=argument.place, expected=self.instead(chosen)
+                f"{who} takes {takes}",
+                place=argument.place,
+                expected=self.instead(chosen),
+                hint=f"-var {word} mechanical takes it away" if word else None,
             )
         for family in FAMILIES:
             for name in registry.names(family):

@@ -73,16 +73,18 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     first
         What was wrong with that statement.
     """
-    found: list[ScriptError] = []
-    seen = {first.message}
+    found = first.others
+    seen = {first.message, *(error.message for error in found)}
     passed_over: list[Statement] = []
     dependents = Dependents()
 
     def tell(error: ScriptError) -> None:
         # One name that is not known may stand in many lines.
-        if error.message not in seen:
-            found.append(error)
-        seen.add(error.message)
+        for one in (error, *error.others):
+            if one.message not in seen:
+                found.append(one)
+            seen.add(one.message)
+        error.others = []
 
     wrong = interpreter.statement
     while wrong is not None and len(found) < MOST:

@@ -261,8 +261,8 @@ class Interpreter(Meanings):
             del self.record.statements[done:]
             error.place = error.place or statement.place
             self.presets.blame(statement, error)
-            if not error.included:
-                error.included = self._including(depth - 1)
+            for wrong in (error, *error.others):
+                wrong.included = wrong.included or self._including(depth - 1)
             error.complete = True
             raise
         except RecursionError:

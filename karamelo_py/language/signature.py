@@ -163,9 +163,9 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
                 "there is not enough memory for this", hint="use larger cells or fewer points"
             ) from error
     except ScriptError as error:
-        if not error.complete:
-            error.place = error.place or _guilty(error, arguments, bound)
-            error.command = error.command or name
+        for wrong in () if error.complete else (error, *error.others):
+            wrong.place = wrong.place or _guilty(wrong, arguments, bound)
+            wrong.command = wrong.command or name
         raise
 
 

@@ -10,6 +10,7 @@ from karamelo_py.script.errors import ScriptError, meant, nearest
 from karamelo_py.script.evaluation import usage
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
+from karamelo_py.script.mistakes import BLOCKS, NO_BLOCKS
 from karamelo_py.script.other_programs import KARAMELO_COMMANDS, instead
 from karamelo_py.script.syntax import Assignment, Call
 
@@ -56,7 +57,9 @@ def unknown_call(script: Names, name: str, place: Any, statement: bool) -> Scrip
             expected="an operator between the name and the parenthesis",
             hint=f"{name}*(...)",
         )
-    known = [*commands, *FUNCTIONS] if statement else [*FUNCTIONS, *commands]
+    if name in BLOCKS:
+        other = NO_BLOCKS
+    known = commands if statement else [*FUNCTIONS, *commands]
     shown = commands if statement else sorted(FUNCTIONS)
     return ScriptError(
         f"unknown {what} '{name}'",
@@ -126,6 +129,9 @@ def unknown_name(script: Names, name: str, place: Any) -> ScriptError:
         hint = f"{name[:3]} stands in front of a bound in fix velocity_nodes only"
     if name.upper() in WORDS:
         hint = f"write {name.upper()}"
+    if re.match("[vcf]_", name):  # as in LAMMPS
+        own = [n for n in known if re.fullmatch(f"{name[2:]}(_[^_]+)?", n)]
+        hint = f"write {' or '.join(own)}" if own else hint
     if name.lower() in ("true", "false"):
         hint = f"write {int(name.lower() == 'true')}"
     return ScriptError(

@@ -52,7 +52,7 @@ from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table
 from karamelo_py.scene.solid import Solid
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, render_message
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 SERIAL_UP_TO = 20_000  # points; below, waking threads costs more than they save
@@ -121,7 +121,9 @@ def thread_count(hub: Hub, points: int) -> int:
     available = int(config.NUMBA_NUM_THREADS)
     if hub.settings.threads is not None:
         if hub.settings.threads > available:
-            hub.warn(f"only {available} of {hub.settings.threads} threads can be had here")
+            asked = hub.settings.threads
+            said = f"--threads {asked}: only {available} threads can be had here"
+            hub.console.warn(render_message("warning", said))
         return max(1, min(hub.settings.threads, available))
     usable = min(available, os.cpu_count() or 1)
     if (crew := hub.settings.crew) is not None:

@@ -41,7 +41,13 @@ class Mistake(Exception):
 _CLOSES_NOTHING = (
     "this ) closes nothing", "as many ( as )", "remove it, or add the ( that belongs to it"
 )  # fmt: skip
-_PUNCTUATION = re.compile(r'"[^"\n]*"|#[^\n]*|["()“”„‟«»‘’`\x00-\x08\x0e-\x1f\x7f]')
+_PUNCTUATION = re.compile(
+    r'"[^"\n]*"|#[^\n]*|(?<!&)&(?=[ \t]*(?:#.*)?(?:\n|\Z))|["()“”„‟«»‘’`\x00-\x08\x0e-\x1f\x7f]'
+)
+
+
+# A comment of C in the line that ends there.
+_SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
 
 
 def check_characters(text: str) -> None:
@@ -58,6 +64,13 @@ def check_characters(text: str) -> None:
         word = match[0]
         if len(word) > 1 or word in '"#()':
             continue
+        if word == "&":
+            raise Mistake(
+                "no & stands at the end of a line",
+                *match.span(),
+                expected="a statement in one line, or a call over several",
+                hint="leave it out; a call may run over several lines inside its parentheses",
+            )
         if ord(word) < 32 or word == "\x7f":
             raise Mistake(
                 f"a control character (code {ord(word)}) stands here",
@@ -99,7 +112,7 @@ def _open_quote(text: str, start: int) -> Mistake:
         start,
         len(text) if end < 0 else end,
         expected='a second " in the same line',
-        hint='add the missing "',
+        hint="comments begin with #" if _SLASHES.search(text, 0, start) else 'add the missing "',
     )
 
 
@@ -238,6 +251,10 @@ def in_expression(parser: Any, code: str) -> Mistake:
         return _side_by_side(at)
     if at.kind not in _OPERATORS:
         return at.mistake(f"'{at.here}' cannot stand here")
+    for start in (at.start - 1, at.start):
+        if code[max(start, 0) : start + 2] in ("//", "/*"):
+            message = f"'{code[start : start + 2]}' begins no comment"
+            return Mistake(message, start, start + 2, _VALUE, "comments begin with #")
     hint = "put it in parentheses" if at.kind == "NOT" else None
     if before and before.type in _OPERATORS:
         return at.mistake(f"operator '{at.here}' follows operator '{before}'", hint=hint)
@@ -309,8 +326,11 @@ def _side_by_side(at: _Stop) -> Mistake:
     start, end = before.start_pos, at.end
     touching = before.type == "NUMBER" and before.end_pos == at.start
     if touching and at.kind == "NUMBER":
-        end = start + re.match(r"[\d.]+(?:[eE][+-]?\d+)?", code[start:]).end()
+        number = re.match(r"[\d.]+([eE][+-]?[\d.]+)?", code[start:])
+        end = start + number.end()
         expected = "a number has one point at most"
+        if "." in (number[1] or ""):
+            expected = "a whole number as the exponent; x^y is any power"
         return Mistake(f"'{code[start:end]}' is not a number", start, end, expected)
     if touching and at.kind == "NAME":
         if re.fullmatch(r"[eEdD]\d*", here):
@@ -345,7 +365,7 @@ def _side_by_side(at: _Stop) -> Mistake:
     hint = None
     if at.after_call and at.kind == "NAME":
         hint = "multiply with *; two statements stand on two lines"
-        hint = _NO_BLOCKS if at.before[0] in _BLOCKS else hint
+        hint = NO_BLOCKS if at.before[0] in BLOCKS else hint
     elif before.type == "NUMBER" and at.kind == "NAME" and not code[end:].strip():
         hint = "numbers stand without units"
     return at.mistake(
@@ -355,14 +375,16 @@ def _side_by_side(at: _Stop) -> Mistake:
     )
 
 
-_BLOCKS = ("for", "while", "if", "else", "elif", "def", "do", "import", "loop", "next", "jump")
-_NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
+BLOCKS = (
+    "for", "while", "if", "else", "elif", "def", "do", "import", "loop", "label", "next", "jump",
+)  # fmt: skip
+NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
 
 
 def _block_or_call(name: str, words: list[str]) -> str:
     """What to write instead of ``name word word``."""
-    if name in _BLOCKS:
-        return _NO_BLOCKS
+    if name in BLOCKS:
+        return NO_BLOCKS
     if other := OTHERWISE.get(name) or instead("command", name):
         return other
     if name in ("fix", "compute") and len(words) > 2:

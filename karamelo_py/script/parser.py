@@ -1,6 +1,7 @@
 """From text to statements. The grammars are in script.lark and expression.lark."""
 
 import math
+import re
 from dataclasses import replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -28,6 +29,7 @@ from karamelo_py.script.syntax import (
 # Trees are walked by recursion; this keeps well below Python's limit.
 MAX_DEPTH = 150
 
+_SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
 _SPELLINGS = {"**": "^", "and": "&&", "or": "||", "not": "!"}
 
 
@@ -151,6 +153,14 @@ def _arguments(source: Source, name: str, parts: list) -> list[Raw]:
                 place=source.place(*_span(comma)),
                 expected=f"something {where} this comma",
                 hint="leave the comma out, or write NULL where a component is not to be set",
+            )
+        if single := _SINGLE_QUOTED.match(source.text, part[0]):
+            raise ScriptError(
+                f"{single[0]} stands in single quotes",
+                place=source.place(*single.span()),
+                expected="texts stand in double quotes",
+                hint=f'write "{single[1]}"'
+                + (", or the word without quotes" if single[1].isidentifier() else ""),
             )
         raws.append(Raw(source, *part))
     return raws

@@ -136,9 +136,13 @@ class Recorded:
 
 
 def recorded(
-    text: str, headings: Sequence[str] | None, script: Path, variables: Container[str] = ()
+    text: str,
+    headings: Sequence[str] | None,
+    script: Path,
+    variables: Container[str] = (),
+    option: str = "-record",
 ) -> list[Recorded]:
-    """What -record asks for.
+    """What -record, or another option, asks for.
 
     Raises
     ------
@@ -152,7 +156,7 @@ def recorded(
                 continue
             known = list(dict.fromkeys(headings))
             raise ScriptError(
-                f"-record {item.text}: {script} does not log '{column}'",
+                f"{option} {item.text}: {script} does not log '{column}'",
                 expected="one of " + ", ".join(known),
                 hint=meant(column, known)
                 or f"log_modify(custom, step, dt, time, {column}) in the script",

@@ -118,7 +118,7 @@ def energy_column(asked: str | None, headings: Sequence[str] | None, script: Pat
         If the script does not log it, or logs no energy that is known by its name.
     """
     if asked is not None:
-        return records.recorded(asked, headings, script)[0].columns[0]
+        return records.recorded(asked, headings, script, option="-energy")[0].columns[0]
     for name in ENERGIES:
         if headings is None or name in headings:
             return name

@@ -5,11 +5,12 @@ from typing import Annotated
 import numpy as np
 
 from karamelo_py.language.signature import Positive
+from karamelo_py.output.columns import check_columns
 from karamelo_py.output.fields import Fields
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
-from karamelo_py.script.errors import ScriptError, unknown
+from karamelo_py.script.errors import ScriptError
 
 
 class Probe(Compute):
@@ -49,9 +50,7 @@ class Probe(Compute):
         super().__init__(hub, group if point is None else ParticleGroup(hub, everything=True))
         self.columns = (column, *columns)
         known = hub.fields.particle_names()
-        for k, name in enumerate(self.columns):
-            if name not in known:
-                raise unknown(f"unknown column '{name}'", name, known, argument=1 + k)
+        check_columns(self.columns, known, first=1)
         self.place_xyz = (x, y, z)
         self.point = point
         if point is not None and self.at_place:

@@ -6,7 +6,7 @@ from pathlib import Path
 from karamelo_py.language.signature import OutputFile
 from karamelo_py.output.rhythm import Every, Rhythmic
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Place, unknown
+from karamelo_py.script.errors import Place
 
 
 class Dump(Rhythmic):
@@ -69,18 +69,3 @@ class Dump(Rhythmic):
         empty = [name for name in dict.fromkeys(columns) if name in absent]
         if empty:
             self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} have no such field")
-
-    @staticmethod
-    def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
-        """Refuse names that are not `known`.
-
-        `first` is the place of the first column among the arguments of the style.
-
-        Raises
-        ------
-        ScriptError
-            Naming the nearest known column.
-        """
-        for index, name in enumerate(columns):
-            if name not in known:
-                raise unknown(f"unknown column '{name}'", name, known, argument=first + index)

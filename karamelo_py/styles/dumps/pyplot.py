@@ -7,6 +7,7 @@ import numpy as np
 
 from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
+from karamelo_py.output.columns import check_columns
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.units import labelled
@@ -84,7 +85,7 @@ class PyPlot(Dump):
         title: str | None = None,
     ):
         if field is not None:
-            self.check_columns([field], hub.fields.particle_names(), first=4)
+            check_columns([field], hub.fields.particle_names(), first=4)
         super().__init__(hub, every, file, *([] if field is None else [field]))
         self.format = self.check_format()
         self.size = (_inches("width", width), _inches("height", height))

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.language.signature import OutputFile
+from karamelo_py.output.columns import check_columns
 from karamelo_py.output.rhythm import Every
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -57,7 +58,7 @@ class TableDump(Dump):
                 expected="the file name in front of the columns",
                 hint=f"dump_*.LAMMPS, {file}",
             )
-        self.check_columns(columns, known, first=2)
+        check_columns(columns, known, first=2)
         wanted = [name for name in dict.fromkeys(columns) if name not in LEADING]
         # A viewer needs all three positions; where some are not asked for they come first.
         if not set(POSITIONS) <= set(wanted):
