@@ -103,6 +103,7 @@ def test_threads_that_are_not_there_are_told_of_the_option(run_interpreted):
         ("in.a -j4", "did you mean --threads N?"),
         ("in.a --threads abc", "1, 2, ... or auto)\nexpected: --threads N\n"),
         ("in.a --ranks -1", "'-1' is not a whole number of at least 1\nexpected: --ranks N\n"),
+        ("in.a --quiet=3", "'3'\nexpected: --quiet\n"),
         ("in.a -var E", "-var: expected 2 arguments\nexpected: -var NAME VALUE\n"),
         ("in.a -out in.b", "cannot write to in.b: it is a file\n"),
         ("in.a in.b", "one word too many: in.b"),

@@ -217,7 +217,7 @@ class CommandLine(argparse.ArgumentParser):
         if of := re.match(r"argument (-\S+): ", message):
             spelled = of[1].split("/")
             action = next(a for a in self._actions if spelled[0] in a.option_strings)
-            values = action.metavar or action.dest.upper()
+            values = action.metavar or action.dest.upper() if action.nargs != 0 else ()
             expected = " ".join([spelled[0], *([values] if isinstance(values, str) else values)])
             message = f"{spelled[0]}: {message[of.end() :]}"
         raise ScriptError(message, expected=expected)
