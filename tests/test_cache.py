@@ -19,7 +19,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
-from karamelo_py.run.spending import Spent
+from karamelo_py.run.spending import Spent, _about
 from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -454,6 +454,7 @@ def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
     with wait():
         kernel(lambda tag: answer(tag) + 1)(Tag())
     assert "once: 12 s to 28 s, as others use the processors (the next" in out.getvalue()
+    assert _about(0.6) == "about 1 s"  # 0.6 s to 1.4 s
     # So short a wait was not for all of it.
     assert list(cache._times().values()) == [12.3]
 

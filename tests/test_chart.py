@@ -226,6 +226,14 @@ def test_a_page_needs_nothing_else(table):
     assert "point 3 &lt;leaves&gt;" in page and "<leaves>" not in page.split("const runs")[0]
 
 
+def test_a_page_without_plotly_is_refused_before_the_table(table, monkeypatch, capsys):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-o", "chart.html"]) == 1
+    said = capsys.readouterr()
+    assert not said.out and "a page needs the package plotly" in said.err
+    assert "karamelo-py[studies]" in said.err
+
+
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 

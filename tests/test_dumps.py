@@ -287,6 +287,22 @@ def test_pictures_of_a_run_do_not_jump(hub):
         np.testing.assert_allclose(places(), before, atol=1e-9)
 
 
+@pytest.mark.parametrize("size", [(300, 450), (200, 500), (800, 250)])
+@pytest.mark.parametrize("title", [None, "a ball that falls upon a plate of lead"])
+def test_a_title_lies_within_the_picture_and_colours_beside_the_axes(plane, size, title):
+    dump = PyPlot(plane, 1, "p.png", *size, "seq", title=title)
+    plane.update.time = 0.300056
+    dump.write()
+    picture = dump._picture
+    frame, bar = picture.axes.get_window_extent(), picture.scale.axes.get_window_extent()
+    assert bar.height <= frame.height + 1e-6 and abs(bar.y0 + bar.y1 - frame.y0 - frame.y1) < 1e-6
+    written = picture.title.get_window_extent()
+    assert written.x0 > 0 and written.x1 < size[0]
+    assert written.y0 > bar.y1
+    numbers = [label.get_window_extent() for label in picture.scale.get_ticklabels()]
+    assert max(number.x1 for number in numbers) < picture.scale.label.get_window_extent().x0
+
+
 def test_numbers_that_hardly_differ_are_told_apart(plane):
     plane.fields.points["seq"] = 1000 + np.linspace(0, 1, plane.fields.count)
     dump = PyPlot(plane, 1, "p.png", 4, 3, "seq")

@@ -29,7 +29,7 @@ def _about(seconds: float) -> str:
     """How long one processor takes for so many seconds of work; longer where others want it."""
     wanted = 1 + (os.getloadavg()[0] if hasattr(os, "getloadavg") else 0)
     longest = seconds * max(1.0, wanted / (os.cpu_count() or 1))
-    if longest < 1.5 * seconds:
+    if longest < 1.5 * seconds or duration(longest) == duration(seconds):
         return f"about {duration(seconds)}"
     return f"{duration(seconds)} to {duration(longest)}, as others use the processors"
 

@@ -194,11 +194,20 @@ def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
     return float(min(step, STRIDE * clock.spacing / speed) if speed > 0 else step)
 
 
+def _borne(hub: Hub, simulation: Any) -> float:
+    """The largest step that points bear where they are."""
+    clock = simulation.control.clock[0]
+    return own_step_of_waves(hub, still=clock.path <= STILL)[0] * clock.spacing / clock.rate
+
+
+def blows_up(hub: Hub, simulation: Any) -> bool:
+    """Whether the step is so far above the stable one that a run will hardly get anywhere."""
+    return simulation.dt > LOST * _borne(hub, simulation)
+
+
 def what_follows(hub: Hub, simulation: Any, step: float) -> str:
     """What is known of a `step` above the stable one of bodies that move."""
-    clock = simulation.control.clock[0]
-    still = clock.path <= STILL
-    borne = own_step_of_waves(hub, still=still)[0] * clock.spacing / clock.rate
+    borne = _borne(hub, simulation)
     if step <= borne:
         return (
             f" of bodies that go from cell to cell, which gain energy; at rest up to {borne:.4g} "

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies import histories, keeping, look, pictures, records, versus
+from karamelo_py.app.studies import histories, keeping, look, page, pictures, records, versus
 from karamelo_py.app.studies.curves import Family, missing, order
 from karamelo_py.app.studies.options import add_axes, along, new_parser, out_file, split
 from karamelo_py.app.studies.study import shown, terminal
@@ -86,6 +86,8 @@ def run(options: Any) -> int:
     if len(family.without) == len(rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
     out = out_file(options.o, *SUFFIXES) if options.o else None
+    if out is not None and out.suffix.lower() == ".html":
+        page.require_plotly()
     title = options.title if options.title is not None else Path(made.get("script", "")).name
     axes = [name.strip() for name in (options.heat or "").split(",") if name.strip()]
     for name in axes:
@@ -103,8 +105,6 @@ def run(options: Any) -> int:
     if out.suffix.lower() == ".html":
         if axes:
             raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
-        from karamelo_py.app.studies import page
-
         page.write(
             family, rows, out, convergence=bool(options.x), title=title or "runs", made=made,
             words=words,

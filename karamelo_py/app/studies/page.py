@@ -2,6 +2,7 @@
 
 import base64
 import html
+import importlib.util
 import io
 import json
 from collections.abc import Mapping
@@ -70,24 +71,28 @@ Plotly.Plots.resize(document.getElementById("chart"));
 """
 
 
-def write(
-    family: Family, rows: list, path: Path, *, convergence: bool, title: str, made: Mapping,
-    words: tuple[str, str],
-) -> None:  # fmt: skip
-    """Write the page; `words` stand along the axes.
+def require_plotly() -> None:
+    """See that Plotly is there, which takes long to import.
 
     Raises
     ------
     ScriptError
-        If Plotly is not installed.
+        If it is not installed.
     """
-    try:
-        from plotly import graph_objects
-        from plotly import io as plotly_io
-    except ImportError:
+    if importlib.util.find_spec("plotly") is None:
         raise ScriptError(
             "a page needs the package plotly", hint='pip install "karamelo-py[studies]"'
-        ) from None
+        )
+
+
+def write(
+    family: Family, rows: list, path: Path, *, convergence: bool, title: str, made: Mapping,
+    words: tuple[str, str],
+) -> None:  # fmt: skip
+    """Write the page with Plotly; `words` stand along the axes."""
+    from plotly import graph_objects
+    from plotly import io as plotly_io
+
     number_of = {id(row): k for k, row in enumerate(rows)}
     figure = graph_objects.Figure()
     front = family.front()

@@ -19,6 +19,7 @@ from PIL import Image
 SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
 MOST_IN_LEGEND = 16
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks
+MARGIN = 4  # pixels at both sides of a long title
 # Towards the light, in a frame of right, up and towards the eye.
 LIGHT = np.array([-0.35, 0.6, 0.72])
 AMBIENT = 0.5  # light from all sides
@@ -87,6 +88,7 @@ class Picture:
         # The axis whose labels change with the limits of the field.
         self.scale: Any = None
         self._laid_out = False
+        self._widest = 0.0  # of the titles, in pixels
         self._background: Any = None
         self.axes.tick_params(labelsize=8)
         self.title = self.axes.set_title("step 0, time 0", fontsize=9)
@@ -128,8 +130,21 @@ class Picture:
                 self.limits = limits
                 self._apply_limits(*limits)
                 self._background = None
-        self.title.set_text(title)
+        self._entitle(title)
         self._place(x, values, size)
+
+    def _entitle(self, text: str) -> None:
+        """Write the title above the axes, and where that is too narrow within the picture."""
+        self.title.set_text(text)
+        whole = self.figure.bbox.width - 2 * MARGIN
+        wide = self.title.get_window_extent(self.canvas.get_renderer()).width
+        if wide > whole:
+            self.title.set_fontsize(self.title.get_fontsize() * whole / wide)
+        self._widest = max(self._widest, min(wide, whole))  # what is shorter does not jump back
+        box = self.axes.get_window_extent()
+        half = self._widest / 2 + MARGIN
+        at = np.clip(box.x0 + box.width / 2, half, max(half, self.figure.bbox.width - half))
+        self.title.set_x((at - box.x0) / box.width)
 
     def begin_with(self, limits: tuple[float, float] | None) -> None:
         """Let limits that grow begin with those that a picture had before."""
@@ -173,6 +188,12 @@ class Picture:
         self.figure.set_layout_engine("none")
         if self.scale is not None:
             axes = self.scale.axes
+            if axes is not self.axes:  # a colour bar, no higher than the axes
+                own, beside = axes.get_position(), self.axes.get_position()
+                high = min(own.height, beside.height)
+                low = beside.y0 + (beside.height - high) / 2
+                axes.set_box_aspect(None)
+                axes.set_position((own.x0, low, own.width, high))
             at = axes.transAxes.inverted().transform((self.scale.label.get_position()[0], 0))
             self.scale.set_label_coords(at[0], 0.5)
         self._laid_out = True
