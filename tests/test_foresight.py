@@ -6,6 +6,12 @@ import pytest
 from conftest import INPUTS
 from scenes import block
 
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.run.foresight import warn
+from karamelo_py.run.watch import cause_of_gain
+from karamelo_py.scene.hub import Hub
+
 SCENE = """
     method({method})
     dimension(2, 0, 12, 0, 8, 1)
@@ -204,6 +210,40 @@ def test_metals_that_drift_are_told(run_interpreted, strength, v, told):
     assert ("noise of a drift" in run_interpreted(text, command="check").err) == told
 
 
+@pytest.mark.parametrize(
+    ("functions", "mach", "more", "told"),
+    [
+        ("linear", 4, "", True),  # a disk that swings by 0.2 % gains 1.46 times in 40 periods
+        ("quadratic-spline", 2.1, "", True),  # 1.17
+        ("ugimp", 2.1, "", True),  # 1.16
+        ("quadratic-spline", 1.5, "scheme(usavg)", False),
+        ("cubic-spline", 1.05, "", False),  # 1.08 with one point a cell
+    ],
+)
+def test_bodies_faster_than_waves_are_told(run_interpreted, functions, mach, more, told):
+    method = f"ulmpm, FLIP, {functions}, 1"
+    words = {**QUIET, "method": method, "v": f"{-1.16 * mach}, 0", "more": more, "steps": 900}
+    text = SCENE.format(**words).replace("set_dt(0.01)", "")
+    assert ("noise of a drift" in run_interpreted(text, command="check").err) == told
+
+
+@pytest.mark.parametrize(
+    ("runs", "told"),
+    [
+        (["run(0)"] * 20 + ["run(400)"], True),
+        (["run_time(10)"] * 13, True),
+        (["run(0)"] * 20 + ["run(100)"], False),
+        (["run(0)", "scheme(usavg)", "run(400)"], False),
+    ],
+)
+def test_a_scene_in_several_runs_is_told(run_interpreted, runs, told):
+    """As 400 steps of one run, and 120, in test_failures_of_long_runs."""
+    words = {**QUIET, "v": "-0.9, 0", "more": "dt_factor(0.9)"}
+    text = dedent(SCENE).format(**words).replace("set_dt(0.01)", "")
+    text = text.replace("run(1)", "\n".join(runs))
+    assert ("noise of a drift" in run_interpreted(text, command="check").err) == told
+
+
 @pytest.mark.parametrize("wall", ["0, 0", "0, NULL", "NULL, 0"])
 def test_what_is_held_neither_drifts_nor_turns(run_interpreted, wall):
     """A square whose lower edge is held swings at most; along a wall it may slide, not turn."""
@@ -216,6 +256,65 @@ def test_what_is_held_neither_drifts_nor_turns(run_interpreted, wall):
     text = SCENE.format(**words | {"steps": 3000}).replace("set_dt(0.01)", "")
     said = run_interpreted(text, command="check").err
     assert ("noise of a drift" in said) == (wall == "NULL, 0") and "noise of a turn" not in said
+
+
+@pytest.mark.parametrize(("scheme", "told"), [("usf", True), ("musl", False)])
+def test_a_turn_about_the_long_axis_is_told(run_interpreted, scheme, told):
+    """A cylinder, six times its radius long, its rim at 0.15 of the speed of waves: with usf it
+    gains 23 % in 4 rad."""
+    text = f"""
+        method(ulmpm, FLIP, quadratic-spline, 1)
+        scheme({scheme})
+        dimension(3, -4, 4, -2, 2, -2, 2, 0.5)
+        region(bar, cylinder, x, 0, 0, 1, -3, 3)
+        material(m, neo-hookean, 1, 1, 0.3)
+        solid(bar, region, bar, 2, m, 0.5)
+        c = sqrt(0.7/(1.3*0.4))
+        fix(v, initial_velocity_particles, all, 0, 0 - 0.15*c*z0, 0.15*c*y0)
+        run_time(4/(0.15*c))
+    """
+    said = run_interpreted(text, command="check").err
+    assert ("noise of a turn" in said) == told and ("turns by about 4 rad" in said) == told
+
+
+@pytest.mark.parametrize(
+    ("turn", "more", "cause"),
+    [
+        (1, "scheme(usf)", "a turn: a body turns by about 0.2 rad"),
+        (0, "", "a drift through the grid, at 0.4"),
+        (0, "scheme(usavg)", "no cause that is known"),
+        (0, "scheme(usavg)\ndt_factor(0.9)", "a step that is too large"),
+    ],
+)
+def test_what_a_body_gains_energy_from(turn, more, cause):
+    """The motion that feeds it is named, if less than what is told before; else a step that the
+    script asks for, and no step that the program takes of itself."""
+    v = "0.1*(3.5 - y), 0.1*(x - 3.5)" if turn else "0.5, 0"
+    words = {**QUIET, "method": "ulmpm, FLIP, ugimp, 1", "u": v, "more": more}
+    hub = _checked(**words)
+    hub.values.set("time", 2.0)
+    assert cause in cause_of_gain(hub, hub.simulation)[0]
+
+
+def _checked(**words: object) -> Hub:
+    hub = Hub(Console(quiet=True))
+    hub.checking, hub.interpreter = True, Interpreter(hub)
+    hub.interpreter.run_text(dedent(SCENE).format(**words).replace("set_dt(0.01)", ""))
+    return hub
+
+
+def test_runs_that_are_over_count_from_the_last_fix():
+    """200 time units of drift through 100 cells, of which the last run is a hundredth."""
+    hub = _checked(**QUIET | {"u": "0.5, 0", "more": "scheme(musl)"})
+    told = hub.update.foreseen
+    hub.values.set("time", 198.0)
+    assert not told
+    warn(hub, hub.simulation, 2.0, halves=False)
+    assert told == ["noise of a drift"]
+    told.clear()
+    hub.interpreter.run_text("fix(new, body_force, all, 0, 0)")
+    warn(hub, hub.simulation, 2.0, halves=False)
+    assert not told
 
 
 STEEL = "linear, {rho}, {E}, 0.3"

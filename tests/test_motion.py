@@ -12,6 +12,7 @@ import pytest
 from scenes import LAWS, SCHEMES, TRANSFERS, block
 from selection import covering, parameters
 
+from karamelo_py.run.motion import Motion
 from karamelo_py.schemes.usl import USL
 
 VELOCITY = (0.7, -0.4, 0.3)
@@ -201,3 +202,27 @@ def test_a_stressed_body_keeps_its_stress_when_it_turns(run_interpreted, d, axis
     for name, (i, j) in {"s11": (0, 0), "s22": (1, 1), "s33": (2, 2),
                          "s12": (0, 1), "s13": (0, 2), "s23": (1, 2)}.items():  # fmt: skip
         assert last[name] == pytest.approx(np.full(len(last.id), expected[i, j]), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("half", "w", "turns", "reach"),
+    [
+        ((3, 1, 1), (0.2, 0, 0), 0.2, 1),
+        ((3, 1, 1), (0, 0.2, 0), 0.2, 3),
+        # Across (1, 2, 0): z, and (2, -1, 0), along which it reaches sqrt((4*3^2 + 1)/5).
+        ((3, 1, 2), (0.1, 0.2, 0), 0.05**0.5, 7.4**0.5),
+        ((3, 0, 0), (0, 0, 0.2), 0.2, 3),  # points in a row
+        ((3, 0, 0), (0.2, 0, 0), 0, 0),
+        ((3, 1), (0.2,), 0.2, 3),
+    ],
+)
+def test_spin_of_a_body(half, w, turns, reach):
+    """An ellipsoid that turns as if rigid: v = w x X, sum m X X = m half^2/5 in its axes."""
+    d, half = len(half), np.array(half, float)
+    w = np.array([*w, 0, 0, 0][:3]) if d == 3 else np.array([0, 0, *w])
+    spread = np.diag(half**2 / 5)
+    gradient = np.cross(np.eye(3), w)[:d, :d]  # v_b = gradient_ba X_a
+    still = np.zeros(d)
+    one = Motion(0, 1.0, still, still, spread, spread @ gradient.T, -half, half, still, still)
+    assert one.spin == pytest.approx(turns)
+    assert one.reach == pytest.approx(reach)

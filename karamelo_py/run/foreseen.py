@@ -10,7 +10,6 @@ from karamelo_py.language import registry
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.transfers import Moment
 from karamelo_py.run.motion import Motion
-from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.fixes.body_force import BodyForce
 
@@ -18,7 +17,7 @@ from karamelo_py.styles.fixes.body_force import BodyForce
 class Foreseen:
     """A scene before a run of `duration`: what rules ask of it."""
 
-    def __init__(self, hub: Hub, simulation: Simulation, duration: float):
+    def __init__(self, hub: Hub, simulation: Any, duration: float):
         self.hub, self.simulation = hub, simulation
         # A run that a condition ends takes some hundred steps at least.
         self.duration = duration if isfinite(duration) else 300 * simulation.dt

@@ -23,7 +23,7 @@ from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.foreseen import Foreseen
-from karamelo_py.run.large_steps import warn_about_steps
+from karamelo_py.run.large_steps import duration_of_later, warn_about_steps
 from karamelo_py.run.noise import ELASTIC, noises
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import blows_up, elastic_speed, one_a_cell, sparse
@@ -99,8 +99,9 @@ def _strained_before(s: Foreseen) -> Iterator[Failure]:
 def _noise(s: Foreseen) -> Iterator[Failure]:
     if s.waves > 0 and blows_up(s.hub, s.simulation):
         return  # it never comes so far
-    for words in noises(s):
-        yield Failure(*words)
+    for noise in noises(s):
+        if noise.share > 1:
+            yield Failure(*noise.words)
 
 
 def _large_vibration(s: Foreseen) -> Iterator[Failure]:
@@ -258,7 +259,7 @@ RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
 
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
-    """Tell what will go wrong in a run of `duration`; each failure once in a script.
+    """Tell what will go wrong in a run of `duration`, and the next; each failure once in a script.
 
     Raises
     ------
@@ -266,8 +267,9 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
         If temperatures would swing, in a run that does not halve its step then.
     """
     _warn_about_groups(hub)
-    warn_about_steps(hub, simulation, halves)
     scene = Foreseen(hub, simulation, duration)
+    scene.duration += _gone(hub, simulation) + duration_of_later(hub, simulation)
+    warn_about_steps(hub, simulation, halves)
     _warn_about_precision(scene)
     warn_about_velocities(hub, simulation)
     for rule in RULES:
@@ -279,6 +281,16 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
                     place=failure.place or hub.update.method.place,
                     hint=failure.cure,
                 )
+
+
+def _gone(hub: Hub, simulation: Simulation) -> float:
+    """How long the solids have moved: since the last fix has come."""
+    fixes, update = list(hub.fixes.values()), hub.update
+    known, since = update.moving
+    if any(all(fix is not other for other in known) for fix in fixes):
+        since = simulation.time
+    update.moving = fixes, since
+    return simulation.time - since
 
 
 def _warn_about_precision(s: Foreseen) -> None:

@@ -1,5 +1,6 @@
 """Steps above the stable limit, of this run and of later ones, told before they are taken."""
 
+from math import fsum, inf, isfinite
 from typing import Any, NamedTuple
 
 from karamelo_py.kernels.watch import BORNE
@@ -10,13 +11,17 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Step(NamedTuple):
-    """The step that a run asks for, where that is, and what its stable limit depends on."""
+    """The step that a run asks for, where that is, and what its stable limit depends on.
+
+    `span` says how long the run is, in time or in steps; infinite where a condition ends it.
+    """
 
     place: Any
     fixed_dt: float | None
     dt_factor: float | None
     halves: bool
     scene: tuple
+    span: tuple[float, float] = (inf, inf)
 
     @property
     def command(self) -> str:
@@ -24,7 +29,7 @@ class Step(NamedTuple):
         return "set_dt" if self.fixed_dt else "dt_factor"
 
 
-def step_of(hub: Hub, halves: bool) -> Step:
+def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
     """The step that a run asks for here, which goes back and halves it in trouble or not."""
     update = hub.update
     method, scheme, transfer = update.method, update.scheme, update.transfer
@@ -32,7 +37,7 @@ def step_of(hub: Hub, halves: bool) -> Step:
         *(hub.domain.h, *hub.solids.values(), method, update.thermal),
         *(type(scheme), scheme, type(transfer), transfer),
     )
-    return Step(hub.place, update.fixed_dt, update.dt_factor, halves, scene)
+    return Step(hub.place, update.fixed_dt, update.dt_factor, halves, scene, span)
 
 
 def warn_about_steps(
@@ -53,6 +58,14 @@ def warn_about_steps(
         if step.scene == present.scene:
             _warn_about_step(hub, simulation, step, later=True)
     hub.later.clear()
+
+
+def duration_of_later(hub: Hub, simulation: Simulation) -> float:
+    """How long the runs behind the next one are that have the same scene, as far as is known."""
+    present = step_of(hub, False).scene
+    later = [step for step in hub.later[len(hub.runs) :] if step.scene == present]
+    spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
+    return fsum(span for span in spans if isfinite(span))
 
 
 def _warn_about_step(

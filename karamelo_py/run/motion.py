@@ -50,11 +50,27 @@ class Motion(NamedTuple):
         return np.array([0.0, self.velocity[1]]) if axisymmetric else self.velocity
 
     @property
+    def turning(self) -> np.ndarray:
+        """(3,) Angular velocity, I^-1 L; a body without extent across an axis has none about it."""
+        spread, shear = np.zeros((2, 3, 3))
+        d = len(self.centre)
+        spread[:d, :d], shear[:d, :d] = self.spread, self.shear
+        inertia, skew = np.trace(spread) * np.eye(3) - spread, shear - shear.T
+        momentum = np.array([skew[1, 2], skew[2, 0], skew[0, 1]])
+        return np.linalg.pinv(inertia, rcond=1e-9, hermitian=True) @ momentum
+
+    @property
     def spin(self) -> float:
-        """Angular velocity, of the polar moment of inertia."""
-        inertia = float(np.trace(self.spread))
-        turning = self.shear - self.shear.T
-        return float(np.linalg.norm(turning)) / np.sqrt(2) / inertia if inertia > 0 else 0.0
+        """Angular velocity."""
+        return float(np.linalg.norm(self.turning))
+
+    @property
+    def reach(self) -> float:
+        """Largest distance, from the axis that it turns about, of an ellipsoid in its box."""
+        w, half = self.turning, np.zeros(3)
+        half[: len(self.centre)] = (self.high - self.low) / 2
+        across = np.dot(w, w) * np.eye(3) - np.outer(w, w)
+        return float(np.linalg.norm(across * half, 2)) / (np.dot(w, w) or 1.0)
 
     @property
     def rate(self) -> float:

@@ -50,6 +50,8 @@ class Far(NamedTuple):
         By the rim of a body that turns, with musl and usf.
     rim_averaged
         The same with usavg.
+    fastest
+        Times the speed of waves, from where on a drift feeds nothing.
     """
 
     drift: tuple[float, float]
@@ -57,12 +59,31 @@ class Far(NamedTuple):
     averaged: tuple[float, float]
     rim: tuple[float, float]
     rim_averaged: tuple[float, float]
+    fastest: float = inf
+
+
+class Noise(NamedTuple):
+    """What motion feeds.
+
+    Attributes
+    ----------
+    share
+        How much of what is borne it takes.
+    words
+        Name, reason and cure.
+    cause
+        The reason, in a run that gains energy.
+    """
+
+    share: float
+    words: tuple[str, str, str]
+    cause: str
 
 
 JUMPS = Far((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # functions whose gradients jump
 BOXES = Far((18, 18), 6, (inf, inf), (60, 25), (inf, inf))
 QUADRATIC = Far((54, 20), 6, (inf, inf), (inf, 25), (inf, inf))
-CUBIC = Far((135, 70), 6, (inf, inf), (inf, inf), (inf, inf))
+CUBIC = Far((135, 70), 6, (inf, inf), (inf, inf), (inf, inf), fastest=1)
 
 
 def far(basis: Any) -> Far:
@@ -87,8 +108,8 @@ def yields(law: Any) -> bool:
     return not set(law_kind(law)) & {*ELASTIC, Elastic}
 
 
-def noises(s: Any) -> Iterator[tuple[str, str, str]]:
-    """Name, reason and cure of what the motion in the scene `s` (Foreseen) feeds."""
+def noises(s: Any) -> Iterator[Noise]:
+    """What the motion in the scene `s` (Foreseen) feeds, also where that is borne."""
     keeps = s.moves and isinstance(s.transfer, FLIP) and s.transfer.alpha > 0.9
     if not isinstance(s.scheme, (MUSL, USF, USAVG)):
         return
@@ -105,11 +126,11 @@ def _bodies(s: Any) -> list[tuple[Motion, Any]]:
     return [(one, law) for one, law in bodies if rings(law)]
 
 
-def _drift(s: Any) -> Iterator[tuple[str, str, str]]:
+def _drift(s: Any) -> Iterator[Noise]:
     known, spacing = far(s.basis), float(s.simulation.control.clock[0].spacing)
     averages = isinstance(s.scheme, USAVG)
     bound = (known.averaged if averages else known.drift)[sparse(s.hub)]
-    bound *= spacing / (s.simulation.dt * s.waves or inf) / (known.line if s.d == 1 else 1)
+    bound /= known.line if s.d == 1 else 1
     speed = cells = 0.0
     for one, law in _bodies(s):
         velocity = one.drift(s.hub.domain.axisymmetric)
@@ -117,50 +138,73 @@ def _drift(s: Any) -> Iterator[tuple[str, str, str]]:
             continue
         own = float(np.linalg.norm(velocity[~held(s, one)]))
         time = min(s.duration, _free_time(s, one)) if yields(law) else s.duration
-        if SLOW < own / s.waves < 1 and own * time / spacing > cells:
+        if SLOW < own / s.waves < known.fastest and own * time / spacing > cells:
             speed, cells = own / s.waves, own * time / spacing
-    if cells > bound:
-        schemes = "usavg" if averages else "musl and usf"
+    if cells:
+        schemes, moved = (
+            "usavg" if averages else "musl and usf",
+            "what the grid does not see of the",
+        )
+        damps = isinstance(s.basis, CubicSpline) and s.d == 3
+        gains = (
+            "it damps what vibrates (to 0.85 of its energy where that was tried)"
+            if damps
+            else "if it vibrates, that gains a tenth to several times its energy"
+        )
         smooth = "quadratic-spline in the place of the basis"
-        yield (
-            "noise of a drift",
-            f"a body drifts at {speed:.2g} times the speed of waves through about {cells:.0f} "
-            f"cells, and with {schemes} what the grid does not see of the velocities grows with "
-            "each cell: if it vibrates, that gains a tenth to several times its energy",
-            smooth if averages else "scheme(usavg), with which it grows ten times less, or not",
+        less = "scheme(usavg), with which it grows ten times less, or not"
+        yield Noise(
+            cells * s.simulation.dt * s.waves / spacing / bound,
+            (
+                "noise of a drift",
+                f"a body drifts at {speed:.2g} times the speed of waves through about {cells:.0f} "
+                f"cells, and with {schemes} {moved} velocities grows with each cell: {gains}",
+                "method tlmpm" if damps else smooth if averages else less,
+            ),
+            f"a drift through the grid, at {speed:.2g} times the speed of waves: with {schemes} "
+            f"and {s.method.basis_name} functions {moved} velocities grows with each cell",
         )
 
 
-def _turn(s: Any) -> Iterator[tuple[str, str, str]]:
+def _turn(s: Any) -> Iterator[Noise]:
     known, spacing = far(s.basis), float(s.simulation.control.clock[0].spacing)
     averages, dt, one_point = isinstance(s.scheme, USAVG), s.simulation.dt, sparse(s.hub)
     bound = (known.rim_averaged if averages else known.rim)[one_point]
+    most = Noise(0.0, ("", "", ""), "")
     for one, _ in _bodies(s):
-        speed, angle = one.spin * one.size / s.waves, one.spin * s.duration
+        speed, angle = one.spin * one.reach / s.waves, one.spin * s.duration
         if speed <= SLOW or held(s, one).any():
             continue
-        cells, fed = angle * one.size / spacing, one.spin * angle * dt
-        strains_early = isinstance(s.scheme, USF) and fed > USF_TURNS
+        cells, fed = angle * one.reach / spacing, one.spin * angle * dt
+        early = fed / USF_TURNS if isinstance(s.scheme, USF) else 0.0
         if averages:
-            strains_early = fed > USAVG_TURNS if s.moments else fed * speed > USAVG_FLIP
-        torn = one_point and angle > TORN[s.moments]
-        noise = not s.moments and cells * dt * s.waves / spacing > bound
-        if noise or strains_early or torn:
-            ends = "loses points at its rim" if torn else "gains a tenth of its energy or more"
-            known_cures = {
-                f"{2**s.d} points a cell": one_point,
-                "scheme(musl)": strains_early,
-                "quadratic-spline in the place of the basis": noise and not one_point,
-            }
-            cures = [cure for cure, helps in known_cures.items() if helps]
-            yield (
+            early = fed / USAVG_TURNS if s.moments else fed * speed / USAVG_FLIP
+        torn = angle / TORN[s.moments] if one_point else 0.0
+        noise = 0.0 if s.moments else cells * dt * s.waves / spacing / bound
+        share = max(noise, early, torn)
+        if share <= most.share:
+            continue
+        ends = "loses points at its rim" if torn > 1 else "gains a tenth of its energy or more"
+        known_cures = {
+            f"{2**s.d} points a cell": one_point,
+            "scheme(musl)": early > min(noise, 1),
+            "quadratic-spline in the place of the basis": noise > min(early, 1) and not one_point,
+        }
+        cures = [cure for cure, helps in known_cures.items() if helps]
+        turns = f"turns by about {angle:.2g} rad, its rim at {speed:.2g} times the speed of waves"
+        way = f"with {s.words} and {s.method.basis_name} functions"
+        most = Noise(
+            share,
+            (
                 "noise of a turn",
-                f"a body turns by about {angle:.2g} rad, its rim at {speed:.2g} times the speed of "
-                f"waves through about {cells:.0f} cells, and with {s.words} and "
-                f"{s.method.basis_name} functions it {ends} on the way",
-                ", ".join(cures) + ", or method tlmpm",
-            )
-            return
+                f"a body {turns} through about {cells:.0f} cells, and {way} it {ends} on the way",
+                ", ".join([*cures, "or method tlmpm"]),
+            ),
+            f"a turn: a body {turns}, {way}"
+            + (", and is strained before the forces have turned" if early > noise else ""),
+        )
+    if most.share:
+        yield most
 
 
 def held(s: Any, one: Motion) -> np.ndarray:

@@ -71,7 +71,9 @@ class Runner:
         check_scene(hub)
         self._check_condition()
         if hub.rehearsing:
-            hub.later.append(large_steps.step_of(hub, self.halve))
+            steps = inf if self.steps is None else self.steps
+            span = self.end_time - hub.update.time, steps
+            hub.later.append(large_steps.step_of(hub, self.halve, span))
             return
         if hub.pausing:
             raise Pause

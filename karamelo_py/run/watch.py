@@ -10,7 +10,9 @@ from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.run.foreseen import Foreseen
 from karamelo_py.run.lowering import warms_by_friction
+from karamelo_py.run.noise import noises
 from karamelo_py.run.stable import USUAL, keeping_share, sparse
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.fixes.pairs import PairContact
@@ -96,9 +98,13 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             "work than it took",
             "material neo-hookean, which stores what it is given",
         )
+    told = noises(Foreseen(hub, simulation, simulation.time))
+    fed = max(told, key=lambda noise: noise.share, default=None)
+    if fed is not None and fed.share > 0:
+        return fed.cause, fed.words[2]
     if moves and jumps:
         return f"points that go from cell to cell: the gradients of {functions} jump", smooth
-    if share > 0.3:
+    if share > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
         return "a step that is too large", f"{_step_of(hub, simulation, 0.3)} or less"
     return "no cause that is known to do that", "another basis, transfer or scheme to compare with"
 

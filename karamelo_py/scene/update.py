@@ -37,6 +37,8 @@ class Update:
         Whether the user knows that points were reflected.
     foreseen
         Names of the failures that the user was warned of.
+    moving
+        The fixes of the last run, and since when none has come to them.
     """
 
     remembers = ("warned_of_bounces", "foreseen")
@@ -55,6 +57,7 @@ class Update:
         self.boundary_place: Place | None = None
         self.warned_of_bounces = False
         self.foreseen: list[str] = []
+        self.moving: tuple[list[Any], float] = ([], 0.0)
 
     @property
     def words(self) -> str:
