@@ -254,7 +254,8 @@ CLOCK = np.dtype(
         ("sum_of_balance", np.float64),  # of a window of looks
         ("last_balance", np.float64),  # at the look before
         ("last_but_one", np.float64),
-        ("first_mean", np.float64),  # mean of the first looks
+        ("first_few", np.float64),  # mean of the first looks
+        ("first_mean", np.float64),  # mean of the first window
         ("largest_mean", np.float64),
         ("largest_energy", np.float64),  # of kinetic, stored and work
         ("largest_own", np.float64),  # the same, without what bodies have that only drift
@@ -264,7 +265,7 @@ CLOCK = np.dtype(
         ("energy_floor", np.float64),  # round-off of energies
         ("windows", np.int64),  # in which the balance has grown, one after another
         ("growth", np.float64),  # in the last window, of the largest energy
-        ("grown", np.float64),  # since the first looks, at most
+        ("grown", np.float64),  # since the first looks or the first window, at most
         ("watch_heat", np.int64),  # whether all sources of heat are known
         ("coldest", np.float64),  # that initial state, fixes and sources allow
         ("hottest", np.float64),

@@ -163,12 +163,12 @@ def grown_little(simulation: Any) -> bool:
     if not clock.watch_energy:
         return True
     # The last look, too: noise that grows by half in a hundred steps is there in the state already.
-    before = clock.first_mean if clock.looks >= FEW else clock.first_balance
+    before = clock.first_few if clock.looks >= FEW else clock.first_balance
     return bool(clock.balance - before < IN_ALL * unit_of(clock))
 
 
 def forget_growth(simulation: Any) -> None:
     """Count from the present state on what energy grows by: that it has grown was told."""
     clock = simulation.control.clock[0]
-    clock.first_mean = clock.largest_mean
+    clock.first_few = clock.first_mean = clock.largest_mean
     clock.windows, clock.grown = 0, 0.0
