@@ -10,16 +10,18 @@ from scenes import SCHEMES, block
 
 from karamelo_py.app.cli import main
 from karamelo_py.kernels.arrays import new_control
+from karamelo_py.kernels.watch import DRIFTING as SHARES
 from karamelo_py.kernels.watch import LOOKS, judge
 
 TRAVEL = "fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y0))"
 
 
-def watched(balances, work=None):
+def watched(balances, work=None, drift=0.0):
     """The clock after looks at these balances; whether the last is within its bound."""
     control = new_control(np.zeros(3))
     clock = control.clock[0]
     clock.level, clock.energy_floor = 0.5, 1e-12
+    clock.drifting, clock.of_drift = SHARES[0], drift
     within = True
     for k, balance in enumerate(balances):
         clock.work = work[k] if work is not None else 0.0
@@ -37,6 +39,51 @@ def test_windows_that_grow_are_counted():
     growing, within = watched([1.02 ** (k // LOOKS) for k in range(4 * LOOKS)])
     assert within and growing.windows == 3
     assert growing.growth == pytest.approx(0.02 / 1.02)
+
+
+def test_growth_at_the_start_is_seen():
+    """Three looks in a row that are above the mean of the first three; one or two are a swing."""
+    short, within = watched([1.0, 0.98, 1.02, 1.1, 1.25, 1.3, 1.25])
+    assert within and short.grown == pytest.approx(0.25 / 1.3)
+    assert watched([1.0, 0.98, 1.02, 1.0, 1.25, 1.3])[0].grown <= 0
+    assert watched([1.0, 1.3, 1.6, 1.9, 2.2])[0].grown == 0  # too few to tell
+    driven = watched([1.0] * 3 + [1.2] * 3, work=[0.0] * 3 + [0.8] * 3)[0]
+    assert driven.grown == pytest.approx(0.2 / (2 + 4 * 0.8))
+
+
+def test_a_fast_drift_hides_nothing():
+    """A body at 1.05 c that vibrates with 0.5 % strain: 1e-5 of its energy, grown 2.9 times."""
+    grown = watched([1 + 1e-5 * (1 + 0.1 * k) for k in range(20)], drift=1.0)[0]
+    assert grown.grown > 0.5
+    assert watched([1 + 1e-14 * k for k in range(20)], drift=1.0)[0].grown < 1e-6
+
+
+def test_a_short_run_is_told(run_interpreted):
+    """A disk that turns by 3/s gains by usf (its kinetic energy is all that it has), in 144 steps.
+
+    Two runs of half as many steps go on with the same watch.
+    """
+    spun = """
+    method(ulmpm, FLIP, ugimp, 1)
+    scheme({})
+    dimension(2, -2, 2, -2, 2, 0.5)
+    region(d, cylinder, 0, 0, 1)
+    material(r, neo-hookean, 1000, 1e6, 0.3)
+    solid(d, region, d, 2, r, 0.5)
+    fix(v, initial_velocity_particles, all, -3*y0, 3*x0)
+    compute(Ek, kinetic_energy, all)
+    compute(Es, strain_energy, all)
+    E = Ek + Es
+    log_modify(custom, step, E)
+    set_output(12)
+    """
+    grown = run_interpreted(spun.format("usf") + "run(144)\n")
+    assert max(grown.log.E) > 1.1 * grown.log.E[0]
+    assert "energy comes from nowhere" in grown.err and "since the start" in grown.err
+    pieces = run_interpreted(spun.format("usf") + "run(72)\nrun(72)\n", folder="pieces")
+    assert "energy comes from nowhere" in pieces.err
+    kept = run_interpreted(spun.format("usavg") + "run(144)\n", folder="kept")
+    assert "energy comes from nowhere" not in kept.err
 
 
 def test_the_bound_is_what_there_was_and_what_loads_have_brought():

@@ -253,16 +253,20 @@ CLOCK = np.dtype(
         ("first_balance", np.float64),
         ("first_work", np.float64),
         ("sum_of_balance", np.float64),  # of a window of looks
+        ("last_balance", np.float64),  # at the look before
+        ("last_but_one", np.float64),
+        ("first_few", np.float64),  # mean of the first looks
         ("first_mean", np.float64),  # mean of the first window
         ("largest_mean", np.float64),
         ("largest_energy", np.float64),  # of kinetic, stored and work
         ("largest_own", np.float64),  # the same, without what bodies have that only drift
         ("of_drift", np.float64),  # kinetic energy of the centres of mass
+        ("drifting", np.float64),  # share of the largest energy that growth is measured by at least
         ("supplied", np.float64),  # largest work so far, of either sign
         ("energy_floor", np.float64),  # round-off of energies
         ("windows", np.int64),  # in which the balance has grown, one after another
         ("growth", np.float64),  # in the last window, of the largest energy
-        ("grown", np.float64),  # since the first window
+        ("grown", np.float64),  # since the first looks or the first window, at most
         ("watch_heat", np.int64),  # whether all sources of heat are known
         ("coldest", np.float64),  # that initial state, fixes and sources allow
         ("hottest", np.float64),

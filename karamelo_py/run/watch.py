@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
-from karamelo_py.kernels.watch import BORNE, LOOKS, unit_of
+from karamelo_py.kernels.watch import BORNE, FEW, unit_of
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
@@ -136,7 +136,7 @@ def _torn(hub: Hub) -> bool:
 
 
 def has_grown(simulation: Any) -> bool:
-    """Whether energy has come from nowhere, as far as the means of a hundred steps tell."""
+    """Whether energy has come from nowhere, as far as looks at it tell."""
     clock = simulation.control.clock[0]
     return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > IN_ALL))
 
@@ -151,7 +151,7 @@ def growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
     much = (
         f"{100 * clock.growth:.2g} % of the largest so far in the last hundred steps"
         if fast
-        else f"{100 * clock.grown:.2g} % of the largest so far since the first hundred steps"
+        else f"{100 * clock.grown:.2g} % of the largest so far since the start"
     )
     message = (
         f"step {simulation.step}, time {simulation.time:.6g}: energy comes from nowhere, "
@@ -169,12 +169,12 @@ def grown_little(simulation: Any) -> bool:
     if not clock.watch_energy:
         return True
     # The last look, too: noise that grows by half in a hundred steps is there in the state already.
-    before = clock.first_mean if clock.looks > LOOKS else clock.first_balance
+    before = clock.first_few if clock.looks >= FEW else clock.first_balance
     return bool(clock.balance - before < IN_ALL * unit_of(clock))
 
 
 def forget_growth(simulation: Any) -> None:
     """Count from the present state on what energy grows by: that it has grown was told."""
     clock = simulation.control.clock[0]
-    clock.first_mean = clock.largest_mean
+    clock.first_few = clock.first_mean = clock.largest_mean
     clock.windows, clock.grown = 0, 0.0
