@@ -169,7 +169,7 @@ def grown_little(simulation: Any) -> bool:
     if not clock.watch_energy:
         return True
     # The last look, too: noise that grows by half in a hundred steps is there in the state already.
-    before = clock.first_few if clock.looks >= FEW else clock.first_balance
+    before = clock.first_mean if clock.looks >= FEW else clock.first_balance
     return bool(clock.balance - before < IN_ALL * unit_of(clock))
 
 
