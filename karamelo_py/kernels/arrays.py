@@ -261,7 +261,6 @@ CLOCK = np.dtype(
         ("largest_energy", np.float64),  # of kinetic, stored and work
         ("largest_own", np.float64),  # the same, without what bodies have that only drift
         ("of_drift", np.float64),  # kinetic energy of the centres of mass
-        ("drifting", np.float64),  # share of the largest energy that growth is measured by at least
         ("supplied", np.float64),  # largest work so far, of either sign
         ("energy_floor", np.float64),  # round-off of energies
         ("windows", np.int64),  # in which the balance has grown, one after another

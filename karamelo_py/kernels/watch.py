@@ -37,9 +37,7 @@ FEW = 3  # looks that are compared where no window is whole: the present and the
 SWING = 4.0  # times the work of loads, which is right to some hundredths only in a few large steps
 LOOKS = 10  # looks that are averaged, in a window of 100 steps
 GROWTH = 0.01  # of the largest energy so far, in a window: more is told
-# Of the energy of bodies that drift, in double and in single precision: less is lost in it. Bodies
-# that fall keep it to 1e-14 and 3e-7; where they meet, more is there within a few steps.
-DRIFTING = 1e-5, 1e-3
+DRIFTING = 1e-3  # of the energy of bodies that drift: what they vibrate by and matters is more
 BOUND = 10.0  # times the energy that there was and that loads have brought: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
 COARSE = 1000.0  # round-off errors: a strain of so many is noise, too
@@ -226,7 +224,7 @@ def _sum_before(s, mode, step):
 @shared
 def unit_of(clock):
     """What growth of energy is measured by: the most that there was, of a drift no more than so."""
-    return max(clock.largest_own, clock.drifting * clock.largest_energy, clock.energy_floor)
+    return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
 
 
 @entered

@@ -14,7 +14,7 @@ from karamelo_py.kernels.clock import STILL, choose_dt
 from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
 from karamelo_py.kernels.totals import agree_on_heat
-from karamelo_py.kernels.watch import COARSE, DRIFTING, ROUND_OFF, begin_to_look, measure_heat
+from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat
 from karamelo_py.run.lowered import Lowered
 from karamelo_py.run.motion import Motion, motions
 from karamelo_py.run.python_hooks import PythonHooks, sets_initial_state, views_of
@@ -228,8 +228,6 @@ class Simulation(Lowered):
         """Measure the energies of all points, which the watch over them starts from."""
         s = self.stepped
         clock = s.control.clock[0]
-        single = s.nodes.sums.dtype == np.float32
-        clock.drifting = DRIFTING[int(single)]
         strain = COARSE * float(np.finfo(s.nodes.sums.dtype).eps)
         clock.energy_floor = max(ROUND_OFF, strain**2) * self.total("mass") * float(clock.rate) ** 2
         clock.born_with = self.total("born with")
