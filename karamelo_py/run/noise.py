@@ -140,30 +140,28 @@ def _drift(s: Any) -> Iterator[Noise]:
         time = min(s.duration, _free_time(s, one)) if yields(law) else s.duration
         if SLOW < own / s.waves < known.fastest and own * time / spacing > cells:
             speed, cells = own / s.waves, own * time / spacing
-    if cells:
-        schemes, moved = (
-            "usavg" if averages else "musl and usf",
-            "what the grid does not see of the",
-        )
-        damps = isinstance(s.basis, CubicSpline) and s.d == 3
-        gains = (
-            "it damps what vibrates (to 0.85 of its energy where that was tried)"
-            if damps
-            else "if it vibrates, that gains a tenth to several times its energy"
-        )
-        smooth = "quadratic-spline in the place of the basis"
-        less = "scheme(usavg), with which it grows ten times less, or not"
-        yield Noise(
-            cells * s.simulation.dt * s.waves / spacing / bound,
-            (
-                "noise of a drift",
-                f"a body drifts at {speed:.2g} times the speed of waves through about {cells:.0f} "
-                f"cells, and with {schemes} {moved} velocities grows with each cell: {gains}",
-                "method tlmpm" if damps else smooth if averages else less,
-            ),
-            f"a drift through the grid, at {speed:.2g} times the speed of waves: with {schemes} "
-            f"and {s.method.basis_name} functions {moved} velocities grows with each cell",
-        )
+    if not cells:
+        return
+    schemes = "usavg" if averages else "musl and usf"
+    grows = "what the grid does not see of the velocities grows with each cell"
+    gains = "if it vibrates, that gains a tenth to several times its energy"
+    cure = "scheme(usavg), with which it grows ten times less, or not"
+    if isinstance(s.basis, CubicSpline) and s.d == 3:
+        gains = "it damps what vibrates (to 0.85 of its energy where that was tried)"
+        cure = "method tlmpm"
+    elif averages:
+        cure = "quadratic-spline in the place of the basis"
+    yield Noise(
+        cells * s.simulation.dt * s.waves / spacing / bound,
+        (
+            "noise of a drift",
+            f"a body drifts at {speed:.2g} times the speed of waves through about {cells:.0f} "
+            f"cells, and with {schemes} {grows}: {gains}",
+            cure,
+        ),
+        f"a drift through the grid, at {speed:.2g} times the speed of waves: with {schemes} "
+        f"and {s.method.basis_name} functions {grows}",
+    )
 
 
 def _turn(s: Any) -> Iterator[Noise]:

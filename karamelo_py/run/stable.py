@@ -140,12 +140,9 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
     if not longer:
         return 1.0
     still = getattr(method.basis, "courant_still", 1.0)
-    strained_first = getattr(scheme, "strained_before", 0.0) == 1
-    return (
-        min(still, getattr(method.basis, "courant_strained_first", inf))
-        if strained_first
-        else still
-    )
+    if getattr(scheme, "strained_before", 0.0) == 1:
+        return min(still, getattr(method.basis, "courant_strained_first", inf))
+    return still
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
