@@ -57,6 +57,17 @@ class FakeFields:
     def pieces(self):
         yield self
 
+    def each(self, part, name, *arguments):
+        found = getattr(part, name)(self, *arguments)
+        return [] if found is None else [found]
+
+    def counted(self, part, name, size, *arguments):
+        return np.bincount(getattr(part, name)(self, *arguments), minlength=size)
+
+    def in_order(self, part, name, *arguments):
+        keys, rows = getattr(part, name)(self, *arguments)
+        yield rows[:, np.argsort(keys)]
+
     def particle_names(self):
         return list(self.points)
 

@@ -21,7 +21,7 @@ from karamelo_py.styles.dumps.grid_gz import GridGz
 from karamelo_py.styles.dumps.movie import Movie
 from karamelo_py.styles.dumps.particle import Particle
 from karamelo_py.styles.dumps.particle_gz import ParticleGz
-from karamelo_py.styles.dumps.pyplot import PyPlot
+from karamelo_py.styles.dumps.pyplot import PyPlot, Scene
 
 
 @pytest.fixture(params=[1, 2, 3])
@@ -362,6 +362,7 @@ def test_a_ball_is_lit_where_it_faces_the_light(tmp_path):
     x = x[np.linalg.norm(x, axis=1) < 0.4]
     hub.fields.points = dict(zip("xyz", x.T, strict=True))
     hub.fields.points |= {"type": np.ones(len(x), int), "volume": np.full(len(x), 0.04**3)}
+    hub.fields.points["id"] = np.arange(1, len(x) + 1)
     dump = PyPlot(hub, 1, "p.png", 4, 4)
     dump.write()
     seen = np.asarray(dump._picture.artist.get_offsets())
@@ -374,12 +375,12 @@ def test_a_ball_is_lit_where_it_faces_the_light(tmp_path):
 
 def test_points_have_the_size_of_what_they_stand_for(plane):
     """Rings of an axisymmetric scene, too, whose volume is that per radian."""
-    side = PyPlot(plane, 1, "p.png", 4, 3)._side(plane.fields.points["x"])
-    assert side == pytest.approx(np.sqrt(0.5 / 40))
+    dump = PyPlot(plane, 1, "p.png", 4, 3)
+    assert Scene(dump).side == pytest.approx(np.sqrt(0.5 / 40))
     plane.domain.axisymmetric = True
     x = np.linspace(1e-4, 1e-2, 40)
-    plane.fields.points["volume"] = x * 0.05**2
-    assert PyPlot(plane, 1, "p.png", 4, 3)._side(x) == pytest.approx(0.05)
+    plane.fields.points |= {"x": x, "volume": x * 0.05**2}
+    assert Scene(dump).side == pytest.approx(0.05)
 
 
 def test_legend_of_solids_and_units(plane):

@@ -153,7 +153,8 @@ def test_nobody_has_the_whole(tmp_path):
     lines = (
         "compute(p, linear_momentum, all)", "compute(m, max_position, all)",
         "compute(e, error, all, ux, 0.1*time)", "compute(at, probe, all, s11, x=0.4)",
-        "dump(v, all, vtk, 10, v.*.vtu, seq)", "dump(g, all, grid, 10, g.*.txt, vx, mass, vol)",
+        "dump(p, all, pyplot, 10, p.*.png, 3, 3, vx)", "dump(v, all, vtk, 10, v.*.vtu, seq)",
+        "dump(g, all, grid, 10, g.*.txt, vx, mass, vol)",
     )  # fmt: skip
     log = "log_modify(custom, step, E, p_x, m_x, e, at)"
     path = moving(tmp_path, *lines, *FILES[:3], log, *FILES[-2:], "run(12)", size=0.5)

@@ -102,14 +102,26 @@ def test_dumps_in_pieces(state_interpreted, tmp_path):
 
 
 def test_what_is_asked_between_two_runs(state_interpreted, tmp_path):
-    """A picture had the first gather the points; then all ask for them, and for a file."""
+    """All ask for points, and for a file."""
     script = block(
-        2, MOVING[0], *MOVING[2:], "dump(p, all, pyplot, 4, p.*.png, 1, 1, vx)",
+        2, MOVING[0], *MOVING[2:],
         "run(4)", "c = value(xcm(all, x))", "write_restart(between.h5)",
         "fix(w, initial_velocity_particles, all, c, 0)",
         "run(3)", size=(0.3, 0.2),
     )  # fmt: skip
     assert shared(state_interpreted, tmp_path, script)
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_pictures(state_interpreted, tmp_path, dimension):
+    """From far to near, with the light of all points; 16 of them after others."""
+    script = block(
+        dimension, "dump(p, all, pyplot, 4, p.*.png, 2, 2, vx)", *MOVING[1:],
+        "dump(q, all, pyplot, 4, q.svg, 2, 2, seq, vmin=0)", "dump(m, all, movie, 2, m.gif, 1, 1)",
+        f"fix(v, initial_velocity_particles, all, 0.9+sin(40*x0){', 0' * (dimension - 1)})",
+        "run(5)", size=(0.3, 0.2, 0.2)[:dimension],
+    )  # fmt: skip
+    assert shared(state_interpreted, tmp_path, script, ranks=3)
 
 
 COMPUTES = """\

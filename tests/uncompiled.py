@@ -21,8 +21,8 @@ def save_state(request: dict) -> int:
     from crews import learn_at_random
     from states import final_columns, final_state
 
-    from karamelo_py.run import by_id, by_number, part, shares, storing, tiles, work
-    from karamelo_py.styles.dumps import hdf5
+    from karamelo_py.run import by_id, by_number, part, ranks, shares, storing, tiles, work
+    from karamelo_py.styles.dumps import hdf5, look
 
     script, columns = request["arguments"][0], request["columns"]
     usual = tiles.DIRECT_UP_TO, tiles.TILES
@@ -30,8 +30,9 @@ def save_state(request: dict) -> int:
     if request["boxes"]:
         tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 2, 3: 2}
     # One process has all points in a piece, several a few; files of HDF5 are the same then, too.
-    by_id.PIECE = by_number.PIECE = storing.PIECE = 16 if request["ranks"] > 1 else 1 << 17
-    hdf5.PIECE = 16
+    piece = 16 if request["ranks"] > 1 else 1 << 17
+    by_id.PIECE = by_number.PIECE = storing.PIECE = ranks.PIECE = piece
+    ranks.SAMPLES, hdf5.PIECE, look.MARKS = 8, 16, 16
     try:
         folder = request["out"] and Path(request["out"])
         if columns:

@@ -14,6 +14,7 @@ from karamelo_py.output.files import picture_format, unwarned, whole
 from karamelo_py.output.movies import Frames, movie_format
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.dumps.look import AtHand
 
 SUMMARY = "Draw pictures or a movie of dumps of points."
 TEXT = """\
@@ -158,7 +159,7 @@ def _show(picture: Any, snapshot: Snapshot, column: str | None) -> None:
     x = np.column_stack([snapshot.columns[name] for name in "xyz"])
     values = snapshot.columns[column or ("type" if picture.domain.dimension > 1 else "x")]
     time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g}"
-    picture.show(x, values, picture.side, f"step {snapshot.step}{time}")
+    picture.show(AtHand(x, values, picture.side), f"step {snapshot.step}{time}")
 
 
 def _side(x: np.ndarray) -> float:

@@ -164,10 +164,32 @@ class ById:
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
         return np.array([rounded(total) for total in self.of_all(limbs)])
 
-    def each(self, part: Any, name: str) -> list:
+    def each(self, part: Any, name: str, *arguments: Any) -> list:
         """What a method of a part says of some points of its group after others, where it does."""
-        found = (getattr(part, name)(Fields(self.hub, some)) for some in self.some(part.group))
-        return [one for one in found if one is not None]
+        return list(self._said(part, name, *arguments))
+
+    def _said(self, part: Any, name: str, *arguments: Any) -> Iterator[Any]:
+        say = getattr(part, name)
+        found = (say(Fields(self.hub, some), *arguments) for some in self.some(part.group))
+        return (one for one in found if one is not None)
+
+    def counted_of(self, part: Any, name: str, size: int, *arguments: Any) -> np.ndarray:
+        """How many points of a part's group have each of `size` numbers, which its method says."""
+        counts = np.zeros(size, np.int64)
+        for numbers in self._said(part, name, *arguments):
+            counts += np.bincount(numbers, minlength=size)
+        return self.of_all(counts)
+
+    def in_order(self, part: Any, name: str, *arguments: Any) -> Iterator[np.ndarray]:
+        """Rows (k, n) of the points of a part's group in the order of keys that it says, too."""
+        yield self.ordered(part, name, *arguments)[1]
+
+    def ordered(self, part: Any, name: str, *arguments: Any) -> tuple[np.ndarray, np.ndarray]:
+        """The keys (n,) of the points at hand, ascending, and their rows (k, n)."""
+        keys, rows = zip(*self._said(part, name, *arguments), strict=True)
+        of_all = np.concatenate(keys)
+        order = np.argsort(of_all)
+        return of_all[order], np.concatenate(rows, axis=1)[:, order]
 
     def counts(self) -> list[int]:
         """How many points each block has."""

@@ -8,11 +8,13 @@ first gathers into the arrays of a whole scene, and hands out anew where somethi
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.kernels.arrays import Setup, arrays_of
+from karamelo_py.output.fields import PIECE
 from karamelo_py.run.answers import reads_totals
 from karamelo_py.run.holding import Held, Holding
 from karamelo_py.run.leading import Abandoned, At, HandedOutAnew, by_all
@@ -20,6 +22,8 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.state import of_nodes
 from karamelo_py.run.tiles import numbers
 
+FIRST, LAST = -(2**63), 2**63 - 1  # before all keys of points, and behind them
+SAMPLES = 256  # keys of all processes, by which a piece of points is cut
 CHANGING = ("advance", "set_initial")  # what changes the points
 
 
@@ -108,16 +112,46 @@ class Ranks(Holding):
             return super().added_up(part, name, *arguments)
         return self._all_do("ask", "added_up", *self._named(part), name, *arguments)
 
-    def each(self, part: Any, name: str) -> list:
+    def each(self, part: Any, name: str, *arguments: Any) -> list:
         """What a method of a part says of some points of its group after others."""
         if self._at_hand:
-            found = super().each(part, name)
+            found = super().each(part, name, *arguments)
             return self.crew.gathered(found) if self._stepping else found
-        found = self._all_do("ask", "each", *self._named(part), name)
+        found = self._all_do("ask", "each", *self._named(part), name, *arguments)
         return [one for of_rank in found for one in of_rank]
 
+    def counted_of(self, part: Any, name: str, size: int, *arguments: Any) -> np.ndarray:
+        """How many points of a part's group have each of `size` numbers, which its method says."""
+        if self._at_hand:
+            return super().counted_of(part, name, size, *arguments)
+        return self._all_do("ask", "counted_of", *self._named(part), name, size, *arguments)
+
+    def in_order(self, part: Any, name: str, *arguments: Any) -> Iterator[np.ndarray]:
+        """Rows of the points of a part's group in the order of keys; none has those of all."""
+        if self._at_hand:
+            yield from super().in_order(part, name, *arguments)
+            return
+        found = self._all_do("ask", "keep_in_order", *self._named(part), name, *arguments)
+        some = np.sort(np.concatenate(found))[SAMPLES::SAMPLES]
+        for first, end in pairwise([FIRST, *some.tolist(), LAST]):
+            keys, rows = zip(*self._together("give_in_order", first, end), strict=True)
+            yield np.concatenate(rows, axis=1)[:, np.argsort(np.concatenate(keys))]
+
+    def keep_in_order(self, part: Any, name: str, *arguments: Any) -> list | None:
+        """Put own points in order; some of their keys, of all processes for the first."""
+        self._in_order = keys, _ = self.ordered(part, name, *arguments)
+        return self.crew.gathered(keys[:: max(PIECE // SAMPLES, 1)])
+
+    def give_in_order(self, first: int, end: int) -> list | None:
+        """Own keys from `first` to before `end` and their rows, for the first those of all."""
+        keys, rows = self._in_order
+        own = slice(*np.searchsorted(keys, (first, end)))
+        if end == LAST:
+            del self._in_order
+        return self.crew.gathered((keys[own], rows[:, own]))
+
     def ask(self, what: str, family: str, ID: str, *arguments: Any) -> Any:
-        """Call `added_up` or `each` with a part of the scene."""
+        """Call a method with a part of the scene."""
         return getattr(self, what)(self._catalogues[family][ID], *arguments)
 
     def _named(self, part: Any) -> tuple[str, str]:

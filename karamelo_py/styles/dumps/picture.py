@@ -7,6 +7,7 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize, to_rgba_array
@@ -14,6 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from PIL import Image
+
+from karamelo_py.styles.dumps.look import ROUND, Extent, Look, Seen
 
 # Colour-blind safe (Okabe and Ito 2008); solids take them in turn.
 SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
@@ -23,8 +26,7 @@ MARGIN = 4  # pixels at both sides of a long title
 # Towards the light, in a frame of right, up and towards the eye.
 LIGHT = np.array([-0.35, 0.6, 0.72])
 AMBIENT = 0.5  # light from all sides
-# A circle of this diameter has the area of a unit square.
-ROUND = np.sqrt(4 / np.pi)
+LIT = 8  # points, from which on they have a surface
 
 
 class Options(NamedTuple):
@@ -71,6 +73,28 @@ def _number(value: float, _: Any = None) -> str:
     return f"{value:.8g}"
 
 
+class Marks(Artist):
+    """The points of one state: an artist draws some of them after others, and never has all."""
+
+    def __init__(self, picture: Picture):
+        super().__init__()
+        self.picture = picture
+        self.points: Seen | None = None
+        self.set_zorder(picture.artist.get_zorder())
+        picture.artist.set_visible(False)  # but when this draws
+
+    def draw(self, renderer: Any) -> None:
+        """Draw them."""
+        if self.points is None or not self.get_visible():
+            return
+        artist = self.picture.artist
+        artist.set_visible(True)
+        for rows in self.points.marks(self.picture.look):
+            self.picture.place(rows)
+            artist.draw(renderer)
+        artist.set_visible(False)
+
+
 class Picture:
     """Axes, labels and colour bar as a background, and on it the points of one state.
 
@@ -93,6 +117,9 @@ class Picture:
         self.axes.tick_params(labelsize=8)
         self.title = self.axes.set_title("step 0, time 0", fontsize=9)
         self.artist = self._prepare()
+        self.marks = Marks(self)
+        self.axes.add_artist(self.marks)
+        self.look = Look()
         if not options.axes:
             self.axes.set_axis_off()
         self._add_legend()
@@ -101,8 +128,12 @@ class Picture:
         """Set up axes; return the artist that shows the points."""
         raise NotImplementedError
 
-    def _place(self, x: np.ndarray, values: np.ndarray, size: float) -> None:
-        """Hand a state to the artist."""
+    def _see(self, points: Seen, extent: Extent) -> Look:
+        """How these points are seen."""
+        raise NotImplementedError
+
+    def place(self, rows: np.ndarray) -> None:
+        """Hand what shows of some points to the artist."""
         raise NotImplementedError
 
     def _apply_limits(self, lo: float, hi: float) -> None:
@@ -120,18 +151,20 @@ class Picture:
         ]
         self.figure.legend(handles=dots, loc="outside right upper", frameon=False, fontsize=8)
 
-    def show(self, x: np.ndarray, values: np.ndarray, size: float, title: str) -> None:
-        """Set positions (n, 3), values (n,), side length of a point, and title to draw."""
+    def show(self, points: Seen, title: str) -> None:
+        """Set points and title to draw."""
         if not self._laid_out:
             self._lay_out()
+        extent = points.extent()
         if not self.options.solids:
-            limits = self._limits(values)
+            limits = self._limits(extent.ends)
             if limits != self.limits:
                 self.limits = limits
                 self._apply_limits(*limits)
                 self._background = None
         self._entitle(title)
-        self._place(x, values, size)
+        self.look = self._see(points, extent)
+        self.marks.points = points
 
     def _entitle(self, text: str) -> None:
         """Write the title above the axes, and where that is too narrow within the picture."""
@@ -168,12 +201,12 @@ class Picture:
         """Draw the state over the kept background and write it as PNG."""
         if self._background is None:
             self.title.set_animated(True)
-            self.artist.set_animated(True)
+            self.marks.set_animated(True)
             self.canvas.draw()
             self._background = self.canvas.copy_from_bbox(self.figure.bbox)
         self.canvas.restore_region(self._background)
         self.axes.draw_artist(self.title)
-        self.axes.draw_artist(self.artist)
+        self.axes.draw_artist(self.marks)
         # Opaque everywhere, so three channels do.
         pixels = np.asarray(self.canvas.buffer_rgba())[:, :, :3]
         image = Image.fromarray(np.ascontiguousarray(pixels))
@@ -237,21 +270,23 @@ class Plane(Picture):
     def _apply_limits(self, lo: float, hi: float) -> None:
         self.norm.vmin, self.norm.vmax = lo, hi
 
-    def _place(self, x: np.ndarray, values: np.ndarray, size: float) -> None:
-        self._set(x[:, :2], self._colours_of(values), size)
+    def _see(self, points: Seen, extent: Extent) -> Look:
+        # As large as the material it stands for, and never invisible: least where they are few.
+        least = 0.8 + 4 / np.sqrt(max(extent.count, 1))
+        size = max(ROUND * points.side * self._pixels_per_unit(), least)
+        self.artist.set_sizes([size**2])
+        return Look(limits=None if self.options.solids else self.limits)
 
-    def _colours_of(self, values: np.ndarray) -> np.ndarray:
+    def place(self, rows: np.ndarray) -> None:
+        """Hand what shows of some points to the artist."""
+        self.artist.set_offsets(rows[:2].T)
+        self.artist.set_facecolors(self._colours_of(rows))
+
+    def _colours_of(self, rows: np.ndarray) -> np.ndarray:
         """(n, 4) colours."""
         if self.options.solids:
-            return self.colours[(values.astype(int) - 1) % len(SOLIDS)]
-        return colormaps[self.options.cmap](self.norm(values))
-
-    def _set(self, xy: np.ndarray, colours: np.ndarray, size: float) -> None:
-        self.artist.set_offsets(xy)
-        self.artist.set_facecolors(colours)
-        # As large as the material it stands for, and never invisible: least where they are few.
-        least = 0.8 + 4 / np.sqrt(max(len(xy), 1))
-        self.artist.set_sizes([max(ROUND * size * self._pixels_per_unit(), least) ** 2])
+            return self.colours[(rows[2].astype(int) - 1) % len(SOLIDS)]
+        return colormaps[self.options.cmap](rows[2])
 
 
 class Space(Plane):
@@ -314,33 +349,40 @@ class Space(Plane):
             rotation=90 if axis == 2 else 0,
         )
 
-    def _place(self, x: np.ndarray, values: np.ndarray, size: float) -> None:
-        seen = self._project(x)
-        order = np.argsort(seen[:, 2], kind="stable")
-        colours = self._colours_of(values)
-        colours[:, :3] *= self._light(x, size)[:, None]
-        self._set(seen[order, :2], colours[order], size)
+    def _see(self, points: Seen, extent: Extent) -> Look:
+        look = super()._see(points, extent)._replace(view=self.view, middle=self.middle)
+        self.light = None
+        if extent.count < LIT:
+            return look
+        size = extent.hi - extent.lo
+        cell = max(1.5 * points.side, size.max() / 120, np.finfo(float).tiny)
+        shape = tuple(((size / cell).astype(int) + 5).tolist())
+        look = look._replace(lo=extent.lo, cell=cell, shape=shape)
+        self.light = self._light(points.counts(look).reshape(shape))
+        return look
 
-    def _light(self, x: np.ndarray, size: float) -> np.ndarray:
-        """How much light falls on each point: its surface looks where there are fewer points."""
-        if len(x) < 8:
-            return np.ones(len(x))
-        lo, extent = x.min(axis=0), np.ptp(x, axis=0)
-        cell = max(1.5 * size, extent.max() / 120, np.finfo(float).tiny)
-        shape = (extent / cell).astype(int) + 5
-        at = tuple(((x - lo) / cell).astype(int).T + 2)
-        density = np.bincount(np.ravel_multi_index(at, shape), minlength=shape.prod())
-        density = density.reshape(shape).astype(float)
+    def _colours_of(self, rows: np.ndarray) -> np.ndarray:
+        colours = super()._colours_of(rows)
+        if self.light is not None:
+            colours[:, :3] *= self.light[rows[3].astype(int)][:, None]
+        return colours
+
+    def _light(self, counts: np.ndarray) -> np.ndarray:
+        """How much light falls on each cell: a surface looks where there are fewer points."""
+        density = counts.astype(float)
         for axis in range(3):
             for _ in range(2):
                 density = 0.5 * density + 0.25 * (
                     np.roll(density, 1, axis) + np.roll(density, -1, axis)
                 )
-        normal = -np.column_stack([slope[at] for slope in np.gradient(density)])
+        there = np.flatnonzero(counts)
+        normal = -np.column_stack([slope.ravel()[there] for slope in np.gradient(density)])
         length = np.linalg.norm(normal, axis=1)
         facing = (normal @ self.view.T) @ (LIGHT / np.linalg.norm(LIGHT))
-        facing = np.divide(facing, length, out=np.ones(len(x)), where=length > 0)
-        return AMBIENT + (1 - AMBIENT) * np.clip(facing, 0, 1)
+        facing = np.divide(facing, length, out=np.ones(len(there)), where=length > 0)
+        light = np.zeros(counts.size)
+        light[there] = AMBIENT + (1 - AMBIENT) * np.clip(facing, 0, 1)
+        return light
 
 
 class Line(Picture):
@@ -359,8 +401,12 @@ class Line(Picture):
     def _apply_limits(self, lo: float, hi: float) -> None:
         self.axes.set_ylim(lo, hi)
 
-    def _place(self, x: np.ndarray, values: np.ndarray, size: float) -> None:
-        self.artist.set_data(x[:, 0], values)
+    def _see(self, points: Seen, extent: Extent) -> Look:
+        return Look(kind=float)
+
+    def place(self, rows: np.ndarray) -> None:
+        """Hand what shows of some points to the artist."""
+        self.artist.set_data(rows[0], rows[2])
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:

@@ -1,6 +1,8 @@
 """dump pyplot: pictures of the points, drawn with Matplotlib."""
 
 import re
+from collections.abc import Iterator
+from functools import cached_property
 from typing import Annotated, Any, BinaryIO
 
 import numpy as np
@@ -8,12 +10,15 @@ import numpy as np
 from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.columns import check_columns
+from karamelo_py.output.fields import Fields
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.units import labelled
+from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.styles.dumps.base import Dump
+from karamelo_py.styles.dumps.look import Extent, Look, extent, in_pieces, joined
 
 DPI = 100
 # Above this, a width or height is meant in pixels.
@@ -24,6 +29,7 @@ PNG_COMPRESSION = 1
 # Components have either sign: their colours are of two kinds, with grey at 0.
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
+SAMPLE = 1 << 16  # points, about, that say how large one is
 
 
 class PyPlot(Dump):
@@ -97,6 +103,7 @@ class PyPlot(Dump):
                 argument="vmax",
                 expected="a number above vmin",
             )
+        self.group = ParticleGroup(hub, everything=True)
         self.field = field
         self.limits = (vmin, vmax)
         self.title = title
@@ -137,17 +144,15 @@ class PyPlot(Dump):
             self._picture.save_png(file, PNG_COMPRESSION)
 
     def _draw(self) -> None:
-        fields, update = self.hub.fields, self.hub.update
+        update = self.hub.update
         if self._picture is None:
             self._picture = self._make()
-        x = np.column_stack([fields.particle(name) for name in "xyz"])
-        values = fields.particle(self._label())
         title = f"step {update.step}, time {update.time:.6g}"
         if self.hub.output.units is not None:
             title += f" {self.hub.output.units.time}"
         if self.title:
             title = f"{self.title}: {title}"
-        self._picture.show(x, values, self._side(x[:, 0]), title)
+        self._picture.show(Scene(self), title)
 
     def _make(self) -> Any:
         # Matplotlib takes a third of a second to import: only scenes with pictures pay it.
@@ -168,19 +173,59 @@ class PyPlot(Dump):
         made.begin_with(self._limits)
         return made
 
-    def _side(self, x: np.ndarray) -> float:
-        """Side length of a typical point."""
-        volume, dimension = self.hub.fields.particle("volume"), self.hub.domain.dimension
-        if not len(volume):
-            return 0.0
+    # What each process says of some of its points after others.
+
+    def extent(self, points: Fields) -> Extent | None:
+        """What these fill."""
+        return extent(_places(points), points.particle(self._label()))
+
+    def volumes(self, points: Fields, every: int) -> np.ndarray:
+        """Volumes of those of these whose id is a multiple of `every`."""
+        volume = points.particle("volume")
         if self.hub.domain.axisymmetric:
-            volume = volume / np.maximum(x, 1e-3 * x.max())  # of a ring, per radian
-        return float(np.median(volume)) ** (1 / dimension)
+            volume = volume / points.particle("x")  # of a ring, per radian
+        return volume[points.particle("id") % every == 0]
+
+    def cells(self, points: Fields, look: Look) -> np.ndarray:
+        """The cells of these."""
+        return look.cells_of(_places(points))
+
+    def marks(self, points: Fields, look: Look) -> tuple:
+        """What shows of these."""
+        ids = points.particle("id")
+        return look.marks(ids, _places(points), points.particle(self._label()))
 
     def _label(self) -> str:
         if self.field is not None:
             return self.field
         return "vx" if self.hub.domain.dimension == 1 else "type"
+
+
+class Scene:
+    """The points of a scene that a picture asks, wherever they are."""
+
+    def __init__(self, dump: PyPlot):
+        self.dump, self.fields = dump, dump.hub.fields
+
+    def extent(self) -> Extent:
+        """What they fill."""
+        return joined(self.fields.each(self.dump, "extent"))
+
+    @cached_property
+    def side(self) -> float:
+        """Side length of a typical point."""
+        every = -(-self.fields.count // SAMPLE)
+        volumes = np.concatenate(self.fields.each(self.dump, "volumes", every))
+        dimension = self.dump.hub.domain.dimension
+        return float(np.median(volumes)) ** (1 / dimension) if len(volumes) else 0.0
+
+    def counts(self, look: Look) -> np.ndarray:
+        """How many there are in each cell."""
+        return self.fields.counted(self.dump, "cells", look.cells, look)
+
+    def marks(self, look: Look) -> Iterator[np.ndarray]:
+        """Rows of what shows of them."""
+        return in_pieces(self.fields.in_order(self.dump, "marks", look))
 
 
 def colours_of(
@@ -218,3 +263,8 @@ def _inches(argument: str, value: float) -> float:
             f"from {LEAST_PIXELS} to {MOST_PIXELS} pixels",
         )
     return inches
+
+
+def _places(points: Fields) -> np.ndarray:
+    """(n, 3) positions."""
+    return np.column_stack([points.particle(name) for name in "xyz"])
