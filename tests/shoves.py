@@ -21,6 +21,15 @@ def sway(view):
     return view.velocity.sum(axis=0)
 
 
+def sway_alone(view):
+    """The same for each point or node on its own."""
+    view.velocity[:, 0] *= 1 + 0.01 * np.sin(9 * view.position[:, 1])
+    return view.total(view.velocity)
+
+
+sway_alone.point_by_point = True
+
+
 def warm(view):
     """Nodes are a bit warmer where they are far, or points are heated there."""
     far = 1 + 0.01 * np.sin(9 * view.position[:, 0])

@@ -286,11 +286,13 @@ WARMING = """
 """
 
 
-@pytest.mark.parametrize("script", ["sways", "warms"])
+@pytest.mark.parametrize("script", ["sways", "warms", "sways alone"])
 def test_python_at_every_moment(state_interpreted, tmp_path, script):
     scripts = {
         "sways": block(2, SWAYING, MOVING[0], *MOVING[3:], "set_output(3)", "run(7)",
                        size=(0.3, 0.2)),
+        "sways alone": block(2, SWAYING.replace("sway,", "sway_alone,"), MOVING[0], *MOVING[3:],
+                             "set_output(3)", "run(7)", size=(0.3, 0.2)),
         "warms": slab(HOT.format(301) + WARMING, ", hot_s", "run(6)"),
     }  # fmt: skip
     assert shared(state_interpreted, tmp_path, with_files(scripts[script]), ranks=3)

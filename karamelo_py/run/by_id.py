@@ -164,6 +164,18 @@ class ById:
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
         return np.array([rounded(total) for total in self.of_all(limbs)])
 
+    def summed(self, terms: np.ndarray) -> np.ndarray:
+        """Sums of terms (n,) or (n, k) of what is at hand over all, rounded once."""
+        columns = terms.reshape(len(terms), int(np.prod(terms.shape[1:]))).T
+        limbs = np.zeros((len(columns), LIMBS), np.int64)
+        for k, column in enumerate(columns):
+            add_all(limbs, k, np.ascontiguousarray(column))
+        return np.array([rounded(of) for of in self.of_all(limbs)]).reshape(terms.shape[1:])
+
+    def column(self, name: str, block: Block, rows: np.ndarray) -> np.ndarray:
+        """A column of the dumps for points that are at hand."""
+        return Fields(self.hub, Some(self, block, rows)).particle(name)
+
     def each(self, part: Any, name: str, *arguments: Any) -> list:
         """What a method of a part says of some points of its group after others, where it does."""
         return list(self._said(part, name, *arguments))
@@ -220,10 +232,7 @@ class ById:
         found = np.empty((len(ids), self.kin.dimension))
         order = np.argsort(ids)
         for solid, rows, own in self._own(ids[order]):
-            for begin in range(0, len(own), PIECE):
-                some = own[begin : begin + PIECE]
-                x0 = solid.places[some[0] : some[-1] + 1]
-                found[order[rows][begin : begin + PIECE]] = x0[some - some[0]]
+            found[order[rows]] = solid.x0_of(own)
         return found
 
     def volume0_of(self, ids: np.ndarray) -> np.ndarray:

@@ -11,17 +11,15 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
-from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Setup
+from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Setup
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.conduction import show_heat
-from karamelo_py.kernels.export import impose_stress
-from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.passes import sweep
 from karamelo_py.kernels.rows import SUMS
 from karamelo_py.kernels.sweep import Visit, sweep_nodes
-from karamelo_py.points.laws import can, law_kind, with_stress
+from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.by_id import ById
 from karamelo_py.run.by_number import ByNumber
@@ -133,25 +131,6 @@ class Lowered(ById, ByNumber):
             float(self.control.clock[0].last_dt),
             float(self.control.clock[0].path),
         )
-
-    def set_stress(self, ids: np.ndarray, given: dict[str, np.ndarray]) -> None:
-        """Set components of the Cauchy stress (by name, "11" ...) of the points `ids`."""
-        s = self.setup
-        names = s.kin.symmetric_names
-        chosen = np.zeros(self.count, np.bool_)
-        chosen[ids] = True
-        stress = np.zeros((self.count, len(names)), s.nodes.sums.dtype)
-        for k, name in enumerate(names):
-            if name in given:
-                stress[ids, k] = given[name]
-        flags = np.array([name in given for name in names])
-        for block in s.blocks:
-            if can(elastic_law(block.laws), with_stress):
-                rows = stress[block.points.id]
-                part = chosen[block.points.id]
-                like = s.nodes.sums[0, MASS]
-                impose_stress(s.kin, like, block.points, block.laws, part, flags, rows)
-        self.version += 1
 
     def remove(self, ids: np.ndarray) -> None:
         """Take points out of the run; the ids of the others stay."""

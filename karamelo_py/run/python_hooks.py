@@ -33,14 +33,18 @@ class PythonHooks:
                 if not isinstance(hook, CompiledHook):
                     self.by_stage.setdefault(STAGES[name], []).append((fix, hook))
 
-    def act(self, function: Callable, s: Setup, *arguments: Any) -> None:
-        """Call what acts from Python on a setup."""
-        self.simulation.act(lambda whole: function(self, whole, *arguments), s)
+    def act(self, function: Callable, s: Setup, stage: int, *arguments: Any) -> None:
+        """Call what acts from Python on a setup: the own one where that is enough for all."""
+        if all(fix.point_by_point for fix, _ in self.by_stage[stage]):
+            function(self, s, stage, *arguments)
+        else:
+            self.simulation.act(lambda whole: function(self, whole, stage, *arguments), s)
 
 
 def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
     for fix, hook in hooks.by_stage[stage]:
-        hook(NodesView(s, fix.group, stage, before_update=target == ON_VELOCITY))
+        before = target == ON_VELOCITY
+        hook(NodesView(hooks.simulation, s, fix.group, stage, before_update=before))
 
 
 def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
@@ -50,7 +54,7 @@ def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> Non
 
 def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:
     for fix, hook in hooks.by_stage[stage]:
-        view = PointsView(hooks.simulation, fix.group, bool(then))
+        view = view_of(hooks.simulation, fix, then=bool(then))
         hook(view)
         if view.moved and stage == INITIAL_INTEGRATE:
             hooks.simulation.sort()
@@ -91,10 +95,17 @@ def _(hooks, s):
         hooks.act(_on_points, s, SUPPLY_HEAT, 0)
 
 
+def view_of(simulation: Any, fix: Any, *, then: bool) -> PointsView:
+    """The points of a fix, or those of them that are at hand."""
+    if fix.point_by_point:
+        return PieceView(simulation, list(simulation.rows_of(fix.group)), then)
+    return PointsView(simulation, fix.group, then)
+
+
 def views_of(simulation: Any, fix: Any) -> Iterator[PointsView]:
-    """The points of a fix, in pieces where it looks at each on its own."""
+    """The points of a fix before a step, in pieces where it looks at each on its own."""
     if not fix.point_by_point:
-        yield PointsView(simulation, fix.group, then=False)
+        yield view_of(simulation, fix, then=False)
         return
-    for block, rows in simulation.rows_of(fix.group):
-        yield PieceView(simulation, block, rows)
+    for part in simulation.rows_of(fix.group):
+        yield PieceView(simulation, [part])

@@ -70,9 +70,10 @@ class Simulation(Lowered):
 
     @property
     def acting_from_python(self) -> list[str]:
-        """Words for the fixes that act from Python in each step."""
+        """Words for the fixes that act in Python in each step, on the whole scene."""
         acting = (fix for pairs in self._python.by_stage.values() for fix, _ in pairs)
-        return [f"fix {fix.style} '{fix.id}'" for fix in dict.fromkeys(acting)]
+        whole = (fix for fix in dict.fromkeys(acting) if not fix.point_by_point)
+        return [f"fix {fix.style} '{fix.id}'" for fix in whole]
 
     def begin(self, end_time: float) -> None:
         """Start of a run: choose the first dt; the run ends at `end_time` at the latest."""

@@ -54,8 +54,9 @@ class Fix:
     first_step_only
         Whether it acts in the first step after its definition and is idle thereafter.
     point_by_point
-        Whether its hooks look at each point on its own, and move none: before the first step they
-        are then called for some points after the others, whose fields need no copies.
+        Whether its hooks in Python look at each point or node on its own, and move none. Then they
+        see, in any order, the points that are at hand: those of one of several processes, and
+        before the first step some after others. For sums over all there is ``total``.
     for_method
         Whether it has no hooks because the method reads it.
     prescribes_velocity

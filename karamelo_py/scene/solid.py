@@ -184,6 +184,15 @@ class Solid:
         """(n, d) reference positions; of many points they are made anew each time."""
         return self.places[:]
 
+    def x0_of(self, numbers: np.ndarray) -> np.ndarray:
+        """(n, d) reference positions of some points, in any order, without those of the others."""
+        found, order = np.empty((len(numbers), self.domain.dimension)), np.argsort(numbers)
+        for begin in range(0, len(order), CHUNK):
+            rows = order[begin : begin + CHUNK]
+            first, last = numbers[rows[0]], numbers[rows[-1]]
+            found[rows] = self.places[first : last + 1][numbers[rows] - first]
+        return found
+
     def pieces(self) -> Iterator[tuple[int, np.ndarray]]:
         """Reference positions, so many at a time, with the number of the first of them."""
         for first in range(0, self.count, CHUNK):

@@ -20,10 +20,12 @@ from karamelo_py.kernels.arrays import (
     of_force,
     of_momentum,
 )
-from karamelo_py.kernels.export import export_velocity_moment
+from karamelo_py.kernels.export import export_velocity_moment, impose_stress
 from karamelo_py.kernels.heat import Supply, Temperature
+from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.moments import corners_that_move
 from karamelo_py.kernels.p2g import Force
+from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.view import Shown, View
 
@@ -41,8 +43,10 @@ class NodesView(View):
 
     _fields = ("dt", "kick", "time", "index")
 
-    def __init__(self, s: Any, group: Any, stage: int, before_update: bool):
+    def __init__(self, simulation: Any, s: Any, group: Any, stage: int, before_update: bool):
         super().__init__()
+        self._simulation = simulation
+        self._foreign = getattr(s.control.ranks, "foreign", None)
         self._nodes = s.nodes
         self._grids = s.grids
         self._stage = stage
@@ -56,6 +60,12 @@ class NodesView(View):
         else:
             members = group.nodes
         self.index = members[s.nodes.sums[members, MASS] > 0]
+
+    def total(self, terms: Any) -> np.ndarray:
+        """The sum of terms (n,) or (n, k) over all nodes of the group, those of all processes."""
+        terms = np.asarray(terms, float)
+        own = slice(None) if self._foreign is None else self._foreign[self.index] == 0
+        return self._simulation.summed(terms[own])
 
     def _part(self, array: np.ndarray, first: int) -> tuple:
         """Where in an array of the nodes a vector of those of the view lies."""
@@ -146,6 +156,20 @@ class PointsView(View):
         self.ids = simulation.members(group)
         self.moved = False
         self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
+
+    def total(self, terms: Any) -> np.ndarray:
+        """The sum of terms (n,) or (n, k) over all points of the group, rounded once.
+
+        It is the same for any number of processes, which all have to ask for it.
+        """
+        return self._simulation.summed(np.asarray(terms, float))
+
+    def column(self, name: str) -> np.ndarray:
+        """(n,) a column of the dumps for these points."""
+        found = np.empty(len(self.ids))
+        for block, rows, own in self._at_hand():
+            found[own] = self._simulation.column(name, block, rows)
+        return found
 
     def _gather(self, of: Callable) -> np.ndarray:
         full = self._simulation.by_id(of)
@@ -306,7 +330,20 @@ class PointsView(View):
 
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
-        self._simulation.set_stress(self.ids, given)
+        s = self._simulation.stepped
+        names, like = s.kin.symmetric_names, s.nodes.sums[0, MASS]
+        flags = np.array([name in given for name in names])
+        values = np.stack(
+            [np.broadcast_to(given.get(name, 0.0), len(self.ids)) for name in names], axis=1
+        ).astype(s.nodes.sums.dtype)
+        for block, rows, own in self._at_hand():
+            points = block.points
+            if len(rows) and can(elastic_law(block.laws), with_stress):
+                chosen = np.zeros(len(points.id), np.bool_)
+                chosen[rows] = True
+                stress = np.zeros((len(points.id), len(names)), values.dtype)
+                stress[rows] = values[own]
+                impose_stress(s.kin, like, points, block.laws, chosen, flags, stress)
 
     @Shown
     def reference_position(self) -> np.ndarray:
@@ -315,26 +352,28 @@ class PointsView(View):
 
 
 class PieceView(PointsView):
-    """Some points of a group, in the order in which they are stored: takes next to no memory.
+    """Points of a group that are at hand, in the order in which they are stored.
 
     For hooks that look at each point on its own (`Fix.point_by_point`). Positions are read-only.
     """
 
-    def __init__(self, simulation: Any, block: Any, rows: np.ndarray):
+    def __init__(self, simulation: Any, parts: list[tuple], then: bool = False):
         View.__init__(self)
         self._simulation = simulation
-        self._then = False
-        self._block, self._rows = block, rows
+        self._then = then
+        self._parts = parts or [(simulation.blocks[0], np.empty(0, np.int64))]
+        self._ends = np.cumsum([0, *(len(rows) for _, rows in self._parts)])
         self._take_times(simulation.control)
-        self.ids = block.points.id[rows]
+        self.ids = np.concatenate([block.points.id[rows] for block, rows in self._parts])
         self.moved = False
         self._declared = {}
 
     def _gather(self, of: Callable) -> np.ndarray:
-        return of(self._block.points)[..., self._rows].T
+        return np.concatenate([of(block.points)[..., rows].T for block, rows in self._parts])
 
     def _scatter(self, of: Callable, value: np.ndarray) -> None:
-        of(self._block.points)[..., self._rows] = value.T
+        for block, rows, own in self._at_hand():
+            of(block.points)[..., rows] = value[own].T
 
     @Shown
     def position(self) -> np.ndarray:
@@ -347,4 +386,7 @@ class PieceView(PointsView):
         return self._simulation.x0_of(self.ids)
 
     def _at_hand(self) -> Iterator[tuple]:
-        yield self._block, self._rows, slice(None)
+        for (block, rows), begin, end in zip(
+            self._parts, self._ends[:-1], self._ends[1:], strict=True
+        ):
+            yield block, rows, slice(begin, end)

@@ -63,4 +63,5 @@ class EdgeTraction(EdgeFix):
 
     def loads(self, faces: Faces) -> np.ndarray:
         """See `EdgeFix.loads`."""
-        return faces.area[:, None] * vector(self.traction, self.hub, faces.middle, faces.middle)
+        x = faces.middle
+        return faces.area[:, None] * vector(self.traction, self.hub, x, lambda: x)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.p2g import Force
+from karamelo_py.output.fields import PIECE
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
@@ -17,7 +18,7 @@ SIDES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 class Faces(NamedTuple):
     """Faces of points that lie on the edge of a region, before the first step."""
 
-    point: np.ndarray  # (m,) rows of the group's points
+    point: np.ndarray  # (m,) numbers of the points, or their rows in a view
     axis: np.ndarray  # (m,) that the face is across
     sign: np.ndarray  # (m,) -1 or 1: the way out
     area: np.ndarray  # (m,) per radian around an axis
@@ -31,12 +32,12 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
     outside.
     """
     solids = list(hub.solids.values())
-    if not solids:
-        none = np.zeros(0, np.int64)
-        return Faces(none, none, none, np.zeros(0), np.zeros((0, hub.domain.dimension)))
-    x0 = np.concatenate([solid.x0 for solid in solids])[ids]
-    half = np.concatenate([solid.half_size for solid in solids])[ids]
-    d = x0.shape[1]
+    d = hub.domain.dimension
+    x0, half = np.empty((len(ids), d)), np.empty((len(ids), d))
+    for solid in solids:
+        rows = np.flatnonzero((ids >= solid.first_id) & (ids < solid.first_id + solid.count))
+        own = ids[rows] - solid.first_id
+        x0[rows], half[rows] = solid.x0_of(own), solid.half_size[own]
     found = []
     inside = region.inside(x0)
     for axis in range(d):
@@ -49,7 +50,7 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
             if hub.domain.axisymmetric:
                 area = area * middle[:, 0]
             ones = np.ones(len(rows), np.int64)
-            found.append(Faces(rows, axis * ones, sign * ones, area, middle))
+            found.append(Faces(ids[rows], axis * ones, sign * ones, area, middle))
     return Faces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
 
@@ -64,11 +65,14 @@ class EdgeFix(Fix):
 
     published: tuple[str, ...] = ("x", "y", "z")
     point_fields = (Force,)
+    point_by_point = True
 
     def __init__(self, hub: Hub, group: ParticleGroup, region: Region):
         super().__init__(hub, group)
         self.region = region
-        self._known: tuple[np.ndarray, Faces] | None = None
+        self._ids = np.empty(0, np.int64)  # of the points that were seen last
+        self._known: Faces | None = None  # their faces, by number
+        self._rows: Faces | None = None  # and by row in the view
 
     def defined(self) -> None:
         """Warn where there is nothing to load.
@@ -86,8 +90,9 @@ class EdgeFix(Fix):
                     hint="points=regular in its line",
                 )
         if not self.hub.rehearsing and not self.region.unknown:
-            faces = self.chosen(faces_on(self.hub, self.region, self.group.ids))
-            if len(self.group.ids) and not len(faces.point):
+            ids = self.group.ids
+            pieces = (ids[k : k + PIECE] for k in range(0, len(ids), PIECE))
+            if len(ids) and not any(len(self._find(piece).point) for piece in pieces):
                 self.hub.warn(
                     f"no point of the group lies at this edge of region '{self.region.id}'"
                 )
@@ -102,11 +107,30 @@ class EdgeFix(Fix):
 
     def initial_integrate(self, points: PointsView) -> None:
         """Give the points their forces, and publish the sum."""
-        if self._known is None or not np.array_equal(self._known[0], points.ids):
-            faces = faces_on(self.hub, self.region, points.ids)
-            self._known = points.ids.copy(), self.chosen(faces)
-        faces = self._known[1]
+        faces = self._faces_of(points.ids)
         force = np.zeros(points.position.shape)
         np.add.at(force, faces.point, self.loads(faces))
         points.force = points.force + force
-        self.publish_components(force.sum(axis=0))
+        self.publish_components(points.total(force))
+
+    def _faces_of(self, ids: np.ndarray) -> Faces:
+        """The faces of the points in a view, by their rows there; what was found stays known."""
+        if self._rows is not None and np.array_equal(self._ids, ids):
+            return self._rows
+        order = np.argsort(ids)
+        new = np.setdiff1d(ids, self._ids, assume_unique=True)
+        parts = [self._find(new), *([self._known] if self._known is not None else [])]
+        found = Faces(*map(np.concatenate, zip(*parts, strict=True)))
+        # The forces on a point are added up in this order, whenever its faces were found.
+        found = _some(found, np.lexsort((found.sign, found.axis)))
+        self._ids, self._known = ids.copy(), _some(found, np.isin(found.point, ids))
+        at = np.searchsorted(ids, self._known.point, sorter=order)
+        self._rows = self._known._replace(point=order[at])
+        return self._rows
+
+    def _find(self, ids: np.ndarray) -> Faces:
+        return self.chosen(faces_on(self.hub, self.region, ids))
+
+
+def _some(faces: Faces, which: np.ndarray) -> Faces:
+    return Faces(*(column[which] for column in faces))

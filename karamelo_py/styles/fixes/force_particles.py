@@ -1,7 +1,5 @@
 """fix force_particles: a total force shared by points."""
 
-import numpy as np
-
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -38,6 +36,7 @@ class ForceParticles(Fix):
     syntax = "group, fx[, fy[, fz]]"
     published = ("x", "y", "z")
     point_fields = (Force,)
+    point_by_point = True
 
     def __init__(self, hub: Hub, group: ParticleGroup, *force: Expression | None):
         super().__init__(hub, group)
@@ -45,11 +44,8 @@ class ForceParticles(Fix):
 
     def initial_integrate(self, points: PointsView) -> None:
         """Give the points their share, and publish the sum."""
-        if not len(points.ids):
-            self.publish_components(np.zeros(points.position.shape[1]))
-            return
-        share = points.mass / points.mass.sum()
-        whole = vector(self.force, self.hub, points.position, points.reference_position)
-        force = share[:, None] * whole
+        mass, x = points.mass.astype(float), points.position
+        share = mass / (points.total(mass) or 1.0)
+        force = share[:, None] * vector(self.force, self.hub, x, lambda: points.reference_position)
         points.force = points.force + force
-        self.publish_components(force.sum(axis=0))
+        self.publish_components(points.total(force))

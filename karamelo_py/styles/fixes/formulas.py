@@ -1,6 +1,6 @@
 """What fixes that act by a formula for each component have in common."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, plural
+from karamelo_py.script.expressions import FIRST
 
 AXES = "xyz"
 
@@ -40,8 +41,13 @@ def evaluated(formula: Any, hub: Hub, x: np.ndarray, x0: np.ndarray) -> np.ndarr
     return formula.evaluate_points(hub.values, x, x0)
 
 
-def vector(formulas: Sequence, hub: Hub, x: np.ndarray, x0: np.ndarray) -> np.ndarray:
-    """Values (n, d) of a formula for each direction, 0 where there is none."""
+def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.ndarray:
+    """Values (n, d) of a formula for each direction, 0 where there is none.
+
+    `first()` gives the reference positions, where a formula asks for these.
+    """
+    asked = any(formula is not None and formula.names & FIRST for formula in formulas)
+    x0 = first() if asked else x
     found = np.zeros(x.shape)
     for k, formula in enumerate(formulas):
         if formula is not None:

@@ -86,6 +86,6 @@ class Indent(PointForceFix):
         away = bodies.x - self.now(self.centre)
         r = np.linalg.norm(away, axis=1)
         depth = np.maximum(R - r, 0)
-        self.publish("s", np.count_nonzero(depth))
+        self.publish("s", bodies.total(depth > 0))
         size = np.divide(bodies.mass * K * depth**2, r, out=np.zeros_like(r), where=r > 0)
         return size[:, None] * away

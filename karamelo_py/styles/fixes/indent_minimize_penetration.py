@@ -76,6 +76,6 @@ class IndentMinimizePenetration(PointForceFix):
         r = np.linalg.norm(away, axis=1, keepdims=True)
         normal = np.divide(away, r, out=np.zeros_like(away), where=r > 0)
         depth = R + bodies.side / 2 - r[:, 0]
-        self.publish("s", bodies.face[depth > 0].sum())
+        self.publish("s", bodies.total(bodies.face * (depth > 0)))
         push = apart(bodies, depth, normal)
         return push + rubbed(bodies, push, normal, self.now(self.velocity), self.mu)

@@ -35,6 +35,7 @@ class InitialStress(Fix):
 
     published = ()
     first_step_only = True
+    point_by_point = True
 
     def __init__(
         self,

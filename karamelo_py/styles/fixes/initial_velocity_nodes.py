@@ -31,6 +31,7 @@ class InitialVelocityNodes(Fix):
     published = ()
 
     first_step_only = True
+    point_by_point = True
 
     def __init__(self, hub: Hub, group: NodeGroup, *velocity: Expression | None):
         super().__init__(hub, group)

@@ -44,4 +44,4 @@ class NeumannBcMech(PointForceFix):
 
     def push(self, bodies: Bodies) -> np.ndarray:
         """See `PointForceFix.push`."""
-        return bodies.face[:, None] * vector(self.traction, self.hub, bodies.x, bodies.x0)
+        return bodies.face[:, None] * vector(self.traction, self.hub, bodies.x, lambda: bodies.x0)

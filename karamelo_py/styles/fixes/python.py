@@ -107,6 +107,11 @@ class Python(Fix):
     Every step comes back to Python for it, which takes some ten microseconds and the time of the
     function.
 
+    With many processes all points are gathered for it in each step. A function that looks at each
+    point or node on its own, and moves no points, says so by ``pull.point_by_point = True`` behind
+    it: then each process calls it for its own, in any order, and sums over all are
+    ``points.total(terms)``, of terms (n,) or (n, k).
+
     What the function keeps from step to step goes into files to go on from where it is named:
     ``remembers = ("taken", "left")`` in the module names variables of the module, and in the class
     of an object that is called, attributes of the object. Numbers, texts, arrays, generators of
@@ -153,6 +158,7 @@ class Python(Fix):
         super().__init__(hub, group)
         self.function = function
         self.keeper = Keeper(function)
+        self.point_by_point = getattr(function, "point_by_point", False)
         self.point_fields = () if on_nodes else (Force,)
         setattr(self, moment, self._act)
 

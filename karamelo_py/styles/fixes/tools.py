@@ -30,6 +30,8 @@ class Bodies:
     mass, side, face, stiffness : (n,)
         Masses, edges of the cubes, areas of one face (per radian around an axis), and shear moduli
         less what damage has taken of them.
+    total
+        The sum of terms (n,) over all points of the group, those of all processes.
     dt, kick
         The step, and how long forces act in it.
     """
@@ -38,6 +40,7 @@ class Bodies:
         self._hub, self._group, self._points = hub, group, points
         self.dt, self.kick = points.dt, points.kick
         self._d = hub.domain.dimension
+        self.total = points.total
 
     @cached_property
     def x(self) -> np.ndarray:
@@ -73,11 +76,7 @@ class Bodies:
         return _moduli(self._hub, self._group)[solid] * (1 - self._column("damage"))
 
     def _column(self, name: str) -> np.ndarray:
-        """A column of the dumps for these points."""
-        fields = self._hub.fields
-        column = np.zeros(fields.count)
-        column[fields.particle("id") - 1] = fields.particle(name)
-        return column[self._points.ids]
+        return self._points.column(name)
 
 
 class PointForceFix(Fix):
@@ -91,6 +90,7 @@ class PointForceFix(Fix):
 
     published: tuple[str, ...] = ("x", "y", "z")
     point_fields = (Force,)
+    point_by_point = True
     needs_stiffness = False
 
     def __init__(self, hub: Hub, group: ParticleGroup):
@@ -104,11 +104,9 @@ class PointForceFix(Fix):
 
     def initial_integrate(self, points: PointsView) -> None:
         """Give the points their forces and publish the sum."""
-        if not len(points.ids):
-            return
         force = self.push(Bodies(self.hub, self.group, points))
         points.force = points.force + force
-        self.publish_components(force.sum(axis=0))
+        self.publish_components(points.total(force))
 
     def now(self, formulas: Sequence[Expression]) -> np.ndarray:
         """The present numbers (d,) of formulas of time, one for each direction."""
