@@ -1,5 +1,6 @@
 """Stability maps: edges found with few runs, and failures that say why."""
 
+import re
 from itertools import product
 
 import numpy as np
@@ -55,7 +56,9 @@ def test_the_courant_limit_of_a_bar_is_found(folder, capsys):
     text = (folder / "map.svg").read_text(encoding="utf-8")
     assert text.startswith("<?xml") and "c dt/h (1)" in text
     out = capsys.readouterr().out
-    assert "of 21 cells were run" in out
+    (runs,) = re.findall(r"(\d+) of 21 cells were run", out)
+    counted = re.findall(r"^run (\d+) of at most 21: ", out, re.M)
+    assert counted == [str(k + 1) for k in range(int(runs))]
     assert "times the program's stable step" in out
 
 

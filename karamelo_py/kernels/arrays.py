@@ -188,6 +188,7 @@ class Hooks(NamedTuple):
     chosen: np.ndarray  # (BLOCK,) int64 scratch
     scratch: np.ndarray  # (8 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack
     held: np.ndarray  # (N, d) HELD, where hooks hold nodes in common; else (0, d)
+    loads: np.ndarray  # (N, d) of this step, where hooks bring forces; else (0, d)
 
 
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch

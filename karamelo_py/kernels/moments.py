@@ -3,7 +3,7 @@
 from karamelo_py.compiler.compile import over_blocks, point_function, shared
 from karamelo_py.kernels.arrays import Hooks
 from karamelo_py.kernels.clock import kick, step_size
-from karamelo_py.kernels.node_hooks import node_hooks
+from karamelo_py.kernels.node_hooks import node_hooks, work_of_loads
 from karamelo_py.kernels.point_hooks import Motion, clear_totals, point_hooks, publish_totals
 from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows
@@ -21,6 +21,16 @@ def _(hooks, stage, target, s):
         stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), clock.kept
     )
     clock.set_low = clock.set_high = 0.0  # of temperatures only
+
+
+@point_function(otherwise=True)
+def add_work(hooks, s):
+    """Add up the work of the loads on nodes."""
+
+
+@add_work.on(Hooks)
+def _(hooks, s):
+    work_of_loads(s.kin, s.nodes, s.spans, hooks, s.control, kick(s))
 
 
 @shared

@@ -28,7 +28,7 @@ from karamelo_py.kernels.hooks import (
     evaluate,
     publish_total,
 )
-from karamelo_py.kernels.totals import WORK, add_many, add_to, counts, number_of_all
+from karamelo_py.kernels.totals import WORK, add_many, add_to, carry, counts, number_of_all
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension
@@ -130,11 +130,11 @@ def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, shar
                 total += kept * mass * (old - v) / dt
                 if star == hooks.scratch[VALUE, q]:
                     before = _taken_over(hooks, control, h, n, c, total)
-            # Impulse times the mean of the velocities before and after it.
             if target == ON_SUMS:
-                work = dt * (force - old_force) * (v + 0.5 * dt * (force + old_force) / mass)
+                hooks.loads[n, c] += force - old_force  # see work_of_loads
                 nodes.sums[n, of_force(kin) + c] = force
             elif target == ON_UPDATE:
+                # Impulse times the mean of the velocities before and after it.
                 work = 0.5 * mass * (star - old_star + kept * (old - v)) * (v + star)
                 clock = control.clock[0]
                 clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
@@ -255,3 +255,32 @@ def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept
             _go_through(RUB, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, 1.0)
         if rubs or (hooks.table[h].holds and hooks.held.size > 0):
             publish_total(hooks, h, control)
+
+
+@entered
+def work_of_loads(kin, nodes, spans, hooks, control, dt):
+    """Add up what the loads on nodes have done, and forget them; v* is that of the points now.
+
+    Force times the mean of the velocities before and after the step: what stress and those who hold
+    a node do to it in the same step counts, or the work would be of first order.
+    """
+    if hooks.loads.size == 0:
+        return
+    dt, count = float(dt), 0
+    for s in range(1, 1 + spans[0, 0]):
+        for n in range(spans[s, 0], spans[s, 1]):
+            for c in range(dimension(kin)):
+                load = hooks.loads[n, c]
+                if load == 0:
+                    continue
+                hooks.loads[n, c] = 0
+                if not counts(control.ranks, n):
+                    continue
+                change = nodes.update[n, of_change(kin) + c]
+                hooks.scratch[VALUE, count] = dt * load * (nodes.update[n, c] - 0.5 * change)
+                count += 1
+                if count == BLOCK:
+                    add_many(control.totals, WORK, hooks.scratch[VALUE], count)
+                    count = 0
+    add_many(control.totals, WORK, hooks.scratch[VALUE], count)
+    carry(control.totals[WORK])

@@ -25,6 +25,7 @@ from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.g2p import AverageStress, Move, SeriesTerm, TrialStrain
 from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.moments import add_work
 from karamelo_py.kernels.nodes import (
     ClearRubbed,
     ExtendSeries,
@@ -200,6 +201,7 @@ CONTACT = _call(
     lambda s, mode, hooks: touch(s.contact, s),
     lambda s: "contact of v*" if touch.defined(type(s.contact)) else None,
 )
+WORK_OF_LOADS = _call(lambda s, mode, hooks: add_work(hooks, s), lambda s: None)
 CONTACT_BEFORE = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 0), lambda s: None)
 CONTACT_AFTER = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 1), lambda s: None)
 AXIS = _call(
@@ -226,6 +228,7 @@ ACCELERATE = (
     table.Nodes(Update()),
     table.AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE),
     CONTACT,
+    WORK_OF_LOADS,
 )
 MOVE = (
     table.Gather(Move()),

@@ -6,7 +6,14 @@ import numpy as np
 
 from karamelo_py.compiler.addresses import address_of
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
-from karamelo_py.kernels.arrays import HELD, HOOK, PROGRAM, Hooks, NoHooks
+from karamelo_py.kernels.arrays import (
+    HELD,
+    HOOK,
+    POST_PARTICLES_TO_GRID,
+    PROGRAM,
+    Hooks,
+    NoHooks,
+)
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import told
@@ -39,6 +46,7 @@ def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
         chosen=np.zeros(BLOCK, np.int64),
         scratch=np.zeros((STACK + ROWS, BLOCK)),
         held=np.zeros((builder.shared_nodes(), dimension), HELD).view(np.recarray),
+        loads=np.zeros((builder.loaded_nodes, dimension)),
     )
 
 
@@ -55,6 +63,7 @@ class _Builder:
         self.code: list[np.ndarray] = []
         self.constants: list[np.ndarray] = []
         self.holding: list[Any] = []
+        self.loaded_nodes = 0  # the number of nodes, where hooks bring forces
 
     def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
         """Add one compiled hook of a fix, which acts at `moment` of a step."""
@@ -81,6 +90,8 @@ class _Builder:
         self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
         if hook.holds and hook.on_nodes:
             self.holding.append(fix)
+        if STAGES[moment] == POST_PARTICLES_TO_GRID:
+            self.loaded_nodes = fix.group.total()
 
     def shared_nodes(self) -> int:
         """The number of nodes, where hooks hold some of them in common; else 0."""

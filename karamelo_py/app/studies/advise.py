@@ -196,7 +196,10 @@ def run(options: Any) -> int:
         raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
     combined = cases(others, together, options.where) if others else [{}]
     choices = [Choice(case) for case in combined]
-    study = Study(launch, out.with_suffix(""), items, jobs, again=options.again, strict=True)
+    study = Study(
+        launch, out.with_suffix(""), items, jobs, again=options.again, strict=True,
+        most=len(choices) * len(values[name]),
+    )  # fmt: skip
     study.names = list(values)
     records.describe(
         out, script=str(options.script), variables=values, record=[items[0].text], timed=timed,

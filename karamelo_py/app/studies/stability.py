@@ -5,7 +5,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import ceil, isclose, isfinite, nan
+from math import ceil, isclose, isfinite, nan, prod
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +33,9 @@ from karamelo_py.script.terms import number_of
 DESCRIPTION = """\
 Maps where a script is stable over one or two of its variables: stable, growing (its energy exceeds
 a bound), or failed, with the reason. A mistake of the script ends the study. Edges are searched by
-halves: cells between like ones are not run. The table is written beside the picture (map.csv), and
-says which cells were run; -var with one value is passed on.
+halves, from coarse to fine: cells between like ones are not run, and "run 7 of at most 400" is one
+of about 100. The table is written beside the picture (map.csv), and says which cells were run; -var
+with one value is passed on.
 
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
 
@@ -90,7 +91,10 @@ def run(options: Any) -> int:
     words = along(options, axes[0], axes[1] if len(axes) > 1 else "")
     table = out.with_suffix(".csv")
     items = [records.Recorded(f"max:{energy}")]
-    study = Study(launch, out.with_suffix(""), items, jobs, again=options.again, strict=True)
+    cells = prod(len(values[name]) for name in axes)
+    study = Study(
+        launch, out.with_suffix(""), items, jobs, again=options.again, strict=True, most=cells
+    )
     records.describe(
         table, script=str(options.script), variables=values, energy=energy, bound=options.bound,
         threads=launch.threads, jobs=jobs,

@@ -41,6 +41,8 @@ class Study:
         Heads the table on the terminal.
     strict
         Whether a variant that is refused ends the study.
+    most
+        How many cases there can be, of a study that asks for them by and by; 0: `run` gets all.
 
     Attributes
     ----------
@@ -62,6 +64,7 @@ class Study:
         again: bool = False,
         title: str = "",
         strict: bool = False,
+        most: int = 0,
     ):
         self.launch = launch
         self.folder = folder
@@ -70,9 +73,11 @@ class Study:
         self.again = again
         self.title = title
         self.strict = strict
+        self.most = most
         self.rows: dict[tuple[str, ...], dict[str, Any]] = {}
         self.names: list[str] = []
         self.ran = 0
+        self.begun = time.perf_counter()
         self.on_row: Callable[[], None] = lambda: None
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[dict[str, Any]]:
@@ -159,7 +164,6 @@ class _Display:
         self.names = study.names
         self.count = count
         self.finished = 0
-        self.begun = time.perf_counter()
         self.started: dict[tuple[str, ...], float] = {}
         self.live: Any = None
 
@@ -185,7 +189,9 @@ class _Display:
             numbers = [f"{i.word} {shown(found[i.word])}" for i in self.study.items]
             end = found["status"] + (f": {found['reason']}" if found["reason"] else "")
             line = ", ".join([said, *numbers, f"{shown(found['seconds'])} s", end])
-            print(f"{self.finished}/{self.count}  {line}", flush=True)
+            done, of = self.progress
+            number = f"run {done} of at most {of}:" if self.study.most else f"{done}/{of} "
+            print(f"{number} {line}", flush=True)
 
     def tick(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> None:
         if self.live is None:
@@ -205,18 +211,23 @@ class _Display:
             rows[-room:], self.names, self.study.items, self.study.title,
             self.live.console.width, waiting,
         )  # fmt: skip
-        left = self.left(queue, running)
+        # Nobody knows how many more a study by and by asks for.
+        left = None if self.study.most else self.left(queue, running)
         line = Table.grid(padding=(0, 1))
-        said = f"{self.finished} of {self.count} runs, {duration(self.elapsed)}"
+        done, of = self.progress
+        said = f"{done} of {'at most ' if self.study.most else ''}{of} runs"
+        said += f", {duration(time.perf_counter() - self.study.begun)}"
         line.add_row(
-            ProgressBar(total=self.count, completed=self.finished, width=30),
+            ProgressBar(total=of, completed=done, width=30),
             Text(said + (f", about {duration(left)} left" if left is not None else "")),
         )
         self.live.update(Group(table, line))
 
     @property
-    def elapsed(self) -> float:
-        return time.perf_counter() - self.begun
+    def progress(self) -> tuple[int, int]:
+        """How many runs there were, and of how many."""
+        most = self.study.most
+        return (self.study.ran, most) if most else (self.finished, self.count)
 
     def left(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> float | None:
         """Seconds that remain, from the times of finished runs and how they grow with variables."""
