@@ -154,12 +154,13 @@ def test_nobody_has_the_whole(tmp_path):
     lines = (
         "compute(p, linear_momentum, all)", "compute(m, max_position, all)",
         "compute(e, error, all, ux, 0.1*time)", "compute(at, probe, all, s11, x=0.4)",
+        "group(n, nodes, region, box, all)", "compute(c, center_of_mass, n)",
         "fix(f, force_particles, all, 3, sin(9*x0))", "fix(a, edge_pressure, all, box, 2)",
         "fix(s, python, all, shoves.sway_alone, final_integrate)",
         "dump(p, all, pyplot, 10, p.*.png, 3, 3, vx)", "dump(v, all, vtk, 10, v.*.vtu, seq)",
         "dump(g, all, grid, 10, g.*.txt, vx, mass, vol)",
     )  # fmt: skip
-    log = "log_modify(custom, step, E, p_x, m_x, e, at, f_y, a_x, s_x)"
+    log = "log_modify(custom, step, E, p_x, m_x, e, at, c_y, f_y, a_x, s_x)"
     path = moving(tmp_path, *lines, *FILES[:3], log, *FILES[-2:], "run(12)", size=0.5)
     folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     status, _, err = by_ranks(tmp_path / "run", path, 2, PYTHONPATH=folders)

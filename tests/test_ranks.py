@@ -124,6 +124,15 @@ def test_pictures(state_interpreted, tmp_path, dimension):
     assert shared(state_interpreted, tmp_path, script, ranks=3)
 
 
+def test_state_of_another_run(state_interpreted, tmp_path):
+    """Each process reads its own share between two runs, and can write it at once."""
+    script = block(2, MOVING[0], *MOVING[3:], "set_output(2)", size=(0.3, 0.2))
+    state_interpreted(script + "run(5)\nwrite_restart(w.h5)\n", boxes=True, out="first")
+    (tmp_path / "w.h5").write_bytes((tmp_path / "first" / "w.h5").read_bytes())
+    again = "read_restart(w.h5)\nwrite_restart(r.h5)\nrun(4)\n"
+    assert shared(state_interpreted, tmp_path, with_files(script + again), ranks=3)
+
+
 COMPUTES = """\
 region(left, block, INF, 0.55, INF, INF)
 group(left, particles, region, left, all)
@@ -133,6 +142,8 @@ compute(V, average_velocity, left)
 compute(s, average_stress, left)
 compute(T, average_temperature, all)
 compute(c, center_of_mass, left)
+group(low, nodes, region, left, all)
+compute(n, center_of_mass, low)
 compute(q, position_quantile, all, 0.37)
 compute(m, max_position, left)
 compute(e, max_plastic_strain, all)
@@ -147,9 +158,9 @@ compute(at, probe, all, vy, x=0.52, y=0.41)
 fix(F, force_particles, left, 3, -1)
 fix(check, check_solution, left, 0.1*time*x0, 0)
 pull = external_force(left, x)
-log_modify(custom, step, P_x, P_drift, L_z, L_drift, V_x, s_11, s_12, T, c_x, c_y, q_x, q_y, m_x, &
-           m_y, e_Epmax, e1, e1_max, e2, e2_history, em, em_history, r, r_curve, rm, p_s11, &
-           p_volume, p3, at, check_s, check_z, pull, xcm(left, y))
+log_modify(custom, step, P_x, P_drift, L_z, L_drift, V_x, s_11, s_12, T, c_x, c_y, n_x, n_y, q_x, &
+           q_y, m_x, m_y, e_Epmax, e1, e1_max, e2, e2_history, em, em_history, r, r_curve, rm, &
+           p_s11, p_volume, p3, at, check_s, check_z, pull, xcm(left, y))
 set_output(3)
 """
 

@@ -281,6 +281,11 @@ class Fields:
         for rows in self._simulation.node_pieces([name for name in names if name in BROUGHT]):
             yield NodeFields(self.hub, rows)
 
+    def mass_at_nodes(self, group: Any) -> np.ndarray:
+        """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
+        self._simulation.show_on_nodes()
+        return self._simulation.mass_at_nodes(group.id)
+
     @property
     def occupied_nodes(self) -> tuple[int, int]:
         """How many nodes have mass, and the last of them."""

@@ -52,6 +52,19 @@ class ByNumber:
         nodes = self.counted()
         return nodes[self.stepped.nodes.sums[nodes, MASS] > 0]
 
+    def mass_at_nodes(self, ID: str) -> np.ndarray:
+        """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
+        nodes = np.intersect1d(
+            self.nodes_with_mass(), self.hub.groups[ID].members, assume_unique=True
+        )
+        x, mass = np.empty((len(nodes), 3)), self.stepped.nodes.sums[nodes, MASS].astype(float)
+        for lattice in self.hub.lattices:
+            rows = slice(
+                *np.searchsorted(nodes, (lattice.first, lattice.first + lattice.node_count))
+            )
+            x[rows] = lattice.positions(nodes[rows])
+        return self.summed(mass[:, None] * np.column_stack([np.ones(len(nodes)), x]))
+
     def occupied_nodes(self) -> tuple[int, int]:
         """How many nodes have mass, and the last of them."""
         there = self.nodes_with_mass()

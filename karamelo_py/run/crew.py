@@ -5,7 +5,8 @@ import signal
 import socket
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from math import inf
 from typing import Any
 
@@ -105,6 +106,15 @@ class Crew:
                 return None
             time.sleep(PAUSE)
         return found
+
+    @contextmanager
+    def joint(self) -> Iterator[None]:
+        """What all do together: where one fails the others would wait for ever."""
+        try:
+            yield
+        except BaseException:
+            self.amid = True
+            raise
 
     def told(self, thing: Any = None) -> Any:
         """What the first says to all."""

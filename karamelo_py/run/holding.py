@@ -231,6 +231,7 @@ class Holding(Leading):
 
     map_to_nodes = by_all(Simulation.map_to_nodes)
     occupied_nodes = by_all(Simulation.occupied_nodes)
+    mass_at_nodes = by_all(Simulation.mass_at_nodes)
 
     def counted(self) -> np.ndarray:
         """The numbers of the nodes in use, of each at one process."""
@@ -245,10 +246,10 @@ class Holding(Leading):
         return stored(self) if self.apart else super().stored()
 
     def take_stored(self, path: Path) -> None:
-        """Take the state that a file holds: each process reads its own share."""
-        if not self._leading:
-            super().take_stored(path)
-            return
+        """Take the state that a file holds: each process reads its own share.
+
+        In a run the first has the others do it; between two runs all come to it.
+        """
         with opened(path) as state:
             take_known(self, state)
             blocks = self.part.setup.blocks
@@ -258,7 +259,11 @@ class Holding(Leading):
             tilings = tilings_of(tiles, len(blocks), state)
             whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
             tiles.share_out(work_of(tiles.loads(whole), self.part.work.costs))
-        self._together("read", path, tiles.owner)
+        if self._leading:
+            self._together("read", path, tiles.owner)
+        else:
+            with self.crew.joint():
+                self.read(path, tiles.owner)
         self._handed_out = self.version
 
     def read(self, path: Path, owner: np.ndarray) -> None:

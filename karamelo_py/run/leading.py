@@ -132,12 +132,8 @@ class Leading(Simulation):
                 if goes_on:
                     self._part_with_whole()
                 return
-            try:
-                with suppress(Abandoned):
-                    getattr(self, what)(*arguments)
-            except BaseException:
-                self.crew.amid = True
-                raise
+            with self.crew.joint(), suppress(Abandoned):
+                getattr(self, what)(*arguments)
 
     def _tell(self, what: str, *arguments: Any) -> None:
         self.crew.told((what, *arguments))

@@ -37,14 +37,8 @@ class CenterOfMass(Compute):
 
     def refresh(self) -> None:
         """Measure and publish."""
-        fields = self.hub.fields
-        if isinstance(self.group, ParticleGroup):
-            total, *moments = fields.added_up(self)
-        else:
-            members = self.group.members
-            mass = fields.node("mass")[members]
-            x = np.column_stack([fields.node(axis)[members] for axis in "xyz"])
-            total, moments = mass.sum(), mass @ x
+        fields, on_points = self.hub.fields, isinstance(self.group, ParticleGroup)
+        total, *moments = fields.added_up(self) if on_points else fields.mass_at_nodes(self.group)
         self.publish_components(np.array(moments) / total if total > 0 else np.zeros(3))
 
     def terms(self, points: Fields) -> list[np.ndarray]:
