@@ -16,6 +16,7 @@ import pytest
 from conftest import INPUTS, ROOT
 from going_on import same_files
 from scenes import block
+from test_ranks import HALVED
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.launch import OPEN_MPI
@@ -170,6 +171,27 @@ def test_nobody_has_the_whole(tmp_path):
     status, _, err = by_ranks(tmp_path / "again", *words, PYTHONPATH=folders)
     assert status == 0, err
     same_files(tmp_path / "run", tmp_path / "again")
+
+
+@needs_mpi
+@pytest.mark.full
+def test_a_step_that_is_halved(tmp_path):
+    """Behind files that hold the state that each process goes back to: other numbers of them."""
+    path = script(tmp_path, "restart(6, r.*.h5)", *HALVED, size=(0.4, 0.3))
+    (tmp_path / "sitecustomize.py").write_text(SMALL_TILES, encoding="utf-8")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    one, two = tmp_path / "1", tmp_path / "2"
+    for folder, ranks in ((one, 1), (two, 2)):
+        assert by_ranks(folder, path, ranks, PYTHONPATH=folders)[0] == 0
+    same_files(one, two)
+    for number, ranks in ((6, 3), (18, 1), (30, 2)):
+        again = tmp_path / f"behind {number}"
+        shutil.copytree(two, again)
+        status, _, err = by_ranks(
+            again, path, ranks, "-restart", f"r.{number}.h5", PYTHONPATH=folders
+        )
+        assert status == 0, err
+        same_files(two, again)
 
 
 # --- one end for all ----------------------------------------------------------------------------

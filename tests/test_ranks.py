@@ -133,6 +133,22 @@ def test_state_of_another_run(state_interpreted, tmp_path):
     assert shared(state_interpreted, tmp_path, with_files(script + again), ranks=3)
 
 
+HALVED = (
+    "fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y0))",
+    "dt_factor(1.9)", "set_output(5)", "log_modify(custom, step, dt, time)",
+    "dump(d, all, particle, 5, d.txt, x, vx)", "run(60, on_trouble=halve)",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["ulmpm", "ulmpm/contacts"])
+def test_a_step_that_is_halved(state_interpreted, tmp_path, method):
+    """Each process goes back to what it kept; files hold it, as those of one process do."""
+    script = block(2, *HALVED, size=(0.3, 0.2)).replace("method(ulmpm,", f"method({method},")
+    assert shared(state_interpreted, tmp_path, with_files(script, "restart(6, r.*.h5)\n"), ranks=3)
+    log = (tmp_path / "parts" / "log.mpm").read_text(encoding="utf-8").split()
+    assert float(log[-2]) < 0.6 * float(log[4])
+
+
 COMPUTES = """\
 region(left, block, INF, 0.55, INF, INF)
 group(left, particles, region, left, all)

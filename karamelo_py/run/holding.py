@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from enum import Enum, auto
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from karamelo_py.run.part import Part
 from karamelo_py.run.shares import joined, sized, work_of
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.state import Stored, check_points, of_nodes, opened, take_known
-from karamelo_py.run.storing import own_share, stored, take_nodes, tilings_of
+from karamelo_py.run.storing import own_share, stored, stored_snapshot, take_nodes, tilings_of
 from karamelo_py.run.tiles import DIRECT_UP_TO, Tiles, in_tiles, numbers
 from karamelo_py.scene.hub import Hub
 
@@ -241,6 +241,26 @@ class Holding(Leading):
         """Own nodes with numbers from `first` to before `end`, for the first those of all."""
         return self.crew.gathered(self.part.node_rows(first, end, self._brought))
 
+    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[Stored]:
+        """What such a file holds of the state that each process has kept."""
+        return stored_snapshot(self)
+
+    def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
+        """Keep the state that a file holds beside the present one; what the first keeps."""
+        with opened(path, "good") as found:
+            owner = self._owner_in(found)
+        return self._together("read_snapshot", path, owner)
+
+    def read_snapshot(self, path: Path, owner: np.ndarray) -> dict[str, np.ndarray]:
+        """Keep the own share of it."""
+        with opened(path, "good") as found:
+            part, names = self.part, ("clock", "work", "values")
+            known = {n: found[n][()] for n in found if n in names or n.startswith("touched/")}
+            part.kept = own_share(part, found, owner) | known | {"owner": owner}
+        if not self.crew.leads:
+            part.kept["work"][:] = 0
+        return part.kept
+
     def stored(self) -> Iterator[Stored]:
         """What a file to go on from holds: not even the first needs the memory of all."""
         return stored(self) if self.apart else super().stored()
@@ -252,19 +272,25 @@ class Holding(Leading):
         """
         with opened(path) as state:
             take_known(self, state)
-            blocks = self.part.setup.blocks
-            for k, block in enumerate(blocks):
+            for k, block in enumerate(self.part.setup.blocks):
                 check_points(block.points, state, f"points/{k}/")
-            tiles = self.part.tiles
-            tilings = tilings_of(tiles, len(blocks), state)
-            whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
-            tiles.share_out(work_of(tiles.loads(whole), self.part.work.costs))
+            owner = self._owner_in(state)
         if self._leading:
-            self._together("read", path, tiles.owner)
+            self._together("read", path, owner)
         else:
             with self.crew.joint():
-                self.read(path, tiles.owner)
+                self.read(path, owner)
         self._handed_out = self.version
+
+    def _owner_in(self, state: Mapping) -> np.ndarray:
+        """Who is to have each tile of the points that a file holds."""
+        tiles, blocks = self.part.tiles, self.part.setup.blocks
+        tilings = tilings_of(tiles, len(blocks), state)
+        whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
+        before = tiles.owner
+        tiles.share_out(work_of(tiles.loads(whole), self.part.work.costs))
+        owner, tiles.owner = tiles.owner, before
+        return owner
 
     def read(self, path: Path, owner: np.ndarray) -> None:
         """Take the own share of the state that a file holds."""
@@ -272,7 +298,7 @@ class Holding(Leading):
         with opened(path) as state:
             part.tiles.owner = owner
             part.tiles.empty_nodes(part.setup)
-            part.put(own_share(part, state))
+            part.put(own_share(part, state, owner))
             reached = zip(*self.crew.everyone(part.tiles.reached), strict=True)
             take_nodes(part, state, part.tiles.spans_of(*map(np.concatenate, reached)))
             self.present[:] = state["present"][()]

@@ -24,7 +24,15 @@ from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.by_id import ById
 from karamelo_py.run.by_number import ByNumber
 from karamelo_py.run.lowering import State, chosen, lower, thread_count, warms_by_friction
-from karamelo_py.run.state import Stored, changing, copied, go_back, opened, stored, take_arrays
+from karamelo_py.run.state import (
+    Stored,
+    copied,
+    go_back,
+    opened,
+    stored,
+    stored_copies,
+    take_arrays,
+)
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.run.trial import try_parts
 from karamelo_py.scene.hub import Hub
@@ -207,7 +215,7 @@ class Lowered(ById, ByNumber):
 
         The copies of the snapshot `before`, which is lost, are used again where they fit.
         """
-        return copied(changing(self), self.control, before or {})
+        return copied(self, before or {})
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot."""
@@ -217,6 +225,15 @@ class Lowered(ById, ByNumber):
     def stored(self) -> Iterator[Stored]:
         """What a file to go on from holds, array by array."""
         return stored(self)
+
+    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[Stored]:
+        """What such a file holds of a snapshot."""
+        return stored_copies(snapshot)
+
+    def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
+        """The snapshot that a file holds."""
+        with opened(path, "good") as found:
+            return {name: array[()] for name, array in found.items()}
 
     def take_stored(self, path: Path) -> None:
         """Take the state that a file to go on from holds."""

@@ -15,7 +15,6 @@ from karamelo_py.run.handing import by_tile, join_tilings, share_of, stripped
 from karamelo_py.run.shares import SharedTiles, nodes_of, occupied, work_of
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.state import (
-    changing,
     copied,
     go_back,
     of_nodes,
@@ -42,6 +41,8 @@ class Part:
         What points and nodes cost here.
     answers
         What kernels ask for.
+    kept
+        Copies of a state that can be returned to.
     """
 
     def __init__(self, crew: Crew, hub: Hub, s: Setup, count: int):
@@ -64,7 +65,7 @@ class Part:
             blocks=tuple(block._replace(tiling=tiles.empty_tiling()) for block in s.blocks),
             nodes=nodes, heat=heat, buffers=buffers, **no_nodes(), control=control,
         )  # fmt: skip
-        self._kept: dict[str, np.ndarray] = {}
+        self.kept: dict[str, np.ndarray] = {}
         self._ordered: list[Ordered] = []  # points by id, while pieces of all are looked at
         self._counted_at = self._learned_at = self.step
 
@@ -155,7 +156,21 @@ class Part:
 
     def give_tiles(self, k: int, first: int, end: int) -> dict[str, Any]:
         """Points of the k-th block in tiles with numbers from `first` to before `end`."""
-        return points_of_tiles(self.setup.blocks[k], first, end)
+        arrays = [array for _, array in arrays_of(self.setup.blocks[k].points)]
+        return points_of_tiles(self.tilings()[k], arrays, first, end)
+
+    def tell_of_kept(self) -> dict:
+        """Tiles and work of the state that was kept, and where contact acted last."""
+        kept, blocks = self.kept, range(len(self.setup.blocks))
+        tilings = [stripped(kept, f"tiling/{k}/") for k in blocks]
+        return {"tiling": tilings, "work": kept["work"], "touched": stripped(kept, "touched/")}
+
+    def give_kept(self, k: int, first: int, end: int) -> dict[str, Any]:
+        """Points that were kept, as `give_tiles` gives those of now."""
+        kept = self.kept
+        names = [name for name, _ in arrays_of(self.setup.blocks[k].points)]
+        arrays = [kept[f"points/{k}/{name}"] for name in names]
+        return points_of_tiles(stripped(kept, f"tiling/{k}/"), arrays, first, end)
 
     def give_rows(self, first: int, end: int, memory: bool) -> tuple:
         """Own nodes from `first` to before `end`: their rows, or what contact remembers of them."""
@@ -237,15 +252,15 @@ class Part:
 
     def keep(self) -> dict[str, np.ndarray]:
         """Copy every array that a step changes."""
-        self._kept = copied(changing(self), self.setup.control, self._kept)
-        self._kept["owner"] = self.tiles.owner
-        return self._kept
+        self.kept = copied(self, self.kept)
+        self.kept["owner"] = self.tiles.owner
+        return self.kept
 
     def go_back(self) -> None:
         """Put back what was kept."""
         self.tiles.empty_nodes(self.setup)
-        self.tiles.owner = self._kept["owner"]
-        go_back(self, self._kept)
+        self.tiles.owner = self.kept["owner"]
+        go_back(self, self.kept)
 
 
 def _from_to(numbers: np.ndarray, first: int, end: int) -> np.ndarray:

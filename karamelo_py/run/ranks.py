@@ -252,12 +252,7 @@ class Ranks(Holding):
     # --- state that can be returned to ------------------------------------------------------------
 
     def snapshot(self, before: Any = None) -> dict[str, np.ndarray]:
-        """Have every process keep its present state; what the first keeps.
-
-        Where a file to go on from has to hold it, that is the whole.
-        """
-        if self.hub.running.halve:
-            return super().snapshot(before)
+        """Have every process keep its present state; what the first keeps."""
         self._see_parts()
         return self._together("keep")
 
@@ -267,9 +262,6 @@ class Ranks(Holding):
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot, all processes together."""
-        if self.hub.running.halve:
-            super().restore(snapshot)
-            return
         self._together("go_back")
         self._held = Held.PARTS
         self.version += 1

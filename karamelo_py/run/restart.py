@@ -19,10 +19,11 @@ from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.run.memory import memory_of, remember, remembered
+from karamelo_py.run.state import Stored
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-FORMAT, VERSION = "karamelo-py restart", 4
+FORMAT, VERSION = "karamelo-py restart", 5
 FLAT = {"track_times": False}
 
 
@@ -104,12 +105,17 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
         root.create_dataset("content", data=text, **FLAT)
         for k, array in enumerate(arrays):
             root.create_dataset(f"memory/{k}", data=array, **FLAT)
-        for name, shape, where, array in hub.simulation.stored():
-            state = root.require_group("state")
-            if name not in state:
-                state.create_dataset(name, shape, array.dtype, **FLAT)
-            if array.size:
-                state[name][where] = array
+        _put(root.create_group("state"), hub.simulation.stored())
+        if hub.running is not None and hub.running.good is not None:
+            _put(root.create_group("good"), hub.simulation.stored_snapshot(hub.running.snapshot))
+
+
+def _put(group: Any, found: Iterator[Stored]) -> None:
+    for name, shape, where, array in found:
+        if name not in group:
+            group.create_dataset(name, shape, array.dtype, **FLAT)
+        if array.size:
+            group[name][where] = array
 
 
 def is_restart(path: Path) -> bool:
@@ -212,6 +218,7 @@ class Restart:
         with h5py.File(self.path, "r", locking=False) as root:
             arrays = root.get("memory", ())
             arrays = [arrays[str(k)][()] for k in range(len(arrays))]
+            good = "good" in root
         for name, value in self.content["values"].items():
             if name in hub.values:
                 hub.values.set(name, value)
@@ -222,6 +229,8 @@ class Restart:
                 remember(part, kept[key], arrays)
                 if hasattr(part, "resumed"):
                     part.resumed()
+        if good and hub.running is not None and hub.running.halve:
+            hub.running.snapshot = simulation.take_snapshot(self.path)
 
 
 Memories = tuple[list, list[np.ndarray]]

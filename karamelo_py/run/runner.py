@@ -109,14 +109,14 @@ class Runner:
         self.hub.runs.append(after)
 
     @property
-    def good(self) -> tuple[int, dict[str, np.ndarray], restart.Memories] | None:
-        """The last good state, for files: a run that goes on from one may go back to it."""
-        return (self.kept, self.snapshot, self.memories) if self.halve else None
+    def good(self) -> tuple[int, restart.Memories] | None:
+        """The last good state, for files that hold its snapshot, too: a run may go back to it."""
+        return (self.kept, self.memories) if self.halve and self.snapshot else None
 
     @good.setter
-    def good(self, state: tuple[int, dict[str, np.ndarray], restart.Memories] | None) -> None:
-        if state is not None and state[1]:
-            self.kept, self.snapshot, self.memories = state
+    def good(self, state: tuple[int, restart.Memories] | None) -> None:
+        if state is not None:
+            self.kept, self.memories = state
 
     def _keep(self, simulation: Simulation) -> None:
         self.snapshot, self.kept = simulation.snapshot(self.snapshot), simulation.step

@@ -1,6 +1,6 @@
 """All arrays of a simulation that a step changes, by name: to return to, to write, to read."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.fields import name_of
-from karamelo_py.kernels.arrays import TIMESTEP, Block, Control, Nodes, Points, Tiling, arrays_of
+from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.run.tiles import in_use, numbers, used
 from karamelo_py.script.errors import ScriptError
@@ -32,33 +32,41 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
         for name, array in arrays_of(block.points):
             # The other places are those of the step before, and of none that went wrong.
             yield f"points/{k}/{name}", array[now] if name == "x" else array
-    for k, rows in enumerate(remembered_at(simulation, used(s.spans)[1:])):
-        yield f"contact/{k}", rows
 
 
-def copied(
-    arrays: Iterable[tuple[str, np.ndarray]], control: Control, before: dict[str, np.ndarray]
-) -> dict[str, np.ndarray]:
-    """Copies of arrays and of the published values; those `before`, which are lost, are used again.
+def copied(simulation: Any, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Copies of all that `changing` has, of the published values, and where contact acted last.
 
-    One array after another: where points have come or gone none is there twice.
+    Those `before`, which are lost, are used again. One array after another: where points have come
+    or gone none is there twice.
     """
     found = {}
-    for name, array in (*arrays, ("values", control.values)):
+    for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
             del copy
             copy = np.empty_like(array)
         copy[...] = array
         found[name] = copy
-    return found
+    return found | touched(simulation)
+
+
+def touched(simulation: Any) -> dict[str, np.ndarray]:
+    """The nodes in use where contact acted in the last step, and what it remembers of them."""
+    spans = simulation.setup.spans
+    memory = remembered_at(simulation, used(spans)[1:])
+    if not memory:
+        return {}
+    rows = latest(np.concatenate(memory), simulation.step)
+    there = np.flatnonzero(rows.any(axis=1))
+    return {"touched/nodes": numbers(spans)[there], "touched/rows": rows[there]}
 
 
 def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
     """Views and copies of them, and of what else a file holds; of nodes, the rows in use."""
     s = simulation.setup
     carry(s.control.totals[WORK])  # so that a sum is always the same digits
-    found = {name: a for name, a in changing(simulation) if not name.startswith("contact/")}
+    found = dict(changing(simulation))
     found["clock"] = s.control.clock.view(np.ndarray)
     found |= {f"points/{k}/x": block.points.x for k, block in enumerate(s.blocks)}
     if memory := remembered_at(simulation, used(s.spans)[1:]):
@@ -82,18 +90,30 @@ def latest(memory: np.ndarray, step: int) -> np.ndarray:
 
 def stored(simulation: Any) -> Iterator[Stored]:
     """What a file to go on from holds, array by array."""
-    for name, array in arrays_by_name(simulation).items():
+    yield from wholes(arrays_by_name(simulation))
+
+
+def stored_copies(kept: dict[str, np.ndarray]) -> Iterator[Stored]:
+    """What a file holds of what `copied` has given."""
+    work = kept["work"].copy()
+    carry(work)
+    yield from wholes(kept | {"clock": kept["clock"].view(np.ndarray), "work": work})
+
+
+def wholes(arrays: Mapping[str, np.ndarray]) -> Iterator[Stored]:
+    """Arrays that are written at once."""
+    for name, array in arrays.items():
         yield name, array.shape, ..., array
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[dict[str, Any]]:
+def opened(path: Path, group: str = "state") -> Iterator[dict[str, Any]]:
     """The arrays in a file to go on from, by name; they are read when they are looked at."""
     import h5py
 
     with h5py.File(path, "r", locking=False) as root:
         found: dict[str, Any] = {}
-        root["state"].visititems(
+        root[group].visititems(
             lambda name, item: found.update({name: item}) if hasattr(item, "shape") else None
         )
         yield found
@@ -146,7 +166,6 @@ def go_back(simulation: Any, kept: Mapping[str, np.ndarray]) -> None:
     """Put a simulation into the state of which `changing` has given all arrays, and its values."""
     s = simulation.setup
     # Nodes that were not in use then have to be empty, as they were.
-    spans = used(s.spans)[1:].copy()
     simulation.tiles.empty_nodes(s)
     blocks = []
     for k, block in enumerate(s.blocks):
@@ -163,10 +182,10 @@ def go_back(simulation: Any, kept: Mapping[str, np.ndarray]) -> None:
         array[...] = kept[name]
     for block in s.blocks:
         block.points.x[:] = block.points.x[s.control.clock[0].now]
-    values = s.control.values
-    values[:] = kept["values"]
-    for marks in remembered_at(simulation, spans):
-        marks[np.abs(marks) > values[TIMESTEP]] = 0
+    s.control.values[:] = kept["values"]
+    for marks in remembered_at(simulation, np.array([[0, simulation.hub.fields.node_count]])):
+        marks[marks != 0] = 0
+        marks[kept["touched/nodes"]] = kept["touched/rows"]
 
 
 def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:

@@ -6,68 +6,80 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import Block, Tiling, arrays_of
+from karamelo_py.kernels.arrays import Tiling, arrays_of
 from karamelo_py.kernels.totals import carry
 from karamelo_py.output.fields import PIECE
 from karamelo_py.run.handing import by_tile, join_tilings, share_of_tiling
 from karamelo_py.run.shares import SharedTiles
-from karamelo_py.run.state import Stored, known, latest, of_nodes, take_tiling
+from karamelo_py.run.state import Stored, known, latest, of_nodes, take_tiling, wholes
 from karamelo_py.run.tiles import SHARES, between, in_use, numbers
 
 
-def points_of_tiles(block: Block, first: int, end: int) -> dict[str, Any]:
+def points_of_tiles(
+    tiling: dict[str, np.ndarray], arrays: list[np.ndarray], first: int, end: int
+) -> dict[str, Any]:
     """Own points in tiles with numbers from `first` to before `end`, and how they lie in them."""
-    tiling = block.tiling
-    own = slice(*np.searchsorted(tiling.number[: tiling.count[0]], (first, end)))
-    ranges = tiling.range[own]
+    own = slice(*np.searchsorted(tiling["number"], (first, end)))
+    ranges = tiling["range"][own]
     points = slice(ranges[0, 0], ranges[-1, 1]) if len(ranges) else slice(0, 0)
     return {
-        "number": tiling.number[own], "range": ranges, "count": [len(ranges)],
-        "points": [array[..., points] for _, array in arrays_of(block.points)],
+        "number": tiling["number"][own], "range": ranges, "count": [len(ranges)],
+        "points": [array[..., points] for array in arrays],
     }  # fmt: skip
 
 
 def stored(ranks: Any) -> Iterator[Stored]:
     """The arrays of `state.arrays_by_name`, with the same bits, in the same order."""
     parts = ranks.together("tell_of_tiles")
-    tilings = [ranks.tiles.empty_tiling() for _ in ranks.blocks]
-    for k, tiling in enumerate(tilings):
-        tiling.count[1] = 1 if ranks.tiles.direct else SHARES
-        join_tilings(tiling, [part["tiling"][k] for part in parts])
-        for name, rows in in_use(tiling):
-            yield _whole(f"tiling/{k}/{name}", getattr(tiling, name)[:rows])
-    yield _whole("clock", ranks.control.clock.view(np.ndarray))
-    work = sum(part["work"] for part in parts)
-    carry(work)
-    yield _whole("work", work)
-    for k, tiling in enumerate(tilings):
-        yield from _points(ranks, k, tiling)
+    yield from _in_tiles(ranks, parts, ranks.control.clock, "give_tiles")
     reached = zip(*(part["reached"] for part in parts), strict=True)
     spans = ranks.tiles.spans_of(*map(np.concatenate, reached))
     if memory := ranks.part.memory():
         yield from _nodes(ranks, spans, {"contact": memory[0]})
-    yield from (_whole(name, array) for name, array in known(ranks).items())
+    yield from wholes(known(ranks))
     yield from _nodes(ranks, spans, dict(of_nodes(ranks.part.setup)))
 
 
-def _whole(name: str, array: np.ndarray) -> Stored:
-    return name, array.shape, ..., array
+def stored_snapshot(ranks: Any) -> Iterator[Stored]:
+    """The arrays of `state.stored_copies`, likewise."""
+    parts, own = ranks.together("tell_of_kept"), ranks.part.kept
+    yield from _in_tiles(ranks, parts, own["clock"], "give_kept")
+    yield from wholes({"values": own["values"]})
+    if touched := [part["touched"] for part in parts if part["touched"]]:
+        nodes, first = np.unique(np.concatenate([of["nodes"] for of in touched]), True)
+        rows = np.concatenate([of["rows"] for of in touched])[first]
+        yield from wholes({"touched/nodes": nodes, "touched/rows": rows})
 
 
-def _points(ranks: Any, k: int, tiling: Tiling) -> Iterator[Stored]:
+def _in_tiles(ranks: Any, parts: list[dict], clock: np.ndarray, give: str) -> Iterator[Stored]:
+    """Tiles, clock and work, and the points, which the parts `give` tile after tile."""
+    tilings = [ranks.tiles.empty_tiling() for _ in ranks.blocks]
+    for k, tiling in enumerate(tilings):
+        tiling.count[1] = 1 if ranks.tiles.direct else SHARES
+        join_tilings(tiling, [part["tiling"][k] for part in parts])
+        rows = {f"tiling/{k}/{name}": getattr(tiling, name)[:n] for name, n in in_use(tiling)}
+        yield from wholes(rows)
+    work = sum(part["work"] for part in parts)
+    carry(work)
+    yield from wholes({"clock": clock.view(np.ndarray), "work": work})
+    for k, tiling in enumerate(tilings):
+        yield from _points(ranks, k, tiling, give)
+
+
+def _points(ranks: Any, k: int, tiling: Tiling, give: str) -> Iterator[Stored]:
     """The points of a block, tile after tile."""
     number, ends = (array[: tiling.count[0]] for array in (tiling.number, tiling.range[:, 1]))
     total = int(ends[-1]) if len(ends) else 0
-    likes = [(name, array) for name, array in arrays_of(ranks.part.setup.blocks[k].points)]
+    names = [name for name, _ in arrays_of(ranks.part.setup.blocks[k].points)]
     begin = 0
     for first, end in _cuts(ends):
         limits = (int(number[first]), int(number[end - 1]) + 1) if total else (0, 0)
-        found = ranks.together("give_tiles", k, *limits)
+        found = ranks.together(give, k, *limits)
         order = by_tile(found)
-        for (name, like), *same in zip(likes, *(part["points"] for part in found), strict=True):
+        for name, *same in zip(names, *(part["points"] for part in found), strict=True):
             array = np.take(np.concatenate(same, axis=-1), order, axis=-1)
             where = ..., slice(begin, begin + len(order))
-            yield f"points/{k}/{name}", (*like.shape[:-1], total), where, array
+            yield f"points/{k}/{name}", (*array.shape[:-1], total), where, array
         begin += len(order)
 
 
@@ -110,10 +122,10 @@ def tilings_of(tiles: SharedTiles, blocks: int, state: Mapping) -> list[Tiling]:
     return [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(blocks)]
 
 
-def own_share(part: Any, state: Mapping) -> dict[str, np.ndarray]:
-    """Points and tiles of a part, in the tiles that it owns."""
+def own_share(part: Any, state: Mapping, owner: np.ndarray) -> dict[str, np.ndarray]:
+    """Points and tiles of a part, which are its own by the `owner` of each tile."""
     blocks, found = part.setup.blocks, {}
-    own = part.tiles.owner == part.crew.rank
+    own = owner == part.crew.rank
     for k, tiling in enumerate(tilings_of(part.tiles, len(blocks), state)):
         points, tiles = share_of_tiling(k, tiling, own)
         names = [f"points/{k}/{name}" for name, _ in arrays_of(blocks[k].points)]
