@@ -26,6 +26,7 @@ from karamelo_py.run.by_number import ByNumber
 from karamelo_py.run.lowering import State, chosen, lower, thread_count, warms_by_friction
 from karamelo_py.run.state import (
     Stored,
+    changing,
     copied,
     go_back,
     opened,
@@ -233,7 +234,9 @@ class Lowered(ById, ByNumber):
     def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
         """The snapshot that a file holds."""
         with opened(path, "good") as found:
-            return {name: array[()] for name, array in found.items()}
+            # In the order in which copies are made, and written.
+            names = dict.fromkeys([*(name for name, _ in changing(self)), "values", *found])
+            return {name: found[name][()] for name in names}
 
     def take_stored(self, path: Path) -> None:
         """Take the state that a file to go on from holds."""
