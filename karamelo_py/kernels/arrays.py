@@ -181,7 +181,7 @@ class Hooks(NamedTuple):
     evaluate: int  # address of the evaluator of formulas
     table: np.ndarray  # (k,) HOOK
     programs: np.ndarray  # (k, 4) PROGRAM, for each component, and friction at a wall
-    members: np.ndarray  # int64: node numbers, or a 1 for each point that is a member
+    members: np.ndarray  # int64: node numbers, or 64 bits for points, 1 for members
     code: np.ndarray  # (c, 2) int64: the programs of the formulas, one after another
     constants: np.ndarray  # (m,) float64
     x0: np.ndarray  # (n, d) reference positions of the points, by id

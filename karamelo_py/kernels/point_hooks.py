@@ -139,7 +139,7 @@ def _choose_points(what, ids, hooks, h, p):
     where = hooks.scratch
     count = 0
     while p < ids.size and count < BLOCK:
-        if begin < 0 or hooks.members[begin + ids[p]] != 0:
+        if begin < 0 or hooks.members[begin + (ids[p] >> 6)] >> (ids[p] & 63) & 1 != 0:
             hooks.chosen[count] = p
             if hooks.table[h].uses_place:
                 for c in range(directions(hooks)):

@@ -123,9 +123,7 @@ class ById:
         """(N,) whether points are of a group, by id; None where it has all."""
         if group is None or group.all:
             return None
-        among = np.zeros(self.count, np.bool_)
-        among[group.ids] = True
-        return among
+        return group.among(self.count)
 
     def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
         """The points of a group that are at hand, so many at a time: a block, and rows of it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -86,7 +86,7 @@ class ParticleGroup(Group):
 
     kind = "particles"
     script_kind = "a group of points, or all"
-    _members = np.empty(0, dtype=np.int64)
+    _bits = np.empty(0, np.uint8)  # one for each point that there was when members were added
 
     @property
     def ids(self) -> np.ndarray:
@@ -99,25 +99,37 @@ class ParticleGroup(Group):
 
     def chosen(self) -> np.ndarray:
         """See `Group.chosen`."""
-        return self._members
+        return np.flatnonzero(np.unpackbits(self._bits))
+
+    def among(self, count: int) -> np.ndarray:
+        """(count,) whether the points with the first so many numbers are members."""
+        found = np.full(count, self.all)
+        if not self.all:
+            own = np.unpackbits(self._bits)[:count]
+            found[: len(own)] = own
+        return found
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
         """See `Group.add`."""
-        found = self.find(region, solids)
-        self._members = united(self._members, found)
-        return len(found)
+        members, count = self.among(self.total()), 0
+        for found in self._pieces(region, solids):
+            members[found] = True
+            count += len(found)
+        self._bits = np.packbits(members)
+        return count
 
     def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
         """Points of `solids` whose reference position lies in `region`."""
-        found = [np.empty(0, dtype=np.int64)]
+        return np.concatenate([np.empty(0, np.int64), *self._pieces(region, solids)])
+
+    def _pieces(self, region: Region, solids: Sequence[Solid] | None) -> Iterator[np.ndarray]:
         if region.unknown:
-            return found[0]
+            return
         if solids is None:
             solids = tuple(self.hub.solids.values())
         for solid in sorted(set(solids), key=lambda solid: solid.first_id):
             for start, x in solid.pieces():
-                found.append(np.flatnonzero(region.inside(x)) + (solid.first_id + start))
-        return np.concatenate(found)
+                yield np.flatnonzero(region.inside(x)) + (solid.first_id + start)
 
 
 def united(a: np.ndarray, b: np.ndarray) -> np.ndarray:

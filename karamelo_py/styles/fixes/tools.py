@@ -125,6 +125,11 @@ class SolidPoints(ParticleGroup):
         """See `Group.chosen`."""
         return np.arange(self.solid.first_id, self.solid.first_id + self.solid.count)
 
+    def among(self, count: int) -> np.ndarray:
+        """See `ParticleGroup.among`."""
+        numbers = np.arange(count) - self.solid.first_id
+        return (numbers >= 0) & (numbers < self.solid.count)
+
 
 def place(hub: Hub, x: Expression, y: Expression, z: Expression, name: str = "") -> tuple:
     """The formulas of a vector for the directions of the domain; further ones have to be 0."""
