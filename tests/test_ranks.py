@@ -213,6 +213,14 @@ def test_a_bar_is_cut_in_its_length():
     assert set(places[part == 0, 2]) == {0.0} and set(places[part == 1, 2]) == {128.0}
 
 
+@pytest.mark.parametrize(("length", "across"), [(6, 0), (12, 0), (36, 2)])
+def test_rows_of_nodes_are_cut_in_long_bars_only(length, across):
+    """Cubes, and bars twice as long in the last direction, are cut across the first."""
+    places = np.argwhere(np.ones((6, 6, length), bool)) * 8.0
+    part = bisected(places, np.ones(len(places), np.int64), 2, rows=4)
+    assert places[part == 0, across].max() < places[part == 1, across].min()
+
+
 def hub_in_tiles(monkeypatch, *lines: str) -> Hub:
     """A scene in 1D in tiles of 4 cells, sorted."""
     monkeypatch.setattr(tiles, "TILES", {1: 4})

@@ -11,6 +11,7 @@ import pytest
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.sizes import nodes_in_use
+from karamelo_py.run.tiles import SHARES
 from karamelo_py.scene.hub import Hub
 
 # Two bodies that pass each other, at 0.7 of a cell a step and more: sorted at every other one.
@@ -123,3 +124,31 @@ def test_few_nodes_are_visited_in_vain():
     far = sorted_scene(side=40)
     assert nodes_in_use(far.setup) < 1.05 * used
     assert far.tiles.occupied <= 1.5 * simulation.tiles.occupied
+
+
+BAR = """
+method(ulmpm, FLIP, linear, 1)
+dimension(3, 0, 1, 0, 1, 0, 20, 0.1)
+region(bar, block, 0.2, 0.8, 0.2, 0.8, 1, 19)
+material(rubber, linear, 1000, 1e6, 0.3)
+solid(bar, region, bar, 1, rubber, 0.1, 0)
+"""
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_memory_of_nodes_is_gone_through_without_gaps(threads):
+    """A bar of 180 cells in tiles of 128: its rows of nodes are whole, and one thread takes them
+    all in the order of their numbers.
+    """
+    hub = Hub(Console(quiet=True))
+    hub.settings.threads = threads
+    hub.interpreter = Interpreter(hub)
+    hub.interpreter.run_text(BAR)
+    simulation = hub.simulation
+    simulation.begin(inf)
+    simulation.sort()
+    ranges = simulation.setup.ranges
+    rows = np.concatenate([ranges[begin:end] for begin, end in ranges[:SHARES]])
+    assert (rows[:, 1] - rows[:, 0]).min() > 180
+    assert (rows[:, 1] - rows[:, 0]).sum() == nodes_in_use(simulation.setup)
+    assert threads > 1 or (np.diff(rows[:, 0]) > 0).all()

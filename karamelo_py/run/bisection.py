@@ -3,7 +3,7 @@
 import numpy as np
 
 
-def bisected(places: np.ndarray, work: np.ndarray, parts: int) -> np.ndarray:
+def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) -> np.ndarray:
     """The part that each tile belongs to: halves across the longest direction, and halves of these.
 
     After Berger, M. J. and Bokhari, S. H. (1987), "A partitioning strategy for nonuniform problems
@@ -16,7 +16,11 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int) -> np.ndarray:
         (T, d) lower corners of the tiles.
     work
         (T,) in whole numbers; tiles without work fill the parts, wherever they lie.
+    rows
+        How many times as long as the others the last direction is to be where it is cut.
     """
+    d = places.shape[1]
+    least = np.append(np.ones(d - 1), rows)
     part = np.zeros(len(work), np.int64)
     left = [(np.arange(len(work)), 0, parts)]
     while left:
@@ -25,7 +29,9 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int) -> np.ndarray:
             part[tiles] = first
             continue
         busy = places[tiles[work[tiles] > 0]]
-        long = np.argsort(np.ptp(busy, axis=0)) if len(busy) else range(places.shape[1])
+        lengths = np.ptp(busy, axis=0) if len(busy) else np.ones(d)
+        # The longest last; of equal ones that whose neighbours are furthest apart in memory.
+        long = np.argsort(-lengths / least, kind="stable")[::-1]
         tiles = tiles[np.lexsort([places[tiles, k] for k in long])]
         ends = np.cumsum(work[tiles])
         half = count // 2

@@ -77,7 +77,7 @@ class Lowered(ById, ByNumber):
         self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
         if state is not None:
             self.present[: state.count] = state.present
-        self.threads = thread_count(hub, self.count)
+        self.threads = self.tiles.threads = thread_count(hub, self.count)
         self._team = new_team(self.threads)
         self.mode = Threaded(self._team.ctypes.data) if self.threads > 1 else Serial()
         self.version = 0  # grows when fields change without a step

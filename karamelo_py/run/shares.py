@@ -31,6 +31,9 @@ from karamelo_py.run.tiles import (
 from karamelo_py.scene.lattice import Lattice
 
 IMBALANCE = 1.1  # largest share of the work over that after a new cut: above it tiles are cut anew
+# Times longer than across, from which on bodies are cut along long tiles: to go through rows of
+# nodes with gaps between them takes twice as long, and longer than to pass on more nodes.
+ROWS = 4
 FINE = 1000  # parts of the unit of costs, in which work is added up as whole numbers
 
 
@@ -95,7 +98,8 @@ class SharedTiles(Tiles):
     def share_out(self, work: np.ndarray) -> None:
         """Cut the tiles into parts of nearly as much work each."""
         if not self.direct:
-            self.owner = bisected(self._places, work, self.crew.size)
+            rows = ROWS if self.long else 1
+            self.owner = bisected(self._places, work, self.crew.size, rows)
 
     def balance(self, work: np.ndarray) -> bool:
         """Cut the tiles anew where that is worth it; `work` (tiles,) is of the own points."""

@@ -76,13 +76,18 @@ class Tiles:
         Whether points give straight to the nodes, tile after tile: scenes of few points.
     sorts
         How often points were sorted.
+    threads
+        How many sum at nodes.
     """
+
+    threads = 1
 
     def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int, sparse: bool):
         self.direct = points <= DIRECT_UP_TO
         self.dimension = d = lattices[0].dimension
         self.size, self.node_size = np.full(d, TILES[d]), np.full(d, NODES[d])
-        if sparse and d == 3:
+        self.long = sparse and d == 3
+        if self.long:
             self.size[-1] *= LONGER
             self.node_size[:] = 1, 1, self.size[-1]
         self.per_cell = type(basis).nodes_per_cell
@@ -275,9 +280,11 @@ class Tiles:
         order = np.lexsort((boxes.order[reached.box], -reached.size, reached.tile))
         shares = self._shares(s)
         own = order[reached.box[order] < len(shares)][::-1]  # the largest last
+        beside = self._beside(reached.tile, boxes.grid[reached.box])
         owner = np.zeros(self._first_of_nodes[-1], np.int64)
-        owner[reached.tile[own]] = shares[reached.box[own]]
-        order = order[np.argsort(owner[reached.tile[order]], kind="stable")]
+        owner[beside[own]] = shares[reached.box[own]]
+        owner = owner[beside]
+        order = order[np.argsort(owner[order], kind="stable")]
         box, tile, begin, end, _ = (array[order] for array in reached)
         starts = np.flatnonzero(np.diff(tile, prepend=-1))
         grid = boxes.grid[box]
@@ -289,11 +296,24 @@ class Tiles:
         own = self._parts(grid[starts], own_begin, own_end, 0, 0)
         parts = np.insert(parts, starts[more], own[more], axis=0)
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
-        owner = owner[tile[starts]]
+        owner = owner[order][starts]
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
         rows = np.stack(rows_of(own), axis=1)
         ranges = _shared(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
         return _spans(own), ranges, firsts[np.searchsorted(owner, np.arange(SHARES + 1))], parts
+
+    def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
+        """The first of the tiles of nodes (n,) that are of one share with each.
+
+        To go through memory with gaps of some thousand bytes takes twice as long. So, one thread
+        has one share, and long tiles are of one share with those in the same rows of nodes.
+        """
+        if self.threads == 1:
+            return np.zeros_like(tile)
+        if not self.long:
+            return tile
+        first, along = self._first_of_nodes[grid], self._tile_steps[grid, -2]
+        return tile - (tile - first) % along
 
     def spans_of(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
         """(k, 2) spans of nodes in use, from boxes of them (n, d) in tiles of nodes (n,)."""
