@@ -120,7 +120,7 @@ def power_law(factor, exponent, strain, value, increment):
     `value` is that without the increment: (1 + x)^n times as much is a short series for small x.
     """
     one = real(1, strain)
-    near = increment <= real(_NEAR, strain) * strain
+    near = max(exponent, one) * increment <= real(_NEAR, strain) * strain
     x = increment / choose(strain > 0, strain, one)
     series = one
     for k in range(_TERMS, 0, -1):
