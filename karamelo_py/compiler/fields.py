@@ -38,6 +38,8 @@ from numba.extending import lower_builtin, type_callable
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import is_held, item_of
 
+LINE = 64  # bytes that caches get at once
+
 
 def scalar(kin: Any) -> int:
     """One number."""
@@ -117,11 +119,19 @@ def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     return kind(array)
 
 
+def records(count: int, width: int, real: type) -> np.ndarray:
+    """(count, width) zeros of nodes; untouched pages cost no memory, no record is in two lines."""
+    size = np.dtype(real).itemsize
+    room = np.zeros(count * width + LINE // size, real)
+    first = -room.ctypes.data % LINE // size
+    return room[first : first + count * width].reshape(count, width)
+
+
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
-    """The field of `count` nodes, (count, components), zero: untouched pages cost no memory."""
+    """The field of `count` nodes, (count, components), zero."""
     width = kind.shape(kin)
     # Three numbers, wherever they begin, are loaded and stored as four, the width of a register.
-    return kind(np.zeros((count, width if width < 3 else -(-(width + 1) // 4) * 4), real))
+    return kind(records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real))
 
 
 def field(fields: tuple, kind: type) -> Any:

@@ -261,12 +261,12 @@ def warms_by_friction(hub: Hub) -> bool:
 
 
 def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> Nodes:
-    """Fields of `count` nodes, zero: the system gives memory to pages only when touched."""
+    """Fields of `count` nodes, zero."""
     d = kin.dimension
     return Nodes(
-        sums=np.zeros((count, SUMS_WIDTH[d]), real),
-        update=np.zeros((count, UPDATE_WIDTH[d]), real),
-        velocity=np.zeros((count, VELOCITY_WIDTH[d]), real),
+        sums=fields.records(count, SUMS_WIDTH[d], real),
+        update=fields.records(count, UPDATE_WIDTH[d], real),
+        velocity=fields.records(count, VELOCITY_WIDTH[d], real),
         fields=tuple(fields.at_nodes(kind, kin, count, real) for kind in kinds),
     )
 

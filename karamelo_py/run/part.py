@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.fields import records
 from karamelo_py.kernels.arrays import TIMESTEP, Block, Nodes, Setup, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import Linked
@@ -269,6 +270,6 @@ def _from_to(numbers: np.ndarray, first: int, end: int) -> np.ndarray:
 
 
 def _like(nodes: Nodes) -> Nodes:
-    """Nodes of the same kind, zero: the system gives memory to pages only when touched."""
-    fields = tuple(type(one)(np.zeros(one.array.shape, one.array.dtype)) for one in nodes.fields)
-    return Nodes(*(np.zeros(array.shape, array.dtype) for array in nodes[:-1]), fields)
+    """Nodes of the same kind, zero."""
+    fields = tuple(type(one)(records(*one.array.shape, one.array.dtype)) for one in nodes.fields)
+    return Nodes(*(records(*array.shape, array.dtype) for array in nodes[:-1]), fields)

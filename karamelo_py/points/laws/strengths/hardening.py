@@ -18,6 +18,15 @@ def flow_stress(strength, memory, increment, heat, dt):
 
 
 @point_function(otherwise=True)
+def foreseen(strength, memory, heat):
+    """What the flow stress of a step takes from its beginning, whatever the increment is.
+
+    `flow_stress` gets it behind the memory.
+    """
+    return ()
+
+
+@point_function(otherwise=True)
 def hardened(strength, memory, increment, dt):
     """The memory after a step, which may be without plastic strain."""
     return (memory[0] + increment,)
@@ -73,6 +82,7 @@ def plastic_increment(strength, q, memory, heat, dt):
     low, high = zero, q / slope
     x = last = zero
     active = q > zero
+    memory += foreseen(strength, memory, heat)
     for _ in range(_MOST_ITERATIONS):
         flow, hardening = flow_stress(strength, memory, x, heat, dt)
         excess = q - slope * x - flow

@@ -2,12 +2,12 @@
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, point_function, real, shared
+from karamelo_py.compiler.compile import choose, fma, in_all, point_function, real, shared
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
-from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
+from karamelo_py.points.laws.strengths.hardening import flow_stress, foreseen, hardening
 from karamelo_py.points.laws.temperatures import Warm, homologous
 
 
@@ -101,13 +101,35 @@ class Softening(NamedTuple):
 hardening(JohnsonCook)
 
 
+# Increments of strain up to this share of it are a series of so many terms.
+_NEAR, _TERMS = 1 / 32, 9
+
+
 @shared
-def power_law(factor, exponent, strain):
-    """factor strain^exponent and its slope; at no strain the slope is left out."""
+def power_of_strain(factor, exponent, strain):
+    """factor strain^exponent, 0 at no strain."""
     some = strain > 0
     base = choose(some, strain, real(1, strain))
-    value = choose(some, factor * power(base, exponent), real(0, strain))
-    return value, value * (exponent / base)
+    return choose(some, factor * power(base, exponent), real(0, strain))
+
+
+@shared
+def power_law(factor, exponent, strain, value, increment):
+    """factor (strain + increment)^exponent and its slope; at no strain the slope is left out.
+
+    `value` is that without the increment: (1 + x)^n times as much is a short series for small x.
+    """
+    one = real(1, strain)
+    near = max(exponent, one) * increment <= real(_NEAR, strain) * strain
+    x = increment / choose(strain > 0, strain, one)
+    series = one
+    for k in range(_TERMS, 0, -1):
+        series = fma(x * ((exponent - real(k - 1, x)) * real(1 / k, x)), series, one)
+    after = strain + increment
+    value = value * series
+    if not in_all(near):
+        value = choose(near, value, power_of_strain(factor, exponent, after))
+    return value, value * (exponent / choose(after > 0, after, one))
 
 
 @point_function(tags=2, otherwise=True)
@@ -137,8 +159,14 @@ def _(rate, flow, slope, increment, dt):
     return flow * factor, slope * factor + steeper
 
 
+@foreseen.on(JohnsonCook)
+def _(strength, memory, heat):
+    hard = power_of_strain(strength.B, strength.n, memory[0])
+    return hard, softened(strength.softening, heat, hard)
+
+
 @flow_stress.on(JohnsonCook)
 def _(strength, memory, increment, heat, dt):
-    hard, slope = power_law(strength.B, strength.n, memory[0] + increment)
-    soft = softened(strength.softening, heat, hard)
+    ep, before, soft = memory
+    hard, slope = power_law(strength.B, strength.n, ep, before, increment)
     return quickened(strength.rate, (strength.A + hard) * soft, slope * soft, increment, dt)

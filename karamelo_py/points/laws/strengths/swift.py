@@ -3,8 +3,8 @@
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
-from karamelo_py.points.laws.strengths.johnson_cook import power_law
+from karamelo_py.points.laws.strengths.hardening import flow_stress, foreseen, hardening
+from karamelo_py.points.laws.strengths.johnson_cook import power_law, power_of_strain
 
 
 class Swift(NamedTuple):
@@ -48,7 +48,13 @@ class Swift(NamedTuple):
 hardening(Swift)
 
 
+@foreseen.on(Swift)
+def _(strength, memory, heat):
+    return (power_of_strain(strength.B, strength.n, memory[0] - strength.C),)
+
+
 @flow_stress.on(Swift)
 def _(strength, memory, increment, heat, dt):
-    hard, slope = power_law(strength.B, strength.n, memory[0] + increment - strength.C)
+    ep, before = memory
+    hard, slope = power_law(strength.B, strength.n, ep - strength.C, before, increment)
     return strength.A + hard, slope

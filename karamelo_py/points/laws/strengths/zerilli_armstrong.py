@@ -5,8 +5,8 @@ from typing import Annotated, NamedTuple
 from karamelo_py.compiler.compile import choose, real
 from karamelo_py.compiler.powers import exponential
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
-from karamelo_py.points.laws.strengths.johnson_cook import power_law
+from karamelo_py.points.laws.strengths.hardening import flow_stress, foreseen, hardening
+from karamelo_py.points.laws.strengths.johnson_cook import power_law, power_of_strain
 from karamelo_py.points.laws.temperatures import temperature_or
 
 
@@ -86,18 +86,29 @@ class ZerilliArmstrong(NamedTuple):
 hardening(ZerilliArmstrong)
 
 
+@foreseen.on(ZerilliArmstrong)
+def _(strength, memory, heat):
+    half = real(0.5, memory[0])
+    T = temperature_or(heat, strength.initial_temperature)
+    return (
+        power_of_strain(strength.C5, strength.n, memory[0]),
+        power_of_strain(strength.C2, half, memory[0]),
+        exponential(-strength.C3 * T),
+    )
+
+
 @flow_stress.on(ZerilliArmstrong)
 def _(strength, memory, increment, heat, dt):
-    half = real(0.5, increment)
-    T = temperature_or(heat, strength.initial_temperature)
-    strain = memory[0] + increment
-    athermal, slope = power_law(strength.C5, strength.n, strain)
-    root, root_slope = power_law(strength.C2, half, strain)
+    half, one = real(0.5, increment), real(1, increment)
+    ep, athermal, root, thermal = memory
+    athermal, slope = power_law(strength.C5, strength.n, ep, athermal, increment)
+    root, root_slope = power_law(strength.C2, half, ep, root, increment)
     # exp(C4 T ln(rate)) is the rate to a power.
-    power = strength.C4 * T
-    rate, rate_slope = power_law(real(1, T), power, increment / (dt * strength.epsdot0))
-    rate = choose(power > 0, rate, real(1, rate))
-    thermal = exponential(-strength.C3 * T)
+    power = strength.C4 * temperature_or(heat, strength.initial_temperature)
+    rate = increment / (dt * strength.epsdot0)
+    at_rate = power_of_strain(one, power, rate)
+    rate, rate_slope = power_law(one, power, rate, at_rate, increment - increment)
+    rate = choose(power > 0, rate, one)
     factor = strength.C1 + root
     slope += thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
     return strength.C0 + thermal * rate * factor + athermal, slope
