@@ -197,7 +197,7 @@ def lower(
     heat = Insulated()
     if hub.update.thermal:
         at_nodes = lower_nodes((NodalMean,), Line(), count, real)
-        heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes))
+        heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes, len(hub.solids)))
     owners = [method.frame, transfer, averaging, contact, heat, grids]
     owners += [*hub.fixes.values(), hub.update.scheme, basis, method]
     kinds = [
@@ -220,7 +220,7 @@ def lower(
         heat=heat,
         grids=grids,
         nodes=at_nodes,
-        buffers=tiles.empty_buffers(at_nodes),
+        buffers=tiles.empty_buffers(at_nodes, len(hub.solids)),
         blocks=lower_blocks(
             hub,
             [solid if ids is None else part_of(solid, *ids) for solid in hub.solids.values()],

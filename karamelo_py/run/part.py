@@ -54,10 +54,10 @@ class Part:
             crew, method.lattices(hub), s.basis, count, sparse(hub), one_place=one_place
         )
         nodes, heat = _like(s.nodes), s.heat
-        buffers = tiles.empty_buffers(nodes)
+        buffers = tiles.empty_buffers(nodes, len(s.blocks))
         if isinstance(heat, Conducting):
             at_nodes = _like(heat.nodes)
-            heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes))
+            heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes, len(s.blocks)))
         self.work = Work(len(s.blocks))
         self.answers = Answers(crew, s.control, self.work)
         self.answers.part = self

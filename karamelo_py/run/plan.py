@@ -119,11 +119,10 @@ def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) 
     none = s.nodes._replace(
         sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
     )  # boxes of nothing: only their places matter
-    buffers = tiles.empty_buffers(none)
-    tiles.lay_out(s._replace(buffers=buffers))
+    tiles.lay_out(s._replace(buffers=tiles.empty_buffers(none, len(s.blocks))))
     given = [array for one in buffers_of(simulation.setup) for array in summed(one.nodes)]
     row = sum(array.itemsize * array.shape[1] for array in given)
-    boxes = 0 if tiles.direct else row * len(buffers.nodes.sums)
+    boxes = 0 if tiles.direct else row * tiles.rows
     tilings = [block.tiling for block in s.blocks]
     points = sum(int(occupied(one)[1].sum()) for one in tilings)
     rows = sum(map(len, tiles.given.values()))

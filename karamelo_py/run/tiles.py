@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from itertools import product
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.fields import records
 from karamelo_py.compiler.lanes import lanes_for
 from karamelo_py.compiler.packed import forget
 from karamelo_py.kernels.arrays import (
@@ -22,6 +24,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.sorting import order_in_tiles, order_points, widest
 from karamelo_py.kernels.sweep import ROUNDING
+from karamelo_py.points.basis import shape_size
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
 # By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
@@ -31,6 +34,9 @@ NODES = {1: 64, 2: 8, 3: 8}
 LONGER = 16  # times, along the rows of nodes in space, where cells have one point: boxes have more
 #             nodes than points then, and few tiles would have few points
 SHARES = 64  # of the points of a block, nearly equal: threads share them out
+# Times the nodes: boxes that can have no more rows are made at once, on whole lines of the caches;
+# pages that none touches cost no memory. Larger ones grow.
+AT_ONCE = 8
 SPAN = 256  # nodes of a span at most
 DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
 DRIFT = 1.0  # cells that points may go at most before they are sorted again
@@ -76,6 +82,8 @@ class Tiles:
         Whether points give straight to the nodes, tile after tile: scenes of few points.
     sorts
         How often points were sorted.
+    rows
+        How many rows of the buffers the boxes of all tiles take.
     threads
         How many sum at nodes.
     """
@@ -93,7 +101,7 @@ class Tiles:
         self.per_cell = type(basis).nodes_per_cell
         self.least_nodes = type(basis).least_nodes
         self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
-        self.sorts = self.sets = 0
+        self.sorts = self.sets = self.rows = 0
         self.occupied = 0
         # By grid and direction: nodes, cells, and so on.
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
@@ -102,6 +110,10 @@ class Tiles:
         self._steps = steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = _numbered(self.shapes)
+        # Points without a domain reach no further than two cells from those of their tile.
+        widest = np.minimum((self.size + 4) * self.per_cell + 1 + 2 * self.beyond, self._nodes)
+        most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
+        self._most_rows = inf if shape_size(type(basis), d) else most
         self.count = int(self.first[-1])
         self._start = np.zeros(self.count + 1, np.int64)
         tiles = -(-self._nodes // self.node_size)
@@ -124,16 +136,16 @@ class Tiles:
             report=np.zeros((self.count + 1, 10)),
         )
 
-    def empty_buffers(self, nodes: Nodes) -> Buffers:
-        """Buffers for what points give to `nodes`."""
+    def empty_buffers(self, nodes: Nodes, blocks: int) -> Buffers:
+        """Buffers for what points of so many blocks give to `nodes`."""
+        most = blocks * self._most_rows
+        rows = int(most) if most <= AT_ONCE * len(nodes.sums) else 0
         given = tuple(one for one in nodes.fields if getattr(type(one), "summed", False))
         of = nodes._replace(fields=given)
         if not self.direct:
             of = Nodes(
-                *(np.zeros((0, array.shape[1]), array.dtype) for array in of[:-1]),
-                tuple(
-                    type(one)(np.zeros((0, one.array.shape[1]), one.array.dtype)) for one in given
-                ),
+                *(_room(rows, array) for array in of[:-1]),
+                tuple(type(one)(_room(rows, one.array)) for one in given),
             )
         self.sets += 1
         return Buffers(of, *self._layout, self.sets - 1)
@@ -159,7 +171,7 @@ class Tiles:
         if not self.direct:
             for one in buffers_of(s):
                 for array in summed(one.nodes):
-                    array[:] = 0
+                    array[: self.rows] = 0
 
     def sort(self, s: Setup) -> None:
         """Sort all points by tile and find the nodes in use; all sums at nodes are zero then."""
@@ -239,7 +251,8 @@ class Tiles:
         """Bytes of the boxes of all tiles."""
         if self.direct:
             return 0
-        return sum(array.nbytes for one in buffers_of(s) for array in summed(one.nodes))
+        given = [array for one in buffers_of(s) for array in summed(one.nodes)]
+        return self.rows * sum(array.itemsize * array.shape[1] for array in given)
 
     def lay_out(self, s: Setup) -> None:
         """Lay the boxes of all blocks one after another; find the tiles of nodes that they reach.
@@ -378,6 +391,7 @@ class Tiles:
         """Make the buffers as large as the boxes of all tiles need."""
         if rows > MAX_NODES:
             raise MemoryError(f"tiles of points would need {rows} records of nodes")
+        self.rows = rows
         for one in buffers_of(s):
             for array in summed(one.nodes):
                 grow(array, rows)
@@ -524,6 +538,12 @@ def steps_of(shapes: np.ndarray) -> np.ndarray:
     """Steps (k, d) from a number to that of the neighbour in boxes of these shapes (k, d)."""
     after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
     return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
+
+
+def _room(rows: int, like: np.ndarray) -> np.ndarray:
+    """So many rows as the array has, zero; with none it can grow."""
+    width, kind = like.shape[1], like.dtype
+    return records(rows, width, kind) if rows else np.zeros((0, width), kind)
 
 
 def give_up(array: np.ndarray) -> None:
