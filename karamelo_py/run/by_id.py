@@ -103,6 +103,10 @@ class ById:
         """The arrays that are worked on."""
         return self.setup
 
+    @stepped.setter
+    def stepped(self, s: Setup) -> None:
+        self.setup = s
+
     @property
     def blocks(self) -> tuple[Block, ...]:
         """The kinds of points, with those that are at hand."""

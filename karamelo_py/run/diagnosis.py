@@ -20,7 +20,6 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead
 from karamelo_py.run.tiles import in_tiles
 from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain, grown_little, has_grown
-from karamelo_py.scene.boundary import leaving
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError
 
@@ -99,7 +98,7 @@ def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
     No smaller step keeps these. Where nobody watches energy, who knows.
     """
     moves = hub.update.method.frame.moves
-    if not (moves and leaving(simulation).size and grown_little(simulation)):
+    if not (moves and len(simulation.leaving()) and grown_little(simulation)):
         return False
     step = simulation.step
     simulation.restore(snapshot)

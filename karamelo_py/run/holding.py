@@ -76,6 +76,13 @@ class Holding(Leading):
         """The arrays that steps work on."""
         return self.part.setup if self._stepping else self.setup
 
+    @stepped.setter
+    def stepped(self, s: Setup) -> None:
+        if self._stepping:
+            self.part.setup = s
+        else:
+            self.setup = s
+
     @property
     def kin(self) -> NamedTuple:
         """The kinematics."""

@@ -141,14 +141,32 @@ class Lowered(ById, ByNumber):
             float(self.control.clock[0].path),
         )
 
+    def leaving(self) -> np.ndarray:
+        """Ids (0-based, ascending) of the points whose new places lie beyond the edge."""
+        s, then = self.stepped, 1 - self.now
+        edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
+        found = []
+        for block in s.blocks:
+            points = block.points
+            beyond, finite = np.zeros((2, points.id.size), np.bool_)
+            finite[:] = True
+            slack, inv_h = s.grids.slack[points.grid], s.grids.inv_h[points.grid]
+            for y, edge in zip(points.x[then], edges[: s.kin.dimension], strict=False):
+                lower, size = (of[points.grid] for of in edge)
+                a = (y - lower) * inv_h
+                beyond |= (a < -slack) | (a > size + slack)
+                finite &= np.isfinite(y)
+            found.append(points.id[beyond & finite])
+        return np.sort(np.concatenate(found))
+
     def remove(self, ids: np.ndarray) -> None:
         """Take points out of the run; the ids of the others stay."""
         self.present[ids] = False
         blocks = tuple(
             chosen(block, np.flatnonzero(self.present[block.points.id]))
-            for block in self.setup.blocks
+            for block in self.stepped.blocks
         )
-        self.setup = self.setup._replace(blocks=blocks)
+        self.stepped = self.stepped._replace(blocks=blocks)
         self.control.clock[0].drift = np.inf
         self.version += 1
         # The rate of the last step stays: the same whether or not a run begins here.

@@ -224,7 +224,10 @@ class Part:
     def rebalance(self) -> None:
         """Hand over tiles as they are where that is due: points may never be sorted again."""
         s, tiles = self.setup, self.tiles
-        due = abs(self.step - self._learned_at) >= LEARN_EVERY and not tiles.direct
+        clock = s.control.clock[0]
+        sorted_next = clock.drift > clock.drift_limit  # and cut anew then
+        due = abs(self.step - self._learned_at) >= LEARN_EVERY
+        due = due and not (tiles.direct or sorted_next)
         if not due or not tiles.balance(work_of(tiles.loads(s.blocks), self.learn())):
             return
         self.tell_what_touched()

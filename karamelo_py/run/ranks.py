@@ -24,7 +24,7 @@ from karamelo_py.run.tiles import numbers
 
 FIRST, LAST = -(2**63), 2**63 - 1  # before all keys of points, and behind them
 SAMPLES = 256  # keys of all processes, by which a piece of points is cut
-CHANGING = ("advance", "set_initial")  # what changes the points
+CHANGING = ("advance", "set_initial", "remove")  # what changes the points
 
 
 class Ranks(Holding):
@@ -84,6 +84,17 @@ class Ranks(Holding):
             super().set_initial(ID)
         else:
             self._all_do("set_initial", ID)
+
+    @by_all
+    def leaving(self) -> np.ndarray | None:
+        """Ids of the points whose new places lie beyond the edge, of all for the first."""
+        found = super().leaving()
+        if self._stepping:
+            of_all = self.crew.gathered(found)
+            found = np.sort(np.concatenate(of_all)) if of_all is not None else None
+        return found
+
+    remove = by_all(Simulation.remove)
 
     begin_to_look = by_all(Simulation.begin_to_look)
 

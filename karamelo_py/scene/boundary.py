@@ -41,25 +41,6 @@ def check(hub: Scene) -> None:
         )
 
 
-def leaving(simulation: Any) -> np.ndarray:
-    """Ids (0-based, ascending) of the points whose new places lie beyond the edge."""
-    found = []
-    s, then = simulation.setup, 1 - simulation.now
-    for block in s.blocks:
-        beyond = np.zeros(block.points.id.size, np.bool_)
-        finite = np.ones(block.points.id.size, np.bool_)
-        edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
-        for k in range(s.kin.dimension):
-            y = block.points.x[then][k]
-            lower, size = (edge[block.points.grid] for edge in edges[k])
-            slack = s.grids.slack[block.points.grid]
-            a = (y - lower) * s.grids.inv_h[block.points.grid]
-            beyond |= (a < -slack) | (a > size + slack)
-            finite &= np.isfinite(y)
-        found.append(block.points.id[beyond & finite])
-    return np.sort(np.concatenate(found))
-
-
 def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
     """Take out of a step that went wrong the points that leave in it, if the scene says so.
 
@@ -68,7 +49,7 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
     """
     if hub.update.boundary != "delete":
         return False
-    gone = leaving(simulation)
+    gone = simulation.leaving()
     if not len(gone):
         return False
     step, first = simulation.step, simulation.present.all()
@@ -77,7 +58,7 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
         simulation.advance(step - simulation.step)
     simulation.remove(gone)
     if first:
-        solid = list(hub.solids.values())[int(simulation.solid_of[gone[0]])]
+        solid = [one for one in hub.solids.values() if one.first_id <= gone[0]][-1]
         hub.warn(
             f"step {step + 1}, time {simulation.time:.6g}: point {gone[0] + 1} of solid "
             f"'{solid.id}' leaves the domain and is deleted; more are only counted",
