@@ -200,9 +200,9 @@ def _pause(typing_context, long):
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _FAILED, _LED, _RESULT, _TICKETS = range(7 * 64, 11 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
-_SHORT = 3000  # pauses, some 0.1 ms; then threads sleep, since others may need their cores
+_SHORT = 8000  # pauses, some 0.3 ms; then threads sleep, since others may need their cores
 _APART, _LOOKS = 10, 64  # pauses between looks at what is left of another's part; looks, 30 us
-_PATIENCE = 6000  # pauses until a thread does not wait for a leader any more
+_PATIENCE = 11000  # pauses until a thread does not wait for a leader any more
 _LEFT = (1 << 32) - 1  # of a ticket: how many numbers are left; above them the loop
 
 
