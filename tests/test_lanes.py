@@ -7,9 +7,19 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from karamelo_py.compiler.compile import accumulate, choose, fma, in_all, of_present, real, shared
+from karamelo_py.compiler.compile import (
+    accumulate,
+    beside,
+    choose,
+    fma,
+    in_all,
+    of_present,
+    real,
+    shared,
+)
 from karamelo_py.compiler.fields import field, load, store
 from karamelo_py.compiler.lanes import Eights, Fours, group
+from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.compiler.tuples import add_scaled, row, scale
@@ -378,6 +388,53 @@ def test_weights_gather_and_scatter(kind, spread):
     assert alone[:, 0].sum() == pytest.approx(mass.sum(), rel=1e-14)
     np.testing.assert_allclose(together[:, :3], alone[:, :3], rtol=0, atol=1e-14 * mass.sum())
     assert (together[:, 3] == 0).all()  # what lies behind the components of a record
+
+
+@shared
+def _give_affine(array, at, weights, field, p):
+    """Nodes of a square of three by three, whose first node is `at`."""
+    nodes = tuple([beside(at, k // 3 * 7 + k % 3) for k in range(9)])
+    given = load(weights, p, (0.0,) * 9)
+    value, by_row, by_node = (
+        tuple([of_present(p, field[3 * k + c, p]) for c in range(3)]) for k in range(3)
+    )
+    accumulate_affine(array, nodes, 1, given, value, (by_row, by_node))
+    accumulate_affine(array, nodes, 4, given, value[:2], ())
+
+
+@kernel
+def _give_affine_in_lanes(tag, width, at, weights, field, array, n):
+    for q in range(0, n, width):
+        p = group(tag, q, min(width, n - q))
+        _give_affine(array, at[p], weights, field, p)
+
+
+@kernel
+def _give_affine_to_one(tag, width, at, weights, field, array, n):
+    for q in range(0, n, width):
+        p = group(tag, q, min(width, n - q))
+        _give_affine(array, at[0], weights, field, p)
+
+
+@pytest.mark.parametrize("real_type", WIDTHS)
+@pytest.mark.parametrize("give", [_give_affine_in_lanes, _give_affine_to_one])
+def test_affine_fields_at_the_nodes(real_type, give):
+    """The sums are those of the same function on numbers, point after point."""
+    width, tag = WIDTHS[real_type]
+    n = 2 * width + 3
+    rng = np.random.default_rng(8)
+    at = rng.integers(0, 20, n)
+    at[:width] = at[0]
+    weights, field = rng.uniform(size=(9, n)), rng.normal(size=(9, n))
+    array, expected = np.zeros((40, 8), real_type), np.zeros((40, 8))
+    give(tag, width, at, weights.astype(real_type), field.astype(real_type), array, n)
+    for p in range(n):
+        first = at[p] if give is _give_affine_in_lanes else at[0]
+        nodes = [first + k // 3 * 7 + k % 3 for k in range(9)]
+        value, *slopes = field[:3, p], field[3:6, p], field[6:, p]
+        accumulate_affine(expected, nodes, 1, weights[:, p], value, slopes)
+        accumulate_affine(expected, nodes, 4, weights[:, p], value[:2], ())
+    np.testing.assert_allclose(array, expected, rtol=0, atol=200 * np.finfo(real_type).eps)
 
 
 @kernel

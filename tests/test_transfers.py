@@ -9,12 +9,15 @@ from tensors import ALL_KINEMATICS, numbers, tensors
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
+from karamelo_py.points.basis.product import evenly, inverse_spread
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
 from karamelo_py.points.kinematics import planar
 from karamelo_py.points.transfers import (
     Moment,
     add_moment,
     add_momentum,
+    affine_velocity,
+    by_arms,
     displacing_velocity,
     gradient_weight,
     terms,
@@ -177,6 +180,35 @@ def test_an_affine_field_is_taken_and_given_as_it_is(transfer, basis, kin, data)
     assert np.reshape(kept, (d, d)) == pytest.approx(expected, abs=1e-11)
     momentum = met.given(transfer, 1.0, tuple(v), kept)
     assert momentum == pytest.approx(met.weights[:, None] * field, abs=1e-11)
+
+
+@over("transfer", [*AFFINE, *TAYLOR], str)
+@every_basis
+@every_kinematics
+@given(data=st.data())
+def test_what_is_said_of_all_nodes_at_once(transfer, basis, kin, data):
+    """v + C (X - x) with `affine_velocity`'s C is what nodes get; the moment is that of arms."""
+    d = kin.dimension
+    met = Met(basis, kin, position(kin, data.draw(st.tuples(everywhere, everywhere, everywhere))))
+    inverse_d = inverse_spread(basis, met.grid)
+    if not evenly(basis, met.grid, met.stencil):
+        hats = np.sum(np.abs(met.weights) < 1e-12)  # at a wall, of two nodes of three
+        assert hats >= len(met.weights) // 3
+        return
+    if inverse_d:
+        assert met.spread * inverse_d[0] == pytest.approx(np.eye(d), abs=1e-12)
+    v, moment = np.array(data.draw(numbers(d))), data.draw(tensors(planar(kin)))
+    c = affine_velocity(transfer, moment, inverse_d)
+    assert bool(c) == bool(inverse_d or type(transfer) in map(type, TAYLOR))
+    if c:
+        expected = met.weights[:, None] * (v + met.arms @ np.reshape(c, (d, d)).T)
+        assert met.given(transfer, 1.0, tuple(v), moment) == pytest.approx(expected, abs=1e-10)
+    factor = by_arms(transfer, inverse_d)
+    if factor:
+        field = np.reshape(data.draw(numbers(d * len(met.weights))), (-1, d))
+        expected = factor[0] * (met.weights[:, None] * field).T @ met.arms
+        kept = np.reshape(met.taken(transfer, field), (d, d))
+        assert kept == pytest.approx(expected, abs=1e-8)
 
 
 @every_basis

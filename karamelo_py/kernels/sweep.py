@@ -27,6 +27,7 @@ from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.affine import affine_parts, gathered_at_once_all, give_affine
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
@@ -35,7 +36,7 @@ from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.visit import Work, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
-from karamelo_py.points.basis.product import Stencil, sees_same_nodes, with_one_node
+from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
 from karamelo_py.points.frames import Total, Updated, follows
 from karamelo_py.points.grid import inside, renumbered
 
@@ -238,13 +239,31 @@ def gather_nodes(width, stencil, tasks, w, totals):
     return _gather(tasks, w, stencil, totals)
 
 
+@gather_nodes.on(OneByOne, Stencil)
+def _(width, stencil, tasks, w, totals):
+    if not evenly(w.basis, w.grid, stencil):
+        return _gather(tasks, w, stencil, totals)
+    return _gather_parts(tasks, w, stencil, totals)
+
+
 @gather_nodes.on(Fours, Stencil)
 @gather_nodes.on(Eights, Stencil)
 def _(width, stencil, tasks, w, totals):
+    if not in_all(evenly(w.basis, w.grid, stencil)):
+        return _gather(tasks, w, stencil, totals)
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
     if sees_same_nodes(stencil):
-        return _gather(tasks, w, with_one_node(stencil), totals)
-    return _gather(tasks, w, stencil, totals)
+        return _gather_parts(tasks, w, with_one_node(stencil), totals)
+    return _gather_parts(tasks, w, stencil, totals)
+
+
+@shared
+def _gather_parts(tasks, w, stencil, totals):
+    """What can be is gathered from all nodes at once, the rest node by node."""
+    found = gathered_at_once_all(tasks, w, stencil, totals)
+    rest = [k for k, total in enumerate(found) if not len(total)]
+    own = _gather(tuple([tasks[k] for k in rest]), w, stencil, tuple([totals[k] for k in rest]))
+    return tuple([own[rest.index(k)] if k in rest else total for k, total in enumerate(found)])
 
 
 @point_function(tags=2, otherwise=True)
@@ -256,10 +275,24 @@ def scatter_nodes(width, stencil, quantities, w, loads):
 @scatter_nodes.on(Fours, Stencil)
 @scatter_nodes.on(Eights, Stencil)
 def _(width, stencil, quantities, w, loads):
-    if sees_same_nodes(stencil):
-        _scatter(quantities, w, with_one_node(stencil), loads)
-    else:
+    parts = affine_parts(quantities, w, stencil, loads)
+    if not in_all(evenly(w.basis, w.grid, stencil)):
         _scatter(quantities, w, stencil, loads)
+    elif sees_same_nodes(stencil):
+        _scatter_parts(width, quantities, w, with_one_node(stencil), loads, parts)
+    else:
+        _scatter_parts(width, quantities, w, stencil, loads, parts)
+
+
+@shared
+def _scatter_parts(width, quantities, w, stencil, loads, parts):
+    """What is affine at all nodes at once, the rest node by node."""
+    known = tuple([part for part in parts if len(part)])
+    if len(known):
+        give_affine(width, w, stencil, known)
+    rest = [k for k, part in enumerate(parts) if not len(part)]
+    if len(rest):
+        _scatter(tuple([quantities[k] for k in rest]), w, stencil, tuple([loads[k] for k in rest]))
 
 
 @subkernel

@@ -14,6 +14,7 @@ from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
 from karamelo_py.points.kinematics import (
     add_symmetric_dot,
     add_tensor_dot,
+    columns,
     identity,
     increment_of,
     inverse,
@@ -21,6 +22,7 @@ from karamelo_py.points.kinematics import (
     left_cauchy_green,
     nominal,
     planar,
+    symmetric_columns,
     zero_tensor,
 )
 from karamelo_py.points.kinematics.components import Number, formula
@@ -99,6 +101,17 @@ def add_force(frame, kin, total, stress, gradient):
 @add_force.on(Total)
 def _(frame, kin, total, stress, gradient):
     return add_tensor_dot(kin, total, stress, gradient)
+
+
+@point_function(otherwise=True)
+def force_columns(frame, kin, stress):
+    """The columns of a stress that makes nodal forces, vectors."""
+    return symmetric_columns(kin, stress)
+
+
+@force_columns.on(Total)
+def _(frame, kin, stress):
+    return columns(kin, stress)
 
 
 @point_function(otherwise=True)

@@ -5,7 +5,8 @@ gets `Lanes`: one number for each of 4 or 8 points that lie one after another. L
 and compare like numbers, node numbers made of them gather from arrays of nodes, (nodes,
 components), and `accumulate` scatters to them, lane after lane in the order of the points. Point
 functions need not know; powers and logarithms are taken one lane after another (`one_by_one`).
-Results of a lane are those of the same operations on numbers, to the last bit.
+Results of a lane are those of the same operations on numbers, to the last bit; sums at nodes
+differ from those of points one by one by their rounding.
 
 The last group of a tile may have fewer points than lanes: what is loaded for the others is that of
 the first point, and nothing is stored or given to nodes for them.

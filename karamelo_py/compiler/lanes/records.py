@@ -11,6 +11,7 @@ from numba.extending import intrinsic
 from karamelo_py.compiler.compile import accumulate, by_type, lanes_of
 from karamelo_py.compiler.lanes.arrays import Beside, at_lane, pointer_to
 from karamelo_py.compiler.lanes.registers import (
+    I32,
     Lanes,
     element,
     lane,
@@ -196,3 +197,116 @@ def _accumulate(array, i, first, values):
     if isinstance(array, types.Array) and (lanes_of(i) or lanes_of(values)):
         return lambda array, i, first, values: _scatter(array, i, first, values)
     return None
+
+
+def accumulate_affine(array, nodes, first, weights, value, slopes):
+    """Give nodes their weights times an affine field: components from the `first` on.
+
+    `value` is that of the first node; the field grows by ``slopes[d]`` to the next in direction `d`
+    (of nodes in a square or a cube, the last direction running fastest), or is the same everywhere
+    where there are none.
+    """
+    width = round(len(nodes) ** (1 / max(1, len(slopes))))
+    for k, (node, weight) in enumerate(zip(nodes, weights, strict=True)):
+        for c, number in enumerate(value):
+            for d, slope in enumerate(reversed(slopes)):
+                number = number + (k // width**d % width) * slope[c]
+            array[node, first + c] += weight * number
+
+
+@by_type(accumulate_affine)
+def _accumulate_affine_by_type(array, nodes, first, weights, value, slopes):
+    return lambda array, nodes, first, weights, value, slopes: _accumulate_affine(
+        array, nodes, first, weights, value, slopes
+    )
+
+
+@intrinsic
+def _accumulate_affine(typing_context, array, nodes, first, weights, value, slopes):
+    """The records of the points, each with one vector; the weights are read one by one.
+
+    So the records are made once a point, not at each node.
+    """
+    lanes = weights[0]
+    count = 8 if len(value) > 4 else _chunks(len(value))[0][1]
+    vector = ir.VectorType(element(array.dtype), count)
+
+    def codegen(context, builder, sig, arguments):
+        size = array.dtype.bitwidth // 8
+        spread = _kept_in_memory(builder, cgutils.unpack_tuple(builder, arguments[3]))
+        field = _records_of(builder, cgutils.unpack_tuple(builder, arguments[4]), lanes, count)
+        grow = [
+            _records_of(builder, cgutils.unpack_tuple(builder, slope), lanes, count)
+            for slope in cgutils.unpack_tuple(builder, arguments[5])
+        ]
+        width = round(len(nodes) ** (1 / max(1, len(grow))))
+        fma = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(vector, [vector] * 3), f"llvm.fma.v{count}f{8 * size}"
+        )
+        one = Lanes(array.dtype, count)
+        at = {(): field}  # by the place of the node in the first directions
+
+        def field_at(*place):
+            if place not in at:
+                *outer, last = place
+                at[place] = field_at(*outer, last - 1) if last else field_at(*outer)
+                if last:
+                    pairs = zip(at[place], grow[len(outer)], strict=True)
+                    at[place] = [builder.fadd(*pair) for pair in pairs]
+            return at[place]
+
+        for k, node in enumerate(cgutils.unpack_tuple(builder, arguments[1])):
+            place = tuple(k // width**d % width for d in reversed(range(len(grow))))
+            total = pointer = None
+            for j, record in enumerate(field_at(*place)):
+                if total is None or lanes_of(nodes[k]):
+                    given = context, builder, array, arguments[0]
+                    if lanes_of(nodes[k]):
+                        pointer = at_lane(*given, nodes[k], node, j, arguments[2])
+                    else:
+                        pointer = pointer_to(*given, [node, arguments[2]])
+                    pointer = builder.bitcast(pointer, vector.as_pointer())
+                    total = builder.load(pointer, align=size)
+                weight = splat(builder, builder.load(spread(k, j), align=size), one)
+                total = builder.call(fma, [weight, record, total])
+                if lanes_of(nodes[k]):
+                    builder.store(total, pointer, align=size)
+            if not lanes_of(nodes[k]):
+                builder.store(total, pointer, align=size)
+        return context.get_dummy_value()
+
+    made = types.void(array, nodes, types.int64, weights, value, slopes)
+    return made, codegen
+
+
+def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:
+    """A record of `count` components for each lane."""
+    zero = ir.Constant(vector_of(lanes), None)
+    parts = [*parts, *[zero] * 8][:count]
+    rows = []
+    for k in range(0, lanes.width, 4):
+        four = [shuffle(builder, v, v, list(range(k, k + 4))) for v in parts]
+        low, high = _records(builder, four[:4]), four[4:]
+        if high:
+            pairs = zip(low, _records(builder, high), strict=True)
+            low = [shuffle(builder, *pair, list(range(8))) for pair in pairs]
+        rows += low
+    return rows
+
+
+def _kept_in_memory(builder: Any, vectors: list) -> Callable:
+    """Where lane `j` of the k-th vector lies, in memory that LLVM does not see through.
+
+    A number from memory gets into all lanes as it is loaded; out of a register that takes as long
+    as a shuffle.
+    """
+    kind = ir.ArrayType(vectors[0].type, len(vectors))
+    room = cgutils.alloca_once(builder, kind)
+    room.align = 64
+    for k, vector in enumerate(vectors):
+        builder.store(vector, cgutils.gep_inbounds(builder, room, 0, k))
+    hidden = ir.FunctionType(ir.VoidType(), [room.type])
+    builder.asm(hidden, "", "r,~{memory}", [room], side_effect=True)
+    scalars = builder.bitcast(room, vectors[0].type.element.as_pointer())
+    width = vectors[0].type.count
+    return lambda k, j: builder.gep(scalars, [ir.Constant(I32, k * width + j)])

@@ -69,6 +69,18 @@ def spacing(basis, like):
     return real(1, like)
 
 
+@point_function(otherwise=True)
+def inverse_spread(basis, grid):
+    """(D^-1,) of functions for which it is the same away from walls (`evenly`); else nothing."""
+    return ()
+
+
+@point_function(otherwise=True)
+def evenly(basis, grid, stencil):
+    """Whether D^-1 of a point is `inverse_spread`."""
+    return True
+
+
 @shared
 def hoop(weight, gradient, inv_r):
     """N / r at an axisymmetric point; at r = 0 its limit, dN/dr (`inv_r` is 0 there)."""

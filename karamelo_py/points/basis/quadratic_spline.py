@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, real, shared
 from karamelo_py.points.basis import first_node
-from karamelo_py.points.basis.product import Along, along, register
+from karamelo_py.points.basis.product import Along, along, evenly, inverse_spread, register
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -64,6 +64,22 @@ def _at_wall(grid, a, last):
     )
     # For hat functions, N D^-1 (X - x) is the gradient.
     return Along(first, a - real(first, a), weights, gradients, gradients)
+
+
+@inverse_spread.on(QuadraticSpline)
+def _(basis, grid):
+    return (4 * grid.inv_h * grid.inv_h,)
+
+
+@evenly.on(QuadraticSpline)
+def _(basis, grid, stencil):
+    first, *rest = (
+        (cells_along(grid, d) > 1) & (line.r >= 0.5) & (line.r < 1.5)
+        for d, line in enumerate(stencil.lines)
+    )
+    for bulk in rest:
+        first = first & bulk
+    return first
 
 
 @first_node.on(QuadraticSpline)

@@ -59,8 +59,11 @@ from karamelo_py.points.kinematics.vectors import (
     add_outer,
     add_symmetric_dot,
     add_tensor_dot,
+    columns,
     diagonal,
+    from_columns,
     largest_component,
+    symmetric_columns,
     tensor_dot,
     vector_at,
 )

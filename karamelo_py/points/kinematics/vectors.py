@@ -3,7 +3,14 @@
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.symbols import add_product, call
 from karamelo_py.compiler.tuples import row
-from karamelo_py.points.kinematics.components import Components, Symmetric, Tensor, Vector, formula
+from karamelo_py.points.kinematics.components import (
+    Components,
+    Number,
+    Symmetric,
+    Tensor,
+    Vector,
+    formula,
+)
 
 
 @shared
@@ -47,6 +54,24 @@ def add_symmetric_dot(kin, total: Vector, s: Symmetric, a: Vector):
 def add_tensor_dot(kin, total: Vector, p: Tensor, a: Vector):
     """total_i + p_ij a_j of a tensor and a gradient: the force of a nominal stress on a node."""
     return _add_dot(kin, total, p, a)
+
+
+@formula()
+def columns(kin, t: Tensor):
+    """The columns of a tensor, vectors (in the plane of an axisymmetric point)."""
+    return tuple(kin.vector(lambda i, j=j: t[i, j]) for j in kin.directions)
+
+
+@formula()
+def from_columns(kin, c: Number):
+    """The tensor with these columns."""
+    return kin.tensor(lambda i, j: c[j][i])
+
+
+@formula()
+def symmetric_columns(kin, s: Symmetric):
+    """The same of a symmetric tensor."""
+    return tuple(kin.vector(lambda i, j=j: s[i, j]) for j in kin.directions)
 
 
 @formula()

@@ -75,6 +75,15 @@ def add_momentum(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment
 
 
 @point_function(otherwise=True)
+def affine_velocity(transfer, moment, inverse_d):
+    """C, where the velocity that a point gives to node X with its weight is v + C (X - x).
+
+    `inverse_d` is (D^-1,), or () where D is not the same everywhere. Returns () where nobody knows.
+    """
+    return ()
+
+
+@point_function(otherwise=True)
 def zero_moment(transfer, kin, like):
     """What a point at rest keeps, as a tuple: empty for transfers that keep nothing."""
     return ()
@@ -87,9 +96,24 @@ def add_moment(transfer, kin, basis, grid, stencil, k, weight, gradient, velocit
 
 
 @point_function(otherwise=True)
+def by_arms(transfer, inverse_d):
+    """(a,), where what a point keeps is a sum_I N_I v*_I (X_I - x)^T; else ().
+
+    `inverse_d` is (D^-1,), or () where D is not the same everywhere.
+    """
+    return ()
+
+
+@point_function(otherwise=True)
 def gradient_weight(transfer, basis, kin, grid, stencil, k, gradient):
     """What stands for the gradient of the k-th node in strains and forces: `gradient` itself."""
     return gradient
+
+
+@point_function(tags=2, otherwise=True)
+def forces_by_arms(transfer, kin):
+    """Whether N_I D^-1 (X_I - x) is all of `gradient_weight`; constant at compile time."""
+    return False
 
 
 @point_function(tags=2, otherwise=True)

@@ -10,7 +10,13 @@ eqs. 15 to 18).
 from karamelo_py.compiler.tuples import add_scaled, scale
 from karamelo_py.points.basis import affine_weight, reach
 from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
-from karamelo_py.points.transfers import add_moment, add_momentum, zero_moment
+from karamelo_py.points.transfers import (
+    add_moment,
+    add_momentum,
+    affine_velocity,
+    by_arms,
+    zero_moment,
+)
 
 
 def register(transfer: type) -> None:
@@ -23,9 +29,17 @@ def register(transfer: type) -> None:
         mean = add_scaled(total, weight * mass, v)
         return add_scaled(mean, mass, tensor_dot(planar(kin), moment, affine))
 
+    @affine_velocity.on(transfer)
+    def _(transfer, moment, inverse_d):
+        return scale(inverse_d[0], moment) if len(inverse_d) else ()
+
     @zero_moment.on(transfer)
     def _(transfer, kin, like):
         return zero_tensor(planar(kin), like)
+
+    @by_arms.on(transfer)
+    def _(transfer, inverse_d):
+        return (1.0,)
 
     @add_moment.on(transfer)
     def _(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):

@@ -7,6 +7,8 @@ from karamelo_py.points.kinematics import Line, PlaneStrain, Space
 from karamelo_py.points.kinematics.components import Vector, formula
 from karamelo_py.points.transfers import (
     Moment,
+    by_arms,
+    forces_by_arms,
     gradient_weight,
     kept_gradient,
     straining,
@@ -42,6 +44,18 @@ def _(transfer, basis, kin, grid, stencil, k, gradient):
 def with_hoop(kin, planar: Vector, gradient: Vector):
     """The planar gradient, with the hoop part N / r of an axisymmetric one."""
     return [planar[i] if i < kin.dimension else gradient[i] for i in kin.axes]
+
+
+@forces_by_arms.on(MLS, Line)
+@forces_by_arms.on(MLS, PlaneStrain)
+@forces_by_arms.on(MLS, Space)
+def _(transfer, kin):
+    return True
+
+
+@by_arms.on(MLS)
+def _(transfer, inverse_d):
+    return inverse_d
 
 
 # The velocity gradient is what the point keeps: gathered once where both come from v*.

@@ -9,7 +9,7 @@ stays the same; for splines as far as velocity is linear over their support.
 from karamelo_py.compiler.tuples import add, add_scaled
 from karamelo_py.points.basis import reach
 from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
-from karamelo_py.points.transfers import add_moment, add_momentum, zero_moment
+from karamelo_py.points.transfers import add_moment, add_momentum, affine_velocity, zero_moment
 
 
 def register(transfer: type) -> None:
@@ -20,6 +20,10 @@ def register(transfer: type) -> None:
     def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
         arm = reach(basis, kin, grid, stencil, k)
         return add_scaled(total, weight * mass, add(v, tensor_dot(planar(kin), moment, arm)))
+
+    @affine_velocity.on(transfer)
+    def _(transfer, moment, inverse_d):
+        return moment
 
     @zero_moment.on(transfer)
     def _(transfer, kin, like):
