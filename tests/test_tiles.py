@@ -10,7 +10,7 @@ import pytest
 
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.sizes import nodes_in_use
+from karamelo_py.run.sizes import PAGE, bytes_in, nodes_in_use
 from karamelo_py.run.tiles import SHARES
 from karamelo_py.scene.hub import Hub
 
@@ -152,3 +152,15 @@ def test_memory_of_nodes_is_gone_through_without_gaps(threads):
     assert (rows[:, 1] - rows[:, 0]).min() > 180
     assert (rows[:, 1] - rows[:, 0]).sum() == nodes_in_use(simulation.setup)
     assert threads > 1 or (np.diff(rows[:, 0]) > 0).all()
+
+
+@pytest.mark.parametrize("rows", [1000, 200_000])
+def test_large_arrays_take_large_pages(rows):
+    """Rows of 64 bytes: those alone in a small array, in a large one the pages that they lie in,
+    counted one by one.
+    """
+    spans = np.array([[0, 10], [20, 30], [500, 900], [901, 1000]]) * rows // 1000
+    used = np.concatenate([np.arange(*span) for span in spans])
+    pages = {row * 64 // PAGE for row in used}
+    expected = 64 * len(used) if rows == 1000 else PAGE * len(pages)
+    assert bytes_in(spans, np.zeros((rows, 8))) == expected

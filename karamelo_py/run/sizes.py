@@ -10,6 +10,7 @@ from karamelo_py.kernels.arrays import Setup, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.run.shares import occupied
 
+LARGE, PAGE = 1 << 22, 1 << 21  # bytes from which on NumPy asks for large pages, and of these
 THERE = 1  # bytes of each point of the whole scene: whether it was deleted
 
 
@@ -33,10 +34,23 @@ def memory_of(simulation: Any, s: Setup, boxes: int) -> Memory:
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
     points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
     moved = sum(of["x moved"] * n for of, n in zip(of_point, counts, strict=True))
-    nodes = sum(array.itemsize * array.shape[1] for _, array in node_fields(simulation.setup))
+    spans = s.spans[1 : 1 + s.spans[0, 0]]
+    nodes = sum(bytes_in(spans, array) for _, array in node_fields(simulation.setup))
     hooks = sum(getattr(simulation.hooks, name, np.empty(0)).nbytes for name in ("x0", "members"))
     whole = THERE * simulation.count + hooks
-    return Memory(points + whole + nodes * nodes_in_use(s) + boxes, points - moved)
+    return Memory(points + whole + nodes + boxes, points - moved)
+
+
+def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
+    """What rows of an array take, from each of ascending spans (k, 2) to before its end.
+
+    Of large arrays Linux gives pages of 2 MiB: what lies between the nodes in use is there, too.
+    """
+    row = array.nbytes // max(len(array), 1)
+    page = PAGE if array.nbytes >= LARGE else row
+    first, end = spans[:, 0] * row // page, -(-spans[:, 1] * row // page)
+    before = np.append(0, np.maximum.accumulate(end)[:-1])
+    return int(np.maximum(end - np.maximum(first, before), 0).sum()) * page
 
 
 def nodes_in_use(s: Setup) -> int:
