@@ -19,11 +19,12 @@ def watched(balances, work=None):
     """The clock after looks at these balances; whether the last is within its bound."""
     control = new_control(np.zeros(3))
     clock = control.clock[0]
-    clock.level, clock.energy_floor = 0.5, 1e-12
+    clock.level, clock.energy_floor = 0.25, 1e-12
     within = True
     for k, balance in enumerate(balances):
         clock.work = work[k] if work is not None else 0.0
         clock.kinetic = balance + clock.work
+        clock.moving_before = balance
         within = judge(control)
     return clock, within
 
