@@ -14,6 +14,25 @@ def test_a_script_without_a_run_says_so(run_script, script):
     )
 
 
+BODY = """
+method(ulmpm, FLIP, linear, 1)
+dimension(1, 0, 1, 0.1)
+region(line, block, 0, 0.5)
+material(rubber, neo-hookean, 1, 1, 0)
+solid(bar, region, line, 2, rubber, 0.1)
+"""
+
+
+def test_bodies_without_a_run_are_a_mistake(run_interpreted):
+    """Who waits for what they do gets nothing; what is printed, or ends where it says, is meant."""
+    forgotten = run_interpreted(BODY + "set_output(10)\n", status=1)
+    assert "error: " in forgotten.err and "runs nothing" in forgotten.err
+    assert "add run(n)" in forgotten.err
+    for line in ("print(dt)", "quit", "run(1)"):
+        run_interpreted(BODY + line + "\n")
+    run_interpreted(BODY, command="check")
+
+
 def test_calculations_need_no_run(run_script):
     assert run_script("a = 3\nprint(a)\n").err == ""
 

@@ -3,8 +3,10 @@
 import inspect
 import json
 import re
+import shlex
 import subprocess
 import sys
+import tomllib
 from graphlib import TopologicalSorter
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +15,7 @@ import meshio
 import numpy as np
 import pytest
 
-from karamelo_py.app import catalogue
+from karamelo_py.app import catalogue, cli
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.scene.hub import Hub
@@ -128,6 +130,59 @@ def test_readme_tells_the_whole_script():
         return [line for line in lines if line]
 
     assert statements(tour) == statements(script)
+
+
+def command_lines(page):
+    """The command lines of karamelo-py that a page shows, alone and in its text."""
+    text = page.read_text("utf-8")
+    fences = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```", text, re.S | re.M)
+    alone = re.findall(r"^(?:[^#\n]* )?karamelo-py +(.+)$", "".join(fences), re.M)
+    found = alone + re.findall(r"`karamelo-py ([^`]+)`", text)
+    return [line.replace("$SLURM_NTASKS", "4") for line in found]
+
+
+NAMES = {"check", "bench", "styles", "help", "-i SCRIPT", "help drag", "in.script", "script.mpm"}
+LATER = ("in.file", "SCRIPT", "in.script")  # scripts of the reader
+ENTRIES = [
+    entry["name"] for entry in tomllib.loads((ROOT / "docs/atlas.toml").read_text("utf-8"))["entry"]
+]
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p.name != "atlas.md"], ids=lambda p: p.name)
+def test_command_lines_of_pages_are_understood(page):
+    """Options and values; scripts and their variables are there, and tables are made above."""
+    made = ["runs.csv"]  # the text says how
+    for line in command_lines(page):
+        words = shlex.split(line, comments=True)
+        if line in NAMES or words[-1] in ("-h", "--version"):
+            continue  # no lines, or read and done
+        words = words if words[0] in cli.COMMANDS else ["run", *words]
+        options, surplus = cli._parser(words[0])[0].parse_known_args(words)
+        assert not surplus, line
+        script = getattr(options, "script", None)
+        if script is not None and str(script) not in LATER:
+            text = (ROOT / script).read_text("utf-8")
+            for given in options.var:
+                name = given.partition("=")[0] if isinstance(given, str) else given[0]
+                assert re.search(rf"^{name} *=", text, re.M), line
+        if words[0] == "chart":
+            assert set(map(str, options.tables)) <= set(made), line
+        if words[0] == "atlas":
+            assert (ROOT / options.atlas).exists(), line
+            for name in (options.only or "").split(","):
+                assert any(entry.startswith(name) for entry in ENTRIES), line
+        made.append(str(getattr(options, "o", "")))
+
+
+def test_scenes_are_refined_by_variables_that_they_have():
+    """The last column of the table of scenes."""
+    page = (ROOT / "docs" / "verification.md").read_text("utf-8")
+    rows = re.findall(r"^\|[^|]*\| `in\.(\w+)`.*\| `(-var [^|]*)` \|$", page, re.M)
+    assert len(rows) > 5
+    for name, words in rows:
+        text = (ROOT / "inputs" / f"in.{name}").read_text("utf-8")
+        for variable in re.findall(r"-var (\w+)", words):
+            assert re.search(rf"^{variable} *=", text, re.M), (name, variable)
 
 
 def test_every_function_is_in_the_language_page():

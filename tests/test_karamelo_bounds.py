@@ -80,6 +80,7 @@ def test_fixes_that_do_not_agree(run_interpreted, second, warns):
         block(
             2, *EVERY, "fix(one, velocity_nodes, nodes, x0*(0.1*time + 2), NULL)",
             f"fix(two, velocity_nodes, all, {second}{', NULL' * (',' not in second)})",
+            "quit",
         )
     ).err  # fmt: skip
     assert ("gives 169 nodes of this group another vx: this fix decides there" in err) == warns

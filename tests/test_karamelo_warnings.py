@@ -20,14 +20,14 @@ WARM = "\n".join([
     ],
 )
 def test_temperatures_of_solids(run_interpreted, T0, says):
-    text = block(2).replace("material(rubber, linear, 2, 100, 0.3)", WARM)
+    text = block(2, "quit").replace("material(rubber, linear, 2, 100, 0.3)", WARM)
     err = run_interpreted(text.replace("rubber, 0.1, 0)", f"rubber, 0.1, {T0})")).err
     assert (says or "T0 =") in err if says else "T0 =" not in err
 
 
 def test_a_law_without_temperature_has_no_opinion(run_interpreted):
     """Scripts of Karamelo give T0 in mechanical runs, too."""
-    text = block(2).replace("rubber, 0.1, 0)", "rubber, 0.1, -20)")
+    text = block(2, "quit").replace("rubber, 0.1, 0)", "rubber, 0.1, -20)")
     assert "T0" not in run_interpreted(text).err
 
 

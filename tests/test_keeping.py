@@ -144,7 +144,7 @@ def test_what_gains_is_told_beforehand(tmp_path, monkeypatch, capsys):
     """Of every transfer and scheme a cell that gains, on a coarser disk with the same speeds."""
     monkeypatch.chdir(tmp_path)
     cells = gaining()
-    assert len(cells) == 15
+    assert len(cells) == 13
     for transfer, basis, scheme, strain in {(c[0], c[2]): c for c in cells}.values():
         alpha = "1" if "FLIP" in transfer else "mechanical"
         values = {"transfer": transfer, "basis": basis, "order": scheme, "alpha": alpha, "n": "2"}

@@ -19,11 +19,12 @@ def watched(balances, work=None):
     """The clock after looks at these balances; whether the last is within its bound."""
     control = new_control(np.zeros(3))
     clock = control.clock[0]
-    clock.level, clock.energy_floor = 0.5, 1e-12
+    clock.level, clock.energy_floor = 0.25, 1e-12
     within = True
     for k, balance in enumerate(balances):
         clock.work = work[k] if work is not None else 0.0
         clock.kinetic = balance + clock.work
+        clock.moving_before = balance
         within = judge(control)
     return clock, within
 
@@ -37,6 +38,27 @@ def test_windows_that_grow_are_counted():
     growing, within = watched([1.02 ** (k // LOOKS) for k in range(4 * LOOKS)])
     assert within and growing.windows == 3
     assert growing.growth == pytest.approx(0.02 / 1.02)
+
+
+@pytest.mark.parametrize("before", [0, 1])
+def test_a_wave_of_a_coarse_body_is_no_growth(before):
+    """Leapfrog with omega dt = theta: x_n = cos(n theta), v between, whose energies are known.
+
+    The balances at the middle and at the end of a step swing by (1 - cos theta)/2 of the energy
+    each, and their mean by sin(theta/2) of that: cos a - cos(a + theta) = 2 sin(theta/2) sin(...).
+    Stored energies are those of the present step, or with usf of the one `before`.
+    """
+    theta, found = 0.8, []
+    control = new_control(np.zeros(3))
+    clock = control.clock[0]
+    clock.level, clock.energy_floor = 0.25 + 0.5 * before, 1e-12
+    for n in range(1, 200):
+        clock.moving_before, clock.kinetic = (np.sin((n + k - 0.5) * theta) ** 2 for k in (0, 1))
+        clock.stored_before, clock.stored = (np.cos((n + k - before) * theta) ** 2 for k in (0, 1))
+        judge(control)
+        found.append(clock.balance)
+    bound = (1 - np.cos(theta)) / 2 * np.sin(theta / 2)
+    assert 0.9 * bound < np.abs(np.array(found) - 1).max() <= bound * (1 + 1e-12)
 
 
 def test_growth_at_the_start_is_seen():

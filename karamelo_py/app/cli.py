@@ -338,7 +338,13 @@ def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = Non
 
 
 def _tell_of_no_run(hub: Hub, script: str) -> None:
-    """A script of calculations needs no run; one that makes a scene may have forgotten it."""
+    """A script of calculations needs no run; one that makes a scene may have forgotten it.
+
+    Raises
+    ------
+    ScriptError
+        For bodies that nothing was done with: whoever started that waits for what it computes.
+    """
     message = f"{script} runs nothing: there is no run command in it"
     if hub.checking:
         if hub.solids:
@@ -346,6 +352,8 @@ def _tell_of_no_run(hub: Hub, script: str) -> None:
 
             report(hub)
         hub.console.say(render_message("note", message, hint=RUN_COMMANDS))
+    elif hub.solids and not hub.answered:
+        raise ScriptError(message, hint=f"{RUN_COMMANDS}, or quit where it may end")
     elif hub.domain is not None or not hub.interpreter.variables:
         hub.place = None
         hub.warn(message, hint=RUN_COMMANDS)

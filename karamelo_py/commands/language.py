@@ -42,6 +42,7 @@ def print_(hub: Hub, first: Argument, *more: Argument) -> None:
                 parts[-1] += f" = {value.evaluate(hub.values):.10g}"
             else:
                 parts[-1] = f"{argument.text} = {value.evaluate(hub.values):.10g}"
+    hub.answered = True
     hub.console.say(", ".join(parts))
 
 

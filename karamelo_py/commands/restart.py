@@ -99,6 +99,7 @@ def write_restart(hub: Hub, file: OutputFile) -> None:
         return
     if hub.update.method is None or not hub.solids:
         raise ScriptError("there is nothing to write yet", expected="a method and solids before")
+    hub.answered = True
     replay = hub.interpreter.replay
     if replay is None:
         files.write(hub, Path(file), within=False)

@@ -242,12 +242,13 @@ CLOCK = np.dtype(
         ("over_limit", np.int64),  # steps above the stable limit, one after another
         ("watch_limit", np.int64),  # whether to stop because of them
         ("watch_energy", np.int64),  # whether the work of all loads is known: see kernels.watch
-        ("level", np.float64),  # share of the present stored energy in that of the velocities
+        ("level", np.float64),  # share of the present stored energy in the balance
         ("work", np.float64),  # of the fixes so far
         ("kinetic", np.float64),  # sums over the points
         ("stored", np.float64),  # with what is dissipated
         ("born_with", np.float64),  # internal energy of gases before any work
         ("stored_before", np.float64),  # one step earlier
+        ("moving_before", np.float64),  # kinetic less work, then
         ("stored_at", np.int64),  # the step of that
         ("looks", np.int64),  # number of looks at the balance
         ("balance", np.float64),  # kinetic + stored + dissipated - work

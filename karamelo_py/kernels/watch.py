@@ -1,9 +1,9 @@
 """The watch over energy and temperatures: every so many steps, inside the compiled loop.
 
 Kinetic plus stored plus dissipated energy less the work of the loads cannot grow. Velocities belong
-to the middles of steps and stresses to their ends, more or less by the scheme: the stored energy of
-two steps in a row gives that of the middle, to second order. Sums go through the points in the
-order of their tiles, the same on any number of threads.
+to the middles of steps and stresses to their ends, more or less by the scheme: energies of two
+steps in a row give those of one time, to second order. Sums go through the points in the order of
+their tiles, the same on any number of threads.
 
 Growth is measured by the energy that bodies have besides their drift, the motion of their centres
 of mass: large as that may be, from the start or by loads, it cannot hide what vibrates.
@@ -218,6 +218,7 @@ def _sum_before(s, mode, step):
     sum_energies(s, mode)
     clock = s.control.clock[0]
     clock.stored_before = clock.stored
+    clock.moving_before = clock.kinetic - clock.work
     clock.stored_at = step
 
 
@@ -231,8 +232,12 @@ def unit_of(clock):
 def judge(control):
     """Take the present sums into account; whether energy keeps within its bound."""
     clock = control.clock[0]
-    at_middle = clock.level * clock.stored + (1 - clock.level) * clock.stored_before
-    balance = clock.kinetic + at_middle - clock.work
+    # The mean of the balances at the middle of a step and at its end, each with the other energy
+    # from both sides. A wave turns omega dt in a step: alone each of them swings by (omega dt)^2/8,
+    # one up where the other goes down, and the mean by (omega dt)^3/16.
+    moving = clock.kinetic - clock.work
+    balance = moving + clock.level * (clock.moving_before - moving)
+    balance += clock.stored_before + clock.level * (clock.stored - clock.stored_before)
     if clock.looks == 0:
         clock.first_balance = balance
         clock.first_work = clock.work
@@ -320,8 +325,8 @@ def look_at_heat(s):
 def begin_to_look(s, mode, level, anew):
     """Before a run: the stored energy of the present state, where a look is due after a step.
 
-    `level` is the share of a stored energy in that of the velocities' time. With `anew` the balance
-    starts from here.
+    `level` is the share of the later stored energy, and of the earlier kinetic one, in the balance.
+    With `anew` the balance starts from here.
     """
     clock = s.control.clock[0]
     clock.level = level

@@ -213,6 +213,7 @@ class Interpreter(Meanings):
             raise
         except Quit:
             self.frames.clear()
+            self.hub.answered = True
             if self.replay is not None:
                 raise self.replay.other_script("this one ends before") from None
         except ScriptError as error:

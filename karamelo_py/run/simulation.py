@@ -218,7 +218,7 @@ class Simulation(Lowered):
             self.told_of_growth = False
         if clock.watch_energy:
             # Velocities belong to half a step before, stresses to the share strained before.
-            level = 0.5 + getattr(self.hub.update.scheme, "strained_before", 0.0)
+            level = 0.25 + 0.5 * getattr(self.hub.update.scheme, "strained_before", 0.0)
             self.begin_to_look(level, anew)
         clock.watch_heat = int(self.hub.update.thermal and not unknown_heat(self.hub))
         if clock.watch_heat and anew:

@@ -124,6 +124,8 @@ class Hub:
         What the script goes on from, until it is where that was written.
     rehearsing
         True while the rest of a script is tried before the first step: nothing runs or is written.
+    answered
+        Whether the script has printed or written something by itself, or said where it ends.
     checking
         True under ``karamelo-py check``: the first run only reports.
     """
@@ -135,6 +137,7 @@ class Hub:
         self.place: Place | None = None
         self.rehearsing = False
         self.rehearsed = False
+        self.answered = False
         self.checking = False
         self.pausing = False
         self.interpreter: Any = None
