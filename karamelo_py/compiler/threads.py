@@ -11,14 +11,11 @@ and takes those of a thread that does not go on. The leader waits for numbers th
 for threads: one that another program keeps from running holds nobody up.
 """
 
-import platform
-import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from llvmlite import ir
 from numba import prange, types
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -27,6 +24,7 @@ from karamelo_py.compiler import inlining
 from karamelo_py.compiler.compile import by_type, define
 from karamelo_py.compiler.held import HeldTuple, address, at_address, held_type, hold
 from karamelo_py.compiler.loops import kernel, left, subkernel
+from karamelo_py.compiler.words import I64, add, pause, read, replaced, word, write
 
 
 class Serial(NamedTuple):
@@ -40,11 +38,6 @@ class Threaded(NamedTuple):
 
 
 _TASK = types.none(types.intp, types.intp)  # where its arguments are, and a number
-_I64 = ir.IntType(64)
-
-
-def _word(builder: Any, place: Any) -> Any:
-    return builder.inttoptr(place, _I64.as_pointer())
 
 
 @intrinsic
@@ -77,7 +70,7 @@ def _call(typing_context, task, arguments, number, failed):
     def codegen(context, builder, signature, values):
         status = _call_at(context, builder, values[:3])
         with cgutils.if_unlikely(builder, status.is_error):
-            builder.store(builder.add(values[2], _I64(1)), _word(builder, values[3]))
+            builder.store(builder.add(values[2], I64(1)), word(builder, values[3]))
         return context.get_dummy_value()
 
     return types.none(types.intp, types.intp, types.intp, types.intp), codegen
@@ -88,9 +81,9 @@ def _nothing(typing_context):
     """The address of a word of the function that calls this, 0 by now."""
 
     def codegen(context, builder, signature, values):
-        place = cgutils.alloca_once(builder, _I64)
-        builder.store(_I64(0), place)
-        return builder.ptrtoint(place, _I64)
+        place = cgutils.alloca_once(builder, I64)
+        builder.store(I64(0), place)
+        return builder.ptrtoint(place, I64)
 
     return types.intp(), codegen
 
@@ -103,9 +96,9 @@ def _fail(typing_context, task, arguments, failed):
     """
 
     def codegen(context, builder, signature, values):
-        first = builder.load(_word(builder, values[2]))
-        with cgutils.if_unlikely(builder, builder.icmp_signed("!=", first, _I64(0))):
-            status = _call_at(context, builder, [*values[:2], builder.sub(first, _I64(1))])
+        first = builder.load(word(builder, values[2]))
+        with cgutils.if_unlikely(builder, builder.icmp_signed("!=", first, I64(0))):
+            status = _call_at(context, builder, [*values[:2], builder.sub(first, I64(1))])
             with cgutils.if_likely(builder, status.is_error):
                 context.call_conv.return_status_propagate(builder, status)
             text = "one of several threads failed, and did not when it was asked again"
@@ -122,76 +115,6 @@ def _in_parallel(count, task, arguments, failed):
 
 inlining.claim(_in_parallel.__qualname__, "kept")
 _in_parallel = kernel(_in_parallel, parallel=True, no_cpython_wrapper=True)
-
-
-# --- words that threads share ---------------------------------------------------------------------
-
-
-@intrinsic
-def _read(typing_context, place):
-    """The word at an address; all is seen that was written before it was."""
-
-    def codegen(context, builder, signature, values):
-        return builder.load_atomic(_word(builder, values[0]), "acquire", 8)
-
-    return types.intp(types.intp), codegen
-
-
-@intrinsic
-def _write(typing_context, place, value):
-    """Write a word; who sees it sees all that was written before."""
-
-    def codegen(context, builder, signature, values):
-        builder.store_atomic(values[1], _word(builder, values[0]), "release", 8)
-        return context.get_dummy_value()
-
-    return types.none(types.intp, types.intp), codegen
-
-
-@intrinsic
-def _add(typing_context, place, value):
-    """Add to a word, which others may do, too."""
-
-    def codegen(context, builder, signature, values):
-        builder.atomic_rmw("add", _word(builder, values[0]), values[1], "acq_rel")
-        return context.get_dummy_value()
-
-    return types.none(types.intp, types.intp), codegen
-
-
-@intrinsic
-def _replaced(typing_context, place, old, new):
-    """Put `new` in the place of `old`; false if the word was another one."""
-
-    def codegen(context, builder, signature, values):
-        found = builder.cmpxchg(_word(builder, values[0]), *values[1:], "acq_rel", "acquire")
-        return builder.extract_value(found, 1)
-
-    return types.boolean(types.intp, types.intp, types.intp), codegen
-
-
-@intrinsic
-def _pause(typing_context, long):
-    """Wait a moment; if `long`, sleep."""
-
-    def codegen(context, builder, signature, values):
-        def call(name, result, *numbers):
-            kind = ir.FunctionType(result, [ir.IntType(32)] * len(numbers))
-            function = cgutils.get_or_insert_function(builder.module, kind, name)
-            builder.call(function, [ir.Constant(ir.IntType(32), number) for number in numbers])
-
-        with builder.if_else(values[0]) as (then, otherwise):
-            with then:
-                if sys.platform == "win32":
-                    call("Sleep", ir.VoidType(), 0)
-                else:
-                    call("usleep", ir.IntType(32), 10)
-            with otherwise:
-                if platform.machine().lower() in ("x86_64", "amd64"):
-                    call("llvm.x86.sse2.pause", ir.VoidType())
-        return context.get_dummy_value()
-
-    return types.none(types.boolean), codegen
 
 
 # --- teams ------------------------------------------------------------------------------------
@@ -221,16 +144,16 @@ def _take_part(team, k):
     What a thread works on is in its caches, and to get it from there may take longer than the work:
     others take of its part when that gets no smaller for a while.
     """
-    size = _read(team + _SIZE)
-    epoch = _read(team + _TICKETS + 64 * k) >> 32
+    size = read(team + _SIZE)
+    epoch = read(team + _TICKETS + 64 * k) >> 32
     mine = 0
     looks = 0
     seen = 0
     while True:
         part = k
-        word = _read(team + _TICKETS + 64 * k)
+        word = read(team + _TICKETS + 64 * k)
         for other in range(0 if word & _LEFT > 0 else size):
-            found = _read(team + _TICKETS + 64 * other)
+            found = read(team + _TICKETS + 64 * other)
             if found & _LEFT > word & _LEFT:
                 part, word = other, found
         left = word & _LEFT
@@ -241,11 +164,11 @@ def _take_part(team, k):
         if part != k and looks < _LOOKS:
             looks += 1
             for _ in range(_APART):
-                _pause(False)
-        elif _replaced(team + _TICKETS + 64 * part, word, word - 1):
+                pause(False)
+        elif replaced(team + _TICKETS + 64 * part, word, word - 1):
             # As long as a number is not done, the loop stays that of now.
-            end = _read(team + _COUNT) * (part + 1) // size
-            task, arguments = _read(team + _TASK_AT), _read(team + _ARGUMENTS)
+            end = read(team + _COUNT) * (part + 1) // size
+            task, arguments = read(team + _TASK_AT), read(team + _ARGUMENTS)
             _call(task, arguments, end - left, team + _FAILED)
             mine += 1
             seen = word - 1
@@ -254,21 +177,21 @@ def _take_part(team, k):
 @subkernel
 def _share(team, count, task, arguments):
     """Let the team do a loop; its leader calls this."""
-    size = _read(team + _SIZE)
-    _write(team + _TASK_AT, task)
-    _write(team + _ARGUMENTS, arguments)
-    _write(team + _COUNT, count)
-    _write(team + _DONE, 0)
-    _write(team + _FAILED, 0)
-    epoch = _read(team + _EPOCH) + 1
+    size = read(team + _SIZE)
+    write(team + _TASK_AT, task)
+    write(team + _ARGUMENTS, arguments)
+    write(team + _COUNT, count)
+    write(team + _DONE, 0)
+    write(team + _FAILED, 0)
+    epoch = read(team + _EPOCH) + 1
     for part in range(size):
         numbers = count * (part + 1) // size - count * part // size
-        _write(team + _TICKETS + 64 * part, ((epoch & _LEFT) << 32) | numbers)
-    _write(team + _EPOCH, epoch)
+        write(team + _TICKETS + 64 * part, ((epoch & _LEFT) << 32) | numbers)
+    write(team + _EPOCH, epoch)
     mine = _take_part(team, 0)
     pauses = 0
-    while _read(team + _DONE) + mine < count:
-        _pause(pauses > _SHORT)
+    while read(team + _DONE) + mine < count:
+        pause(pauses > _SHORT)
         pauses += 1
 
 
@@ -278,17 +201,17 @@ def _serve(team, k):
     seen = -1
     pauses = 0
     while True:
-        state = _read(team + _STATE)
+        state = read(team + _STATE)
         if state == _ENDED or (state == _WAITS and pauses > _PATIENCE):
             return
-        epoch = _read(team + _EPOCH)
+        epoch = read(team + _EPOCH)
         if state == _LEADS and epoch != seen:
             seen = epoch
             pauses = 0
             mine = _take_part(team, k)
             if mine > 0:
-                _add(team + _DONE, mine)
-        _pause(pauses > _SHORT)
+                add(team + _DONE, mine)
+        pause(pauses > _SHORT)
         pauses += 1
 
 
@@ -296,11 +219,11 @@ def _serve(team, k):
 def _distribute(team, count, task, arguments):
     """Do a loop: by the team that is at work, if one is, else by threads that begin for it."""
     failed = _nothing()
-    if team == 0 or _read(team + _STATE) != _LEADS:
+    if team == 0 or read(team + _STATE) != _LEADS:
         _in_parallel(count, task, arguments, failed)
     elif count > 1:
         _share(team, count, task, arguments)
-        _write(failed, _read(team + _FAILED))
+        write(failed, read(team + _FAILED))
     elif count == 1:
         _call(task, arguments, 0, failed)
     _fail(task, arguments, failed)
@@ -309,7 +232,7 @@ def _distribute(team, count, task, arguments):
 @subkernel
 def _begin_and_end(team, body, leads, arguments):
     """Let threads do `body`: one of them leads, by doing `leads`."""
-    _in_parallel(_read(team + _SIZE), body, arguments, team + _LED)
+    _in_parallel(read(team + _SIZE), body, arguments, team + _LED)
     _fail(leads, arguments, team + _LED)
 
 
@@ -370,7 +293,7 @@ def by_team(function: Callable, parameters: str) -> Callable:
         items = ", ".join(f"a[{k}]" for k in range(1 + len(arguments)))
         names_of_words = {
             "LED": _LED, "STATE": _STATE, "LEADS": _LEADS, "ENDED": _ENDED, "RESULT": _RESULT,
-            "SIZE": _SIZE, "WAITS": _WAITS, "read": _read, "write": _write, "function": inner,
+            "SIZE": _SIZE, "WAITS": _WAITS, "read": read, "write": write, "function": inner,
         }  # fmt: skip
         leads = _task_of(
             f"{function.__qualname__}.leads", (mode, *arguments),

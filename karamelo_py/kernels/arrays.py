@@ -175,6 +175,16 @@ PROGRAM = np.dtype(
 HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the total, 0: nobody
 
 
+class Apart(NamedTuple):
+    """What each of so many threads, A, has of its own where hooks act on nodes."""
+
+    chosen: np.ndarray  # (A, BLOCK): see Hooks
+    scratch: np.ndarray  # (A, 8 + depth, BLOCK)
+    values: np.ndarray  # (A, ...): see Control
+    totals: np.ndarray  # (A, rows, LIMBS), zero between two loops
+    clock: np.ndarray  # (A, 1) CLOCK, of which what hooks read and write is used
+
+
 class Hooks(NamedTuple):
     """Compiled hooks of the fixes, called by address at their stage (see kernels.hooks)."""
 
@@ -189,6 +199,8 @@ class Hooks(NamedTuple):
     scratch: np.ndarray  # (8 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack
     held: np.ndarray  # (N, d) HELD, where hooks hold nodes in common; else (0, d)
     loads: np.ndarray  # (N, d) of this step, where hooks bring forces; else (0, d)
+    mode: NamedTuple  # one thread, or several
+    apart: Apart
 
 
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch

@@ -61,7 +61,7 @@ def _(hooks, stage, target, s):
     clock = s.control.clock[0]
     clock.set_low, clock.set_high = np.inf, -np.inf
     node_hooks(
-        stage, target, Line(), s.grids, s.heat.nodes, s.spans, hooks, s.control, step_size(s), 1.0
+        stage, target, Line(), s.grids, s.heat.nodes, s.ranges, hooks, s.control, step_size(s), 1.0
     )
     agree_on_heat(s.control.ranks, s.control)
     clock.coldest = min(clock.coldest, clock.set_low)

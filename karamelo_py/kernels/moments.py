@@ -18,7 +18,7 @@ def at_nodes(hooks, stage, target, s):
 def _(hooks, stage, target, s):
     clock = s.control.clock[0]
     node_hooks(
-        stage, target, s.kin, s.grids, s.nodes, s.spans, hooks, s.control, kick(s), clock.kept
+        stage, target, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), clock.kept
     )
     clock.set_low = clock.set_high = 0.0  # of temperatures only
 
@@ -30,7 +30,7 @@ def add_work(hooks, s):
 
 @add_work.on(Hooks)
 def _(hooks, s):
-    work_of_loads(s.kin, s.nodes, s.spans, hooks, s.control, kick(s))
+    work_of_loads(s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s))
 
 
 @shared

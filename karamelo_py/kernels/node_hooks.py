@@ -3,8 +3,11 @@
 import numpy as np
 
 from karamelo_py.compiler.addresses import caller_of
+from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.formula import BLOCK
+from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
     BEFORE,
@@ -28,14 +31,22 @@ from karamelo_py.kernels.hooks import (
     evaluate,
     publish_total,
 )
-from karamelo_py.kernels.totals import WORK, add_many, add_to, carry, counts, number_of_all
+from karamelo_py.kernels.totals import (
+    WORK,
+    add_many,
+    add_to,
+    carry,
+    counts,
+    hand_over,
+    number_of_all,
+)
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension
 
 _call_node_function = caller_of(NODE_FUNCTION)
 
-COUNT, ACT, RUB = 0, 1, 2  # what is done with the members of a hook
+COUNT, ACT, RUB, LOADS = 0, 1, 2, 3  # what is done with the members of a hook
 END = np.iinfo(np.int64).max  # behind the last of them
 
 
@@ -55,11 +66,11 @@ def _locate_nodes(kin, grids, hooks, count):
 
 
 @subkernel
-def _clear_held(kin, spans, held):
+def _clear_held(kin, ranges, held):
     """Nobody holds a node yet."""
     if held.size > 0:
-        for s in range(1, 1 + spans[0, 0]):
-            for n in range(spans[s, 0], spans[s, 1]):
+        for r in range(ranges[0, 0], ranges[ranges[0, 0] - 1, 1]):
+            for n in range(ranges[r, 0], ranges[r, 1]):
                 for c in range(dimension(kin)):
                     held[n, c].slot = 0
 
@@ -178,40 +189,52 @@ def _node(hooks, h, m):
 
 
 @subkernel
-def _choose_nodes(nodes, spans, hooks, h, span, member):
+def _choose_nodes(nodes, ranges, hooks, h, row, end, member):
     """The next members in use with mass, up to a block: how many, and where to go on."""
     of_all = hooks.table[h].begin < 0
+    behind = hooks.table[h].end
     member = max(member, hooks.table[h].begin)
     count = 0
-    # Members ascend as spans do: a wall may have many more nodes than a body reaches.
-    while span < spans[0, 0]:
-        low, high = spans[1 + span, 0], spans[1 + span, 1]
-        member = max(member, low) if of_all else member
+    # Members ascend as rows do: a wall may have many more nodes than a body reaches.
+    while row < end:
+        low, high = ranges[row, 0], ranges[row, 1]
+        if of_all:
+            member = max(member, low)
+        elif member < behind and hooks.members[member] < low:
+            member += np.searchsorted(hooks.members[member:behind], low)
         n = _node(hooks, h, member)
         while n < high:
             member += 1
-            if n >= low and nodes.sums[n, MASS] > 0:
+            if nodes.sums[n, MASS] > 0:
                 hooks.chosen[count] = n
                 count += 1
                 if count == BLOCK:
-                    return count, span, member
+                    return count, row, member
             n = _node(hooks, h, member)
-        span += 1
-    return count, span, member
+        row += 1
+    return count, row, member
 
 
 @subkernel
-def _go_through(task, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share):
-    """Do `task` with the members that have mass, block by block; return their number here."""
+def _go_through(
+    task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share, first, end
+):
+    """Do `task` with the members that have mass in shares of the nodes; return their number."""
     heavy = 0
-    count, span, member = BLOCK, NONE, NONE
-    while count == BLOCK:
-        count, span, member = _choose_nodes(nodes, spans, hooks, h, span, member)
-        if task == COUNT:
-            for q in range(count):
-                heavy += counts(control.ranks, hooks.chosen[q])
-        else:
-            _do_at_nodes(task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share)
+    for k in range(first, end):
+        if task == LOADS:
+            _work_at_nodes(kin, nodes, ranges, hooks, control, dt, k)
+            continue
+        count, row, member = BLOCK, ranges[k, 0], NONE
+        while count == BLOCK:
+            count, row, member = _choose_nodes(nodes, ranges, hooks, h, row, ranges[k, 1], member)
+            if task == COUNT:
+                for q in range(count):
+                    heavy += counts(control.ranks, hooks.chosen[q])
+            elif count > 0:
+                _do_at_nodes(
+                    task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
+                )
     return heavy
 
 
@@ -225,50 +248,12 @@ def _do_at_nodes(task, target, kin, grids, nodes, hooks, control, dt, kept, h, c
         _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, share)
 
 
-@entered
-def node_hooks(stage, target, kin, grids, nodes, spans, hooks, control, dt, kept):
-    """Call the node functions of `stage` on the members that have mass.
-
-    `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
-    """
-    dt = float(dt)
-    if target == ON_UPDATE:
-        _clear_held(kin, spans, hooks.held)
-    for h in range(len(hooks.table)):
-        if hooks.table[h].stage != stage:
-            continue
-        clear_total(hooks, h, control)
-        share = 1.0
-        if hooks.table[h].uses_share:
-            heavy = _go_through(
-                COUNT, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share
-            )
-            share = 1.0 / max(number_of_all(control.ranks, control, heavy), 1)
-        _go_through(ACT, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, share)
-        publish_total(hooks, h, control)
-    # Walls rub when it is known which of them hold a node.
-    for h in range(len(hooks.table)):
-        if hooks.table[h].stage != stage:
-            continue
-        rubs = hooks.programs[h, FRICTION].begin >= 0
-        if rubs:
-            _go_through(RUB, target, kin, grids, nodes, spans, hooks, control, dt, kept, h, 1.0)
-        if rubs or (hooks.table[h].holds and hooks.held.size > 0):
-            publish_total(hooks, h, control)
-
-
-@entered
-def work_of_loads(kin, nodes, spans, hooks, control, dt):
-    """Add up what the loads on nodes have done, and forget them; v* is that of the points now.
-
-    Force times the mean of the velocities before and after the step: what stress and those who hold
-    a node do to it in the same step counts, or the work would be of first order.
-    """
-    if hooks.loads.size == 0:
-        return
-    dt, count = float(dt), 0
-    for s in range(1, 1 + spans[0, 0]):
-        for n in range(spans[s, 0], spans[s, 1]):
+@subkernel
+def _work_at_nodes(kin, nodes, ranges, hooks, control, dt, k):
+    """Work of the loads on the nodes of the k-th share."""
+    count = 0
+    for r in range(ranges[k, 0], ranges[k, 1]):
+        for n in range(ranges[r, 0], ranges[r, 1]):
             for c in range(dimension(kin)):
                 load = hooks.loads[n, c]
                 if load == 0:
@@ -283,4 +268,123 @@ def work_of_loads(kin, nodes, spans, hooks, control, dt):
                     add_many(control.totals, WORK, hooks.scratch[VALUE], count)
                     count = 0
     add_many(control.totals, WORK, hooks.scratch[VALUE], count)
+
+
+# --- threads ----------------------------------------------------------------------------------
+
+
+@shared
+def _with(values, others):
+    """A NamedTuple with the items of another in the place of those with their names."""
+    new = dict(zip(others._fields, others, strict=True))
+    items = zip(values._fields, values, strict=True)
+    return type(values)(*(new.get(name, item) for name, item in items))
+
+
+@subkernel
+def _go_through_part(
+    task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share, k
+):
+    """The part of thread `k`, with a scratch and totals of its own: totals do not round."""
+    apart = hooks.apart
+    own = record(apart, k)
+    for i in range(control.values.size):
+        own.values[i] = control.values[i]
+    clock = own.clock[0]
+    clock.last_dt, clock.set_low, clock.set_high = control.clock[0].last_dt, np.inf, -np.inf
+    here, mine = hold(_with(hooks, own)), hold(_with(control, own))
+    shares, parts = ranges[0, 0], apart.chosen.shape[0]
+    first, end = shares * k // parts, shares * (k + 1) // parts
+    _go_through(
+        task, target, kin, grids, nodes, ranges, here, mine, dt, kept, h, share, first, end
+    )  # fmt: skip
+    hand_over(own.totals, control.totals, WORK)
+    for other in range(len(hooks.table)):
+        slot = hooks.table[other].slot
+        for row in range(max(slot, 0), min(slot + 3, own.totals.shape[0]) if slot >= 0 else 0):
+            hand_over(own.totals, control.totals, row)
+
+
+_go_through_parts = shared_out(
+    _go_through_part,
+    "task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share",
+)
+
+
+@point_function()
+def go_through(mode, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share):
+    """Do `task` with all members of a hook that have mass."""
+
+
+@go_through.on(Serial)
+def _(mode, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share):
+    _go_through(
+        task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share,
+        NONE, ranges[0, 0],
+    )  # fmt: skip
+
+
+@go_through.on(Threaded)
+def _(mode, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share):
+    parts = hooks.apart.chosen.shape[0]
+    _go_through_parts(
+        mode, parts, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share
+    )
+    if target == ON_UPDATE:
+        clock = control.clock[0]
+        for k in range(parts):
+            clock.set_low = min(clock.set_low, hooks.apart.clock[k, 0].set_low)
+            clock.set_high = max(clock.set_high, hooks.apart.clock[k, 0].set_high)
+
+
+@entered
+def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
+    """Call the node functions of `stage` on the members that have mass.
+
+    `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
+    """
+    dt = float(dt)
+    if target == ON_UPDATE:
+        _clear_held(kin, ranges, hooks.held)
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage != stage:
+            continue
+        clear_total(hooks, h, control)
+        share = 1.0
+        if hooks.table[h].uses_share:
+            heavy = _go_through(
+                COUNT, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share,
+                NONE, ranges[0, 0],
+            )  # fmt: skip
+            share = 1.0 / max(number_of_all(control.ranks, control, heavy), 1)
+        go_through(
+            hooks.mode, ACT, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share
+        )
+        publish_total(hooks, h, control)
+    # Walls rub when it is known which of them hold a node.
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage != stage:
+            continue
+        rubs = hooks.programs[h, FRICTION].begin >= 0
+        if rubs:
+            go_through(
+                hooks.mode, RUB, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, 1.0
+            )
+        if rubs or (hooks.table[h].holds and hooks.held.size > 0):
+            publish_total(hooks, h, control)
+
+
+@entered
+def work_of_loads(kin, grids, nodes, ranges, hooks, control, dt):
+    """Add up what the loads on nodes have done, and forget them; v* is that of the points now.
+
+    Force times the mean of the velocities before and after the step: what stress and those who hold
+    a node do to it in the same step counts, or the work would be of first order.
+    """
+    if hooks.loads.size == 0:
+        return
+    go_through(
+        hooks.mode, LOADS, ON_SUMS, kin, grids, nodes, ranges, hooks, control, float(dt), 0.0,
+        NONE, 1.0,
+    )  # fmt: skip
     carry(control.totals[WORK])

@@ -13,6 +13,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.words import add_among
 
 LIMBS = 68
 LOST = LIMBS - 1  # counts terms that are no numbers
@@ -95,6 +96,15 @@ def add_many(totals, row, terms, count):
     above = low >> 32
     add_to(totals, row, above * (2.0**32 * part))
     add_to(totals, row, (low - (above << 32)) * part)
+
+
+@subkernel
+def hand_over(own, totals, row):
+    """Add what a thread's own totals have in a row to those of all, and leave zeros."""
+    for k in range(LIMBS):
+        if own[row, k] != 0:
+            add_among(totals, row, k, own[row, k])
+            own[row, k] = 0
 
 
 @entered

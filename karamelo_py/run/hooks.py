@@ -6,15 +6,19 @@ import numpy as np
 
 from karamelo_py.compiler.addresses import address_of
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
+from karamelo_py.compiler.threads import Serial
 from karamelo_py.kernels.arrays import (
+    CLOCK,
     HELD,
     HOOK,
     POST_PARTICLES_TO_GRID,
     PROGRAM,
+    Apart,
     Hooks,
     NoHooks,
 )
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
+from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import told
 from karamelo_py.scene.hub import Hub
@@ -23,8 +27,8 @@ from karamelo_py.script.expressions import FIRST, POINT_SEEDS
 NO_PROGRAM = (-1, -1, -1, -1)
 
 
-def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
-    """Tables of the compiled hooks of `fixes`, in their order."""
+def lower_hooks(hub: Hub, fixes: list, mode: Any = None, threads: int = 1) -> Hooks | NoHooks:
+    """Tables of the compiled hooks of `fixes`, in their order; by one thread, or several."""
     dimension = hub.domain.dimension
     count = sum(s.count for s in hub.solids.values())
     builder = _Builder(hub, count)
@@ -47,6 +51,19 @@ def lower_hooks(hub: Hub, fixes: list) -> Hooks | NoHooks:
         scratch=np.zeros((STACK + ROWS, BLOCK)),
         held=np.zeros((builder.shared_nodes(), dimension), HELD).view(np.recarray),
         loads=np.zeros((builder.loaded_nodes, dimension)),
+        mode=mode or Serial(),
+        apart=_apart(threads if threads > 1 else 0, len(hub.values.array)),
+    )
+
+
+def _apart(threads: int, values: int) -> Apart:
+    """Room for what threads have of their own, with space between the values of two."""
+    return Apart(
+        chosen=np.zeros((threads, BLOCK), np.int64),
+        scratch=np.zeros((threads, STACK + ROWS, BLOCK)),
+        values=np.zeros((threads, values + 16)),
+        totals=np.zeros((threads, values, LIMBS), np.int64),
+        clock=np.zeros((threads, 1), CLOCK).view(np.recarray),
     )
 
 

@@ -26,7 +26,7 @@ class PythonHooks:
 
     def __init__(self, simulation: Any, fixes: list):
         self.simulation = simulation
-        self.compiled = lower_hooks(simulation.hub, fixes)
+        self.compiled = lower_hooks(simulation.hub, fixes, simulation.mode, simulation.threads)
         self.by_stage: dict[int, list[tuple[Any, Callable]]] = {}
         for fix in fixes:
             for name, hook in fix.hooks().items():
