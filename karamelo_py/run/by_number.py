@@ -7,8 +7,8 @@ import numpy as np
 from karamelo_py.kernels.arrays import MASS, Setup
 from karamelo_py.output.fields import PIECE
 from karamelo_py.output.node_columns import NodeRows, brought, loaded
+from karamelo_py.run.boxes import numbers
 from karamelo_py.run.state import of_nodes
-from karamelo_py.run.tiles import numbers
 
 
 class ByNumber:

@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.arrays import Block, Setup, arrays_of
+from karamelo_py.run.boxes import numbers
 from karamelo_py.run.crew import Crew
 from karamelo_py.run.handing import by_tile, join_tilings
 from karamelo_py.run.shares import joined, sized
 from karamelo_py.run.state import of_nodes
-from karamelo_py.run.tiles import SHARES, Tiles, numbers
+from karamelo_py.run.tiles import SHARES, Tiles
 
 
 def lined_up(

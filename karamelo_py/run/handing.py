@@ -3,8 +3,9 @@
 import numpy as np
 
 from karamelo_py.kernels.arrays import Block, Setup, Tiling, arrays_of
+from karamelo_py.run.boxes import between
 from karamelo_py.run.shares import occupied
-from karamelo_py.run.tiles import between, one_after_another, shares_of
+from karamelo_py.run.tiles import one_after_another, shares_of
 
 ROWS = ("number", "range", "grid", "box")  # of a tiling
 

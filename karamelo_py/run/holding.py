@@ -12,6 +12,7 @@ import numpy as np
 from karamelo_py.kernels.arrays import Block, Setup
 from karamelo_py.kernels.totals import WORK
 from karamelo_py.output.node_columns import NodeRows
+from karamelo_py.run.boxes import numbers
 from karamelo_py.run.by_id import ById, Piece
 from karamelo_py.run.gathering import join, lined_up, spread
 from karamelo_py.run.leading import Leading, by_all
@@ -21,7 +22,7 @@ from karamelo_py.run.shares import joined, sized, work_of
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.state import Stored, check_points, of_nodes, opened, take_known
 from karamelo_py.run.storing import own_share, stored, stored_snapshot, take_nodes, tilings_of
-from karamelo_py.run.tiles import DIRECT_UP_TO, Tiles, in_tiles, numbers
+from karamelo_py.run.tiles import DIRECT_UP_TO, Tiles, in_tiles
 from karamelo_py.scene.hub import Hub
 
 

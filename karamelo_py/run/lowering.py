@@ -46,8 +46,9 @@ from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import Moment, lost_shares
+from karamelo_py.run.buffers import no_nodes
 from karamelo_py.run.stable import sparse
-from karamelo_py.run.tiles import Tiles, no_nodes
+from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table

@@ -10,6 +10,8 @@ from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import Linked
 from karamelo_py.kernels.totals import WORK
 from karamelo_py.run.answers import Answers
+from karamelo_py.run.boxes import numbers
+from karamelo_py.run.buffers import no_nodes
 from karamelo_py.run.by_id import Ordered
 from karamelo_py.run.crew import Crew
 from karamelo_py.run.handing import by_tile, join_tilings, share_of, stripped
@@ -24,7 +26,7 @@ from karamelo_py.run.state import (
     take_tiling,
 )
 from karamelo_py.run.storing import points_of_tiles
-from karamelo_py.run.tiles import in_use, no_nodes, numbers
+from karamelo_py.run.tiles import in_use
 from karamelo_py.run.work import Work
 from karamelo_py.scene.hub import Hub
 

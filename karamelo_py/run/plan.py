@@ -8,12 +8,14 @@ from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
 from karamelo_py.kernels.step import Fused, Staged, step
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
+from karamelo_py.run.boxes import Boxes, numbers
+from karamelo_py.run.buffers import buffers_of, chosen_of, no_nodes, summed
 from karamelo_py.run.crew import Crew
 from karamelo_py.run.shares import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.sizes import memory_of
 from karamelo_py.run.stable import sparse
-from karamelo_py.run.tiles import SHARES, Boxes, buffers_of, chosen_of, no_nodes, numbers, summed
+from karamelo_py.run.tiles import SHARES
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 

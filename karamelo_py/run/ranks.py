@@ -16,11 +16,11 @@ import numpy as np
 from karamelo_py.kernels.arrays import Setup, arrays_of
 from karamelo_py.output.fields import PIECE
 from karamelo_py.run.answers import reads_totals
+from karamelo_py.run.boxes import numbers
 from karamelo_py.run.holding import Held, Holding
 from karamelo_py.run.leading import Abandoned, At, HandedOutAnew, by_all
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.state import of_nodes
-from karamelo_py.run.tiles import numbers
 
 FIRST, LAST = -(2**63), 2**63 - 1  # before all keys of points, and behind them
 SAMPLES = 256  # keys of all processes, by which a piece of points is cut

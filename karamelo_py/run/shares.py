@@ -11,23 +11,10 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of
 from karamelo_py.run.bisection import bisected
+from karamelo_py.run.boxes import Boxes, Reached, between, extents, ragged, rows_of, steps_of
+from karamelo_py.run.buffers import buffers_of, chosen_of, give_up
 from karamelo_py.run.crew import Crew
-from karamelo_py.run.tiles import (
-    SHARES,
-    Boxes,
-    Reached,
-    Tiles,
-    between,
-    buffers_of,
-    chosen_of,
-    extents,
-    give_up,
-    one_after_another,
-    ragged,
-    rows_of,
-    shares_of,
-    steps_of,
-)
+from karamelo_py.run.tiles import SHARES, Tiles, one_after_another, shares_of
 from karamelo_py.scene.lattice import Lattice
 
 IMBALANCE = 1.1  # largest share of the work over that after a new cut: above it tiles are cut anew

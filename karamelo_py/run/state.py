@@ -10,7 +10,8 @@ import numpy as np
 from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
-from karamelo_py.run.tiles import in_use, numbers, used
+from karamelo_py.run.boxes import numbers, used
+from karamelo_py.run.tiles import in_use
 from karamelo_py.script.errors import ScriptError
 
 # What else a simulation knows of its state; `measured` comes before what depends on its version.

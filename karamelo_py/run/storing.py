@@ -9,10 +9,11 @@ import numpy as np
 from karamelo_py.kernels.arrays import Tiling, arrays_of
 from karamelo_py.kernels.totals import carry
 from karamelo_py.output.fields import PIECE
+from karamelo_py.run.boxes import between, numbers
 from karamelo_py.run.handing import by_tile, join_tilings, share_of_tiling
 from karamelo_py.run.shares import SharedTiles
 from karamelo_py.run.state import Stored, known, latest, of_nodes, take_tiling, wholes
-from karamelo_py.run.tiles import SHARES, between, in_use, numbers
+from karamelo_py.run.tiles import SHARES, in_use
 
 
 def points_of_tiles(

@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 from itertools import product
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import records
 from karamelo_py.compiler.lanes import lanes_for
-from karamelo_py.compiler.packed import forget
 from karamelo_py.kernels.arrays import (
     ADD,
     CLEAR,
@@ -25,6 +23,19 @@ from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.sorting import order_in_tiles, order_points, widest
 from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.points.basis import shape_size
+from karamelo_py.run.boxes import (
+    Boxes,
+    Reached,
+    extents,
+    joined_spans,
+    numbered,
+    ragged,
+    ranges_of_shares,
+    rows_of,
+    steps_of,
+    used,
+)
+from karamelo_py.run.buffers import buffers_of, grow, room_of, summed
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
 # By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
@@ -37,7 +48,6 @@ SHARES = 64  # of the points of a block, nearly equal: threads share them out
 # Times the nodes: boxes that can have no more rows are made at once, on whole lines of the caches;
 # pages that none touches cost no memory. Larger ones grow.
 AT_ONCE = 8
-SPAN = 256  # nodes of a span at most
 DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
 DRIFT = 1.0  # cells that points may go at most before they are sorted again
 # By dimension, the least they may go: boxes are smaller then, and more points beside each other see
@@ -46,25 +56,6 @@ LEAST_DRIFT = {1: DRIFT, 2: DRIFT, 3: 0.25}
 STEPS = 32  # that are to be between two sorts where points may go further for that
 # The same where points give straight to the nodes: it costs only that more nodes are in use.
 DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
-
-
-class Boxes(NamedTuple):
-    """Boxes of nodes, of b tiles of points."""
-
-    order: np.ndarray  # (b,) in which they are summed
-    grid: np.ndarray  # (b,)
-    lo: np.ndarray  # (b, d) first nodes
-    hi: np.ndarray  # (b, d) last nodes
-
-
-class Reached(NamedTuple):
-    """Pairs of a box and a tile of nodes that it reaches."""
-
-    box: np.ndarray  # (k,) which box
-    tile: np.ndarray  # (k,) number of the tile of nodes
-    begin: np.ndarray  # (k, d) first nodes of the box in the tile
-    end: np.ndarray  # (k, d) last nodes
-    size: np.ndarray  # (k,) number of these nodes
 
 
 class Tiles:
@@ -109,7 +100,7 @@ class Tiles:
         self._first_node = np.array([x.first for x in lattices], np.int64)
         self._steps = steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
-        self.first = _numbered(self.shapes)
+        self.first = numbered(self.shapes)
         # Points without a domain reach no further than two cells from those of their tile.
         widest = np.minimum((self.size + 4) * self.per_cell + 1 + 2 * self.beyond, self._nodes)
         most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
@@ -118,7 +109,7 @@ class Tiles:
         self._start = np.zeros(self.count + 1, np.int64)
         tiles = -(-self._nodes // self.node_size)
         self._tile_steps = steps_of(tiles)
-        self._first_of_nodes = _numbered(tiles)
+        self._first_of_nodes = numbered(tiles)
         # Of all buffers of a scene: count, first and parts.
         self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
 
@@ -144,8 +135,8 @@ class Tiles:
         of = nodes._replace(fields=given)
         if not self.direct:
             of = Nodes(
-                *(_room(rows, array) for array in of[:-1]),
-                tuple(type(one)(_room(rows, one.array)) for one in given),
+                *(room_of(rows, array) for array in of[:-1]),
+                tuple(type(one)(room_of(rows, one.array)) for one in given),
             )
         self.sets += 1
         return Buffers(of, *self._layout, self.sets - 1)
@@ -275,11 +266,16 @@ class Tiles:
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
-        spans = _spans(self._parts(boxes.grid, boxes.lo, boxes.hi, 0, steps))
+        spans = joined_spans(self._parts(boxes.grid, boxes.lo, boxes.hi, 0, steps))
         parts = np.ones((len(spans), 10), np.int64)
         parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
         parts[:, 9] = CLEAR
-        return spans, _shared(spans, np.zeros(len(spans), np.int64), 1), [0, len(spans)], parts
+        return (
+            spans,
+            ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1),
+            [0, len(spans)],
+            parts,
+        )
 
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
         """Spans and ranges of the nodes in tiles that boxes reach; first of each share, and parts.
@@ -312,8 +308,13 @@ class Tiles:
         owner = owner[order][starts]
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
         rows = np.stack(rows_of(own), axis=1)
-        ranges = _shared(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
-        return _spans(own), ranges, firsts[np.searchsorted(owner, np.arange(SHARES + 1))], parts
+        ranges = ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
+        return (
+            joined_spans(own),
+            ranges,
+            firsts[np.searchsorted(owner, np.arange(SHARES + 1))],
+            parts,
+        )
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
         """The first of the tiles of nodes (n,) that are of one share with each.
@@ -333,7 +334,7 @@ class Tiles:
         order = np.argsort(tile, kind="stable")
         starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
         grid = np.searchsorted(self._first_of_nodes, tile[order][starts], side="right") - 1
-        return _spans(self._parts(grid, *extents(starts, begin[order], end[order]), 0, 0))
+        return joined_spans(self._parts(grid, *extents(starts, begin[order], end[order]), 0, 0))
 
     def _shares(self, s: Setup) -> np.ndarray:
         """The share of the points of its block that each own tile is in."""
@@ -417,45 +418,6 @@ class Tiles:
         return parts
 
 
-def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The least and largest of the rows from each start to the next."""
-    if not len(starts):
-        return begin, end
-    return np.minimum.reduceat(begin, starts), np.maximum.reduceat(end, starts)
-
-
-def _spans(boxes: np.ndarray) -> np.ndarray:
-    """(k, 2) the rows of boxes of nodes (see `Buffers`), joined where they meet."""
-    begin, end = rows_of(boxes)
-    order = np.argsort(begin, kind="stable")
-    begin, end = begin[order], np.maximum.accumulate(end[order])
-    apart = begin[1:] > end[:-1]
-    begin, end = np.append(begin[:1], begin[1:][apart]), np.append(end[:-1][apart], end[-1:])
-    of, left = ragged(-(-(end - begin) // SPAN))
-    begin = begin[of] + left * SPAN
-    return np.stack([begin, np.minimum(begin + SPAN, end[of])], axis=1)
-
-
-def _shared(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
-    """`Setup.ranges`: rows (k, 2) of `count` owners, joined where one ends at another."""
-    order = np.lexsort((rows[:, 0], owner))
-    rows, owner = rows[order], owner[order]
-    apart = (rows[1:, 0] != rows[:-1, 1]) | (owner[1:] != owner[:-1])
-    first, last = (edge[: len(rows)] for edge in (np.append(True, apart), np.append(apart, True)))
-    ends = count + np.searchsorted(owner[first], np.arange(count + 1))
-    return np.concatenate(
-        [np.stack([ends[:-1], ends[1:]], axis=1), np.stack([rows[first, 0], rows[last, 1]], axis=1)]
-    )
-
-
-def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First nodes of the rows of boxes of nodes (see `Buffers`), and those behind their last."""
-    row, left = ragged(boxes[:, 2] * boxes[:, 3])
-    own = boxes[row]
-    begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
-    return begin, begin + own[:, 4]
-
-
 def in_use(tiling: Tiling) -> list[tuple[str, int]]:
     """Names of the arrays of a tiling that a sort changes, and how many rows are in use."""
     tiles = tiling.count[0]
@@ -483,78 +445,3 @@ def one_after_another(ranges: np.ndarray) -> np.ndarray:
 def in_tiles(tiling: Tiling) -> int:
     """Number of the points in the tiles."""
     return int(tiling.range[: tiling.count[0], 1].max(initial=0))
-
-
-def no_nodes() -> dict[str, np.ndarray]:
-    """Room for the nodes in use of a setup, where none are yet."""
-    return {name: np.zeros((1, 2), np.int64) for name in ("spans", "ranges")}
-
-
-def used(spans: np.ndarray) -> np.ndarray:
-    """What of an array of spans is in use, the first row with their number."""
-    return spans[: 1 + spans[0, 0]]
-
-
-def numbers(spans: np.ndarray) -> np.ndarray:
-    """The numbers of the nodes in spans, of which the first row is the count."""
-    return between(*used(spans)[1:].T)
-
-
-def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """All whole numbers from each begin to before its end."""
-    of, left = ragged(end - begin)
-    return begin[of] + left
-
-
-def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For each of so many items of each of k lists: its list, and its number in that."""
-    of = np.repeat(np.arange(len(counts)), counts)
-    return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
-
-
-def buffers_of(s: Setup) -> list[Buffers]:
-    """All buffers of a scene, in the order of their numbers."""
-    return [s.buffers] + ([s.heat.buffers] if isinstance(s.heat, Conducting) else [])
-
-
-def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
-    """The arrays that points give to, of the kinds that `what` names (kernels.sums.given)."""
-    sums, velocity, *rest = summed(nodes)
-    return [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
-
-
-def summed(nodes: Nodes) -> list[np.ndarray]:
-    """The arrays that points give to."""
-    own = [one.array for one in nodes.fields if getattr(type(one), "summed", False)]
-    return [nodes.sums, nodes.velocity, *own]
-
-
-def _numbered(shapes: np.ndarray) -> np.ndarray:
-    """(k + 1,) where numbers of what is in boxes of these shapes (k, d) begin, and the end."""
-    return np.concatenate([[0], np.cumsum(np.prod(shapes, axis=1))])
-
-
-def steps_of(shapes: np.ndarray) -> np.ndarray:
-    """Steps (k, d) from a number to that of the neighbour in boxes of these shapes (k, d)."""
-    after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
-    return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
-
-
-def _room(rows: int, like: np.ndarray) -> np.ndarray:
-    """So many rows as the array has, zero; with none it can grow."""
-    width, kind = like.shape[1], like.dtype
-    return records(rows, width, kind) if rows else np.zeros((0, width), kind)
-
-
-def give_up(array: np.ndarray) -> None:
-    """Let an array, which is of no use any more, have no memory."""
-    if array.flags.owndata:
-        forget(array)
-        array.resize((0,) * array.ndim, refcheck=False)
-
-
-def grow(array: np.ndarray, rows: int) -> None:
-    """See that an array has so many rows; in place, since setups hold it."""
-    if len(array) < rows:
-        forget(array)
-        array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

@@ -1,0 +1,98 @@
+"""Boxes of nodes, and ranges of their numbers."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+SPAN = 256  # nodes of a span at most
+
+
+class Boxes(NamedTuple):
+    """Boxes of nodes, of b tiles of points."""
+
+    order: np.ndarray  # (b,) in which they are summed
+    grid: np.ndarray  # (b,)
+    lo: np.ndarray  # (b, d) first nodes
+    hi: np.ndarray  # (b, d) last nodes
+
+
+class Reached(NamedTuple):
+    """Pairs of a box and a tile of nodes that it reaches."""
+
+    box: np.ndarray  # (k,) which box
+    tile: np.ndarray  # (k,) number of the tile of nodes
+    begin: np.ndarray  # (k, d) first nodes of the box in the tile
+    end: np.ndarray  # (k, d) last nodes
+    size: np.ndarray  # (k,) number of these nodes
+
+
+def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First nodes of the rows of boxes of nodes (see `Buffers`), and those behind their last."""
+    row, left = ragged(boxes[:, 2] * boxes[:, 3])
+    own = boxes[row]
+    begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
+    return begin, begin + own[:, 4]
+
+
+def joined_spans(boxes: np.ndarray) -> np.ndarray:
+    """(k, 2) the rows of boxes of nodes (see `Buffers`), joined where they meet."""
+    begin, end = rows_of(boxes)
+    order = np.argsort(begin, kind="stable")
+    begin, end = begin[order], np.maximum.accumulate(end[order])
+    apart = begin[1:] > end[:-1]
+    begin, end = np.append(begin[:1], begin[1:][apart]), np.append(end[:-1][apart], end[-1:])
+    of, left = ragged(-(-(end - begin) // SPAN))
+    begin = begin[of] + left * SPAN
+    return np.stack([begin, np.minimum(begin + SPAN, end[of])], axis=1)
+
+
+def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
+    """`Setup.ranges`: rows (k, 2) of `count` owners, joined where one ends at another."""
+    order = np.lexsort((rows[:, 0], owner))
+    rows, owner = rows[order], owner[order]
+    apart = (rows[1:, 0] != rows[:-1, 1]) | (owner[1:] != owner[:-1])
+    first, last = (edge[: len(rows)] for edge in (np.append(True, apart), np.append(apart, True)))
+    ends = count + np.searchsorted(owner[first], np.arange(count + 1))
+    return np.concatenate(
+        [np.stack([ends[:-1], ends[1:]], axis=1), np.stack([rows[first, 0], rows[last, 1]], axis=1)]
+    )
+
+
+def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The least and largest of the rows from each start to the next."""
+    if not len(starts):
+        return begin, end
+    return np.minimum.reduceat(begin, starts), np.maximum.reduceat(end, starts)
+
+
+def used(spans: np.ndarray) -> np.ndarray:
+    """What of an array of spans is in use, the first row with their number."""
+    return spans[: 1 + spans[0, 0]]
+
+
+def numbers(spans: np.ndarray) -> np.ndarray:
+    """The numbers of the nodes in spans, of which the first row is the count."""
+    return between(*used(spans)[1:].T)
+
+
+def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """All whole numbers from each begin to before its end."""
+    of, left = ragged(end - begin)
+    return begin[of] + left
+
+
+def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For each of so many items of each of k lists: its list, and its number in that."""
+    of = np.repeat(np.arange(len(counts)), counts)
+    return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
+
+
+def numbered(shapes: np.ndarray) -> np.ndarray:
+    """(k + 1,) where numbers of what is in boxes of these shapes (k, d) begin, and the end."""
+    return np.concatenate([[0], np.cumsum(np.prod(shapes, axis=1))])
+
+
+def steps_of(shapes: np.ndarray) -> np.ndarray:
+    """Steps (k, d) from a number to that of the neighbour in boxes of these shapes (k, d)."""
+    after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
+    return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
