@@ -196,8 +196,9 @@ def join(asked: int | None, ends: Callable[[BaseException], None]) -> Crew:
 
 
 def share(hub: Hub, crew: Crew) -> None:
-    """Let a scene be stepped by all processes of the crew; the first writes."""
-    hub.settings.crew, hub.settings.engine = crew, "ranks"
+    """Let a scene be stepped by all processes of the crew; the first writes. One needs no other."""
+    if crew.size > 1:
+        hub.settings.crew, hub.settings.engine = crew, "ranks"
     if not crew.leads:
         hub.output.writes = False
         hub.output.log.rows = []
