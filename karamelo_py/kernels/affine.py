@@ -111,8 +111,9 @@ def _(width, kin, parts):
     if len(parts) != 2 or of_force(kin) != 4:
         return parts
     array, first, a, to_a = parts[0]
-    _, _, b, to_b = parts[1]
-    if len(a) != 1 + dimension(kin) or not (len(to_a) and len(to_b)):
+    _, second, b, to_b = parts[1]
+    of_sums = first == MASS and second == of_force(kin)
+    if not (of_sums and len(to_a) and len(to_b)):
         return parts
     growths = [_beside(x, y) for x, y in zip(to_a, to_b, strict=True)]
     return ((array, first, _beside(a, b), tuple(growths)),)

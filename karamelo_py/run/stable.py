@@ -8,7 +8,8 @@ import numpy as np
 from karamelo_py.kernels.arrays import DT
 from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.kernels.laws import law_on
-from karamelo_py.points.laws import Absent, initial_state, law_kind, wave_speed_squared
+from karamelo_py.points.laws import Absent, can, initial_state, law_kind, wave_speed_squared
+from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.rigid import Rigid
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
@@ -22,6 +23,7 @@ USUAL = 0.9
 BOXES = 6.0  # weight of a common drift in the steps of boxes
 LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
 FLOWING = Viscous, MuI, DruckerPrager, MohrCoulomb  # strengths of what has no shape of its own
+LONE = 0.9  # of the stable step of a lone point: one that swells is stiffer
 DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
 
 
@@ -66,15 +68,41 @@ def _keeps_velocities(hub: Hub) -> bool:
     )
 
 
+def _deforming(hub: Hub) -> list[Any]:
+    laws = [solid.material.law for solid in hub.solids.values()]
+    return [law for law in laws if Rigid not in law_kind(law)]
+
+
+def _flows(law: Any) -> bool:
+    """Whether a body of this law has no shape of its own, as liquids and soils."""
+    strength = getattr(law, "strength", None)
+    return strength is not None and (
+        isinstance(strength, FLOWING) or not shear_modulus(strength) > 0
+    )
+
+
 def one_body(hub: Hub) -> bool:
     """Whether all that deforms is one solid, of an elastic law or a metal: nothing that flows."""
-    laws = [solid.material.law for solid in hub.solids.values()]
-    laws = [law for law in laws if Rigid not in law_kind(law)]
-    strengths = [getattr(law, "strength", None) for law in laws]
-    return len(laws) == 1 and all(
-        strength is None or (shear_modulus(strength) > 0 and not isinstance(strength, FLOWING))
-        for strength in strengths
-    )
+    laws = _deforming(hub)
+    return len(laws) == 1 and not any(map(_flows, laws))
+
+
+def lone_point(hub: Hub) -> float:
+    """The stable step over h/c of a point that has its nodes for itself and keeps a moment.
+
+    The velocity gradient L that it keeps answers to its pressure by dL/dt = -p / (rho D): an
+    oscillator of the frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c; sums of
+    |grad N|^2 / N stand for 1 / D where gradients are kept. Points of what flows come to be alone;
+    those of a gas keep no moments then (`kernels.loss.in_company`).
+    """
+    update = hub.update
+    keeps = Moment in getattr(update.transfer, "point_fields", ()) and update.method.frame.moves
+    stiff = getattr(update.method.basis, "lone", None)
+    flowing = any(_flows(law) and not can(law, taken_heat) for law in _deforming(hub))
+    if not (keeps and stiff and flowing):
+        return inf
+    by_gradient = not getattr(update.transfer, "inverts_spread", False)
+    return LONE * 2 / sqrt(stiff[by_gradient] * hub.domain.dimension)
 
 
 def bears_drift(hub: Hub) -> bool:
@@ -157,7 +185,8 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     if still:
         # A lone point of linear functions is stable up to 0.8 h/c in space.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
-    return courant_number(hub, longer=still or bears_drift(hub)), share
+    courant = courant_number(hub, longer=still or bears_drift(hub))
+    return min(courant, lone_point(hub)), share
 
 
 def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
@@ -261,7 +290,8 @@ def ruling_limit(simulation: Any) -> str:
 
     ``set_dt`` and ``end`` (of the run) are no limits of stability; ``conduction`` is that of heat,
     ``viscosity`` that of waves which viscosity slows down, ``speed`` that of points which move
-    faster than waves, ``light_nodes`` that of usl, and ``waves`` that of the others.
+    faster than waves, ``light_nodes`` that of usl, ``lone_points`` that of points with moments, and
+    ``waves`` that of the others.
     """
     control = simulation.control
     clock = control.clock[0]
@@ -281,7 +311,9 @@ def ruling_limit(simulation: Any) -> str:
     without = _speed_without_viscosity(simulation)
     if 0 < without < (clock.rate - speed) / 1.2:
         return "viscosity"
-    return "light_nodes" if clock.courant < 1 else "waves"
+    if clock.courant < 1:
+        return "lone_points" if clock.courant == lone_point(simulation.hub) else "light_nodes"
+    return "waves"
 
 
 def _speed_without_viscosity(simulation: Any) -> float:

@@ -32,6 +32,9 @@ courant_still, courant_total
 courant_strained_first
     the most of `courant_still` where the strain comes before the forces, as in usf (no bound, where
     a class does not say);
+lone
+    of functions with smooth gradients, h^2 / D and the most of h^2 sum_I |grad N_I|^2 / N_I a
+    direction, away from walls: what makes a point stiff that has its nodes for itself;
 bears_drift
     whether bodies that drift keep their energy with the step of bodies at rest, with musl and usf
     too (not, where a class does not say);

@@ -21,6 +21,7 @@ class CubicSpline(NamedTuple):
 
     steep_edge = False
     in_lanes = True
+    lone = (3.0, 3.14)
     # Of the stable step where points stay in their cells. The shortest waves are all but averaged
     # away: a shaken block is stable up to 2.1 to 2.4 h/c in 1D (tests/test_stability.py), 1.8 to
     # 2.4 in the plane and 1.4 to 2.3 in space (Poisson's ratio 0.45 and 0).

@@ -22,6 +22,7 @@ class QuadraticSpline(NamedTuple):
 
     steep_edge = False
     in_lanes = True
+    lone = (4.0, 6.0)
     # Of the stable step while points are where they were. By the highest frequency of a free block:
     # up to 1.8 to 2.6 h/c in 1D, 1.58 to 2.5 in the plane, 1.4 to 2.4 in space, over places,
     # distances, walls and Poisson's ratios up to 0.49.

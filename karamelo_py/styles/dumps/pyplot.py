@@ -183,7 +183,8 @@ class PyPlot(Dump):
         """Volumes of those of these whose id is a multiple of `every`."""
         volume = points.particle("volume")
         if self.hub.domain.axisymmetric:
-            volume = volume / points.particle("x")  # of a ring, per radian
+            x = points.particle("x")
+            volume = volume / np.maximum(x, 1e-3 * x.max(initial=0.0))  # of a ring, per radian
         return volume[points.particle("id") % every == 0]
 
     def cells(self, points: Fields, look: Look) -> np.ndarray:

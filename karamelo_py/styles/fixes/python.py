@@ -196,6 +196,8 @@ class Python(Fix):
             )
             told.complete = True
             raise told from error
+        if self.point_by_point:
+            self._agree(given)
         if given is None:
             return
         numbers = np.asarray(given, float)
@@ -203,6 +205,23 @@ class Python(Fix):
             self.publish("", numbers)
         else:
             self.publish_components(numbers)
+
+    def _agree(self, given: Any) -> None:
+        """See that all processes return the same."""
+        crew = self.hub.settings.crew
+        if crew is None:
+            return
+        own = None if given is None else np.asarray(given, float).tolist()
+        first, *others = map(repr, crew.everyone(own))
+        other = next((one for one in others if one != first), None)
+        if other is not None:
+            raise ScriptError(
+                f"fix python: {_name(self.function)} returns {first} on one process and {other} "
+                "on another",
+                place=self.place,
+                hint="each has a part of the points: sum by points.total(values) or "
+                "nodes.total(values), which all share, or leave point_by_point out",
+            )
 
 
 class Keeper:

@@ -1,0 +1,45 @@
+"""A point that has its nodes for itself and keeps a moment: an oscillator of c sqrt(d / D)."""
+
+from math import sqrt
+
+import pytest
+
+C = 10.0  # speed of sound, sqrt(1e5 / 1000)
+SCRIPT = """
+method(ulmpm, TRANSFER, quadratic-spline)
+dimension(2, 0, 2, 0, 2, 0.1)
+region(b, block, 0.91, 0.99, 0.91, 0.99)
+eos(we, linear, 1000, 1e5)
+strength(ws, fluid, 0)
+material(water, eos-strength, we, ws)
+solid(s, region, b, 1, water, 0.1, 0)
+fix(start, initial_velocity_particles, all, 0.3 + 0.5*(x - 0.95), 0.1)
+compute(Es, strain_energy, all)
+compute(Ek, kinetic_energy, all)
+log_modify(custom, step, dt, Es, Ek)
+set_output(1)
+STEP
+run(150)
+"""
+
+
+@pytest.mark.parametrize("transfer", ["APIC", "MLS", "TPIC"])
+def test_the_own_step_of_what_flows_bears_a_lone_point(run_interpreted, transfer):
+    """Below 2 / (c sqrt(d / D)) = 0.707 h/c, D = h^2 / 4 of quadratic splines (Jiang et al. 2017).
+
+    By the sqrt(d / D) of gradients that TPIC keeps, sum |grad N|^2 / N <= 6 / h^2: 0.577 h/c.
+    """
+    done = run_interpreted(SCRIPT.replace("TRANSFER", transfer).replace("STEP", ""))
+    stored = done.log["Es"]
+    assert stored[1:40].max() > 0
+    assert stored.max() < 1.5 * stored[:40].max()
+    dt = 0.9 * 0.9 * 2 / sqrt(2 * (6 if transfer == "TPIC" else 4)) * 0.1 / C
+    assert done.log["dt"][1:].max() == pytest.approx(dt, rel=0.05)  # less by the speed
+
+
+def test_above_the_limit_it_does_not(run_interpreted):
+    """At 0.85 h/c, between the limits of one dimension and of two."""
+    script = SCRIPT.replace("TRANSFER", "MLS").replace("STEP", f"set_dt({0.85 * 0.1 / C})")
+    done = run_interpreted(script, status=None)
+    stored = done.log["Es"]
+    assert done.status == 1 or stored.max() > 10 * stored[1:5].max()
