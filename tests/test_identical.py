@@ -203,19 +203,20 @@ def test_compiled_stages(state):
 
 
 @pytest.mark.xdist_group("single")
-def test_single_precision(state):
-    """Numbers are single everywhere, and close to those in double.
+@pytest.mark.parametrize("transfer", ["FLIP", "MLS"])
+def test_single_precision(state, transfer):
+    """Numbers are single (everywhere: the next test), and close to those in double.
 
     Each of 40 steps rounds to 6e-8; stress comes from differences of velocities over a cell and is
     rounded to 6e-8 E (= 6e-6), so velocities of order 2 differ by dt f/m of that: below 1e-4. Where
     a point crosses into a cell without others, one step earlier or later, more may differ.
     """
-    double = state(crossing(2, "run(40)", laws=("linear",)))
-    single = state(crossing(2, "run(40)", laws=("linear",), precision="single"))
-    for name, array in single.items():
-        if name not in ("time", "values", "totals", "work"):  # of the scene, and exact sums
-            assert array.dtype == np.float32, name
-            assert double[name].dtype == np.float64, name
+    scene = {"laws": ("linear",), "transfer": transfer}
+    double = state(crossing(2, "run(40)", **scene))
+    single = state(crossing(2, "run(40)", **scene, precision="single"))
+    for name in ("x", "v"):
+        assert single[name].dtype == np.float32
+        assert double[name].dtype == np.float64
     assert np.abs(single["x"] - double["x"]).max() < 1e-5
     assert np.abs(single["v"] - double["v"]).max() < 1e-3
 

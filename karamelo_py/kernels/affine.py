@@ -111,8 +111,8 @@ def _(width, kin, parts):
     if len(parts) != 2 or of_force(kin) != 4:
         return parts
     array, first, a, to_a = parts[0]
-    _, second, b, to_b = parts[1]
-    of_sums = first == MASS and second == of_force(kin)
+    _, _, b, to_b = parts[1]
+    of_sums = len(a) == 1 + dimension(kin) and len(b) == dimension(kin)
     if not (of_sums and len(to_a) and len(to_b)):
         return parts
     growths = [_beside(x, y) for x, y in zip(to_a, to_b, strict=True)]
