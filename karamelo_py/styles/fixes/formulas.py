@@ -65,7 +65,8 @@ def gradient(
     out = np.zeros_like(x, float)
     if formula.is_constant:
         return out
-    unmoved = (x == x0).all(axis=1)
+    # Positions in single precision are rounded.
+    unmoved = (np.abs(x - x0) <= 0.01 * step).all(axis=1)
     for k in range(x.shape[1]):
         shift = np.zeros_like(out)
         shift[:, k] = step
