@@ -27,6 +27,7 @@ needs_mpi = pytest.mark.skipif(
     MPIEXEC is None or find_spec("mpi4py") is None or sys.platform == "win32",
     reason="needs mpi4py and mpiexec: pip install 'karamelo-py[mpi]'",
 )
+FULL = pytest.mark.full
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.start"]
 FILES = (
     "dump(d, all, particle, 10, d.txt, x, y, vx, s11)", "dump(n, all, grid/hdf5, 20, n.h5, mass)",
@@ -227,12 +228,16 @@ def running(folder: Path, *lines: str, **more: str) -> subprocess.Popen:
 
 
 @needs_mpi
-def test_a_signal(tmp_path):
-    """As with one process: the last state, whole files, 128 + its number."""
+@pytest.mark.parametrize(
+    ("rank", "number"),
+    [(None, signal.SIGTERM), (1, signal.SIGTERM), pytest.param(1, signal.SIGINT, marks=FULL)],
+)
+def test_a_signal(tmp_path, rank, number):
+    """As with one process: the last state, whole files, 128 + its number; whoever gets it."""
     process = running(tmp_path, "dump(d, all, particle, 1000, d.*.txt, x)")
-    process.send_signal(signal.SIGTERM)
+    os.kill(process.pid if rank is None else _pids(process.pid)[rank], number)
     _out, err = process.communicate(timeout=120)
-    assert process.returncode == 128 + signal.SIGTERM, err
+    assert process.returncode == 128 + number, err
     assert err.count("interrupted: the log and the dumps are complete") == 1
     last = (tmp_path / "run" / "log.mpm").read_text(encoding="utf-8").split()[-3]
     assert (tmp_path / "run" / f"d.{last}.txt").exists()
@@ -262,6 +267,22 @@ def test_a_signal_before_the_run(tmp_path, ranks):
     assert not out and err == "error: ended by SIGTERM\n"
 
 
+@needs_mpi
+@pytest.mark.parametrize("words", [pytest.param((), marks=FULL), ("--ranks", "2")])
+def test_a_signal_amid_the_first_picture(tmp_path, words):
+    """It is drawn, and the run takes no step."""
+    path = moving(tmp_path, "dump(d, all, pyplot, 1000, d.*.png, 30, 30, vx)", "run(2)")
+    process = started(tmp_path / "run", *PROGRAM, str(path), *words)
+    while not list((tmp_path / "run").glob("*.part")):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.005)
+    process.send_signal(signal.SIGTERM)
+    _out, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert err.count("interrupted: the log and the dumps are complete") == 1
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["d.0.png", "log.mpm"]
+
+
 SOON = """
 from karamelo_py.app import launch
 launch.LOOK, launch.STANDS = 0.1, 0.5
@@ -288,7 +309,7 @@ def test_a_process_is_stopped(tmp_path):
 
 
 @needs_mpi
-@pytest.mark.parametrize("rank", [pytest.param(0, marks=pytest.mark.full), 1])
+@pytest.mark.parametrize("rank", [pytest.param(0, marks=FULL), 1])
 def test_a_process_is_killed(tmp_path, rank):
     process = running(tmp_path)
     os.kill(_pids(process.pid)[rank], signal.SIGKILL)
@@ -356,7 +377,7 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
 @pytest.mark.parametrize(
     "function",
     [
-        pytest.param("ranks.Ranks._advance", marks=pytest.mark.full),
+        pytest.param("ranks.Ranks._advance", marks=FULL),
         "shares.SharedTiles.give",
         "linear_momentum.LinearMomentum.terms",
     ],
@@ -393,7 +414,7 @@ FAILS = "def push(points):\n    if points.time > 0.01:\n        points.force[999
     "line, says",
     [
         ("dump(d, all, particle, 5, d.*.txt, x)", "Read-only file system"),
-        ("dump(d, all, vtk, 5, d.*.vtu)", "Read-only file system"),
+        pytest.param("dump(d, all, vtk, 5, d.*.vtu)", "Read-only file system", marks=FULL),
         ("restart(5, r.*.h5)", "Read-only file system"),
         ("fix(f, python, all, fails.push)", "index 99999 is out of bounds"),
     ],
@@ -410,6 +431,46 @@ def test_the_first_fails(tmp_path, line, says):
     assert status == 1, err
     assert err.count("error: ") == 1 and says in err
     assert not list((tmp_path / "run").glob("*.part"))
+
+
+ONE_FAILS = """
+import os
+from karamelo_py.styles.fixes.python import Python
+second = os.environ.get("OMPI_COMM_WORLD_RANK", "1") == "1"
+def fails(points):
+    if second and points.time > 0.015:
+        points.force[99999] = 0
+    Python._agree = lambda *_: None  # which a fix of a plug-in has not
+def is_silent(points):
+    return None if second else 1
+def differs(points):
+    return 0.1 + second
+fails.point_by_point = is_silent.point_by_point = differs.point_by_point = True
+"""
+
+
+@needs_mpi
+@pytest.mark.parametrize(
+    "function, says",
+    [
+        ("fails", "index 99999 is out of bounds"),
+        ("is_silent", "is_silent returns 1.0 on one process and None on another"),
+        ("differs", "differs returns 0.1 on one process and 1.1 on another"),
+    ],
+)
+def test_a_function_fails_on_one_process(tmp_path, function, says):
+    """At the end of a step, whose row is not written then, as with a single process."""
+    (tmp_path / "sitecustomize.py").write_text(SMALL_TILES, encoding="utf-8")
+    (tmp_path / "one.py").write_text(ONE_FAILS, encoding="utf-8")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    path = moving(
+        tmp_path, f"fix(f, python, all, one.{function}, final_integrate)", "set_output(1)", "run(9)"
+    )
+    status, _, err = by_ranks(tmp_path / "two", path, 2, PYTHONPATH=folders)
+    assert status == 1 and err.count("error: ") == 1 and says in err
+    if function == "fails":
+        assert by_ranks(tmp_path / "one", path, 1, PYTHONPATH=folders)[0] == 1
+        same_files(tmp_path / "one", tmp_path / "two")
 
 
 # --- before anything is started -----------------------------------------------------------------

@@ -14,7 +14,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -22,7 +21,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from karamelo_py.app.leaving import SIGNALLED
-from karamelo_py.run.crew import ENDING, INSTALL
+from karamelo_py.run.crew import ENDING, INSTALL, heeding
 from karamelo_py.script.errors import ScriptError, render_message
 
 # Where the launcher of this program waits for the processes to report.
@@ -101,7 +100,6 @@ class Launcher:
         self.over = False  # the first has done all
         self.failed = 0.0  # when one has told that it failed
         self.signals: list[int] = []
-        self.heeded: list[int] = []
         self.stopped: dict[int, float] = {}  # since when
         self.told: set[int] = set()  # of these
         self.looked = 0.0
@@ -109,7 +107,7 @@ class Launcher:
 
     def run(self) -> int:
         """Start them and see them end; returns the exit status."""
-        with socket.socket(socket.AF_UNIX) as self.door, self._hearing():
+        with socket.socket(socket.AF_UNIX) as self.door, heeding(self._pass_on):
             self.door.bind(self.name)
             self.door.listen(self.ranks)
             environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}
@@ -134,22 +132,6 @@ class Launcher:
         return status
 
     # --- while they run ---------------------------------------------------------------------------
-
-    @contextmanager
-    def _hearing(self) -> Iterator[None]:
-        """Signals go to the first process, except what this one was told to ignore."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        before = {number: signal.getsignal(number) for number in ENDING}
-        self.heeded = [n for n, handler in before.items() if handler != signal.SIG_IGN]
-        for number in self.heeded:
-            signal.signal(number, self._pass_on)
-        try:
-            yield
-        finally:
-            for number in self.heeded:
-                signal.signal(number, before[number])
 
     def _pass_on(self, number: int, _: Any) -> None:
         self.signals.append(number)
@@ -240,19 +222,23 @@ class Launcher:
             what = "interrupted" if first == signal.SIGINT else f"ended by {first.name}"
             self._say(render_message("error", what))
             return SIGNALLED + self.signals[0]
-        self._say(self._loss() if self.lost else self._no_start())
         status = self.process.returncode
-        return SIGNALLED - status if status < 0 else status or 1
+        status = SIGNALLED - status if status < 0 else status or 1
+        self._say(self._loss(status) if self.lost else self._no_start())
+        return status
 
-    def _loss(self) -> str:
-        one = self.lost[0]
-        who = f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended"
+    def _loss(self, status: int) -> str:
+        one, sent = self.lost[0], status - SIGNALLED
+        by = f" by {signal.Signals(sent).name}" if sent in signal.valid_signals() else ""
+        who = f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended{by}"
         if self.over:
             return render_message("error", f"{who} when the runs were over: all files are complete")
         return render_message(
             "error",
             f"{who}, and the run with it: files are complete up to there",
-            hint="the system ends processes that take too much memory",
+            hint="the system does that to who takes too much memory"
+            if sent not in ENDING
+            else None,
         )
 
     def _no_start(self) -> str:

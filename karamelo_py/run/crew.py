@@ -3,6 +3,7 @@
 import os
 import signal
 import socket
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -28,6 +29,24 @@ ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 # Words at a meeting beside those of runs, which are above zero.
 WELL, FAILED = 0, -1
 PAUSE = 0.005  # seconds between two looks whether the others have come
+
+
+@contextmanager
+def heeding(handler: Callable[[int, Any], None]) -> Iterator[None]:
+    """Have signals that end programs call a handler, but for those that are ignored."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in ENDING}
+    # Whoever started the program may have it go on when the terminal is closed (nohup).
+    heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
+    for number in heeded:
+        signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number in heeded:
+            signal.signal(number, before[number])
 
 
 def launched() -> tuple[int, int]:
@@ -56,6 +75,8 @@ class Crew:
         Whether this process has failed in the midst of what all do together.
     parted
         Whether the processes do not go on together: one has failed, or has another script.
+    signal
+        What this process has been sent in a run, which all are to end with.
 
     Raises
     ------
@@ -65,6 +86,7 @@ class Crew:
 
     beside = 1
     waited = 0.0
+    signal = 0
     amid = parted = False
     _ends = None
 

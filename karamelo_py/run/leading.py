@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import signal
-import threading
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from enum import Enum, auto
@@ -13,7 +12,7 @@ from zlib import crc32
 
 import numpy as np
 
-from karamelo_py.run.crew import ENDING, FAILED, Crew
+from karamelo_py.run.crew import FAILED, Crew, heeding
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
@@ -115,9 +114,16 @@ class Leading(Simulation):
 
     def follow(self) -> None:
         """Do what the first process says, until its run is over."""
-        if threading.current_thread() is threading.main_thread():
-            for number in ENDING:  # the first hears of them
-                signal.signal(number, signal.SIG_IGN)
+        with heeding(self._note):
+            self._do_what_is_said()
+        if self.crew.signal:  # behind the last step
+            os.kill(os.getpid(), self.crew.signal)
+
+    def _note(self, number: int, _: Any) -> None:
+        """A signal that this process alone may have got: all are told of it with their steps."""
+        self.crew.signal = number
+
+    def _do_what_is_said(self) -> None:
         self._meet()
         hub = self.hub
         hub.restart = hub.interpreter.replay = None

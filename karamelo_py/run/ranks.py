@@ -74,6 +74,8 @@ class Ranks(Holding):
             status = super().advance(count)
             part.account()
             part.answers.publish()
+            # What is written shows steps that no process has failed in.
+            self.signal = int(self.most(np.array([self.crew.signal]))[0])
             return status
         self._see_prepared()
         return self._all_do("advance", count)

@@ -1,10 +1,7 @@
 """One run command: steps in chunks, outputs when they are due, and an eye on what goes wrong."""
 
 import signal
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from math import inf, isfinite, isnan
 from pathlib import Path
 from typing import Any
@@ -13,7 +10,7 @@ import numpy as np
 
 from karamelo_py.kernels.step import DONE, STOPPED
 from karamelo_py.run import diagnosis, foresight, large_steps, restart
-from karamelo_py.run.crew import ENDING
+from karamelo_py.run.crew import heeding
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
@@ -160,22 +157,22 @@ class Runner:
         simulation.compile()
         began = simulation.step
         self._banner(simulation, going_on)
-        with self.spent.counted("output"):
-            hub.output.begin(within=going_on)
-        hub.console.begin_run(simulation.step, 0.0)
-        try:
-            with self._interruptible():
-                self._loop(simulation, first_step, first_time)
+        with heeding(self._note):
             with self.spent.counted("output"):
+                hub.output.begin(within=going_on)
+            hub.console.begin_run(simulation.step, 0.0)
+            try:
+                self._loop(simulation, first_step, first_time)
+                with self.spent.counted("output"):
+                    hub.console.end_run()
+                    if self.interrupted:
+                        # Before the last state of this run is written, which a longer one has not.
+                        hub.output.write_last()
+                    hub.output.end()
+            except BaseException:
                 hub.console.end_run()
-                if self.interrupted:
-                    # Before the last state of this run is written, which a longer one has not.
-                    hub.output.write_last()
-                hub.output.end()
-        except BaseException:
-            hub.console.end_run()
-            hub.output.abort()
-            raise
+                hub.output.abort()
+                raise
         self._summary(simulation, began, time.perf_counter() - started)
         if self.interrupted:
             raise Interrupted(self.interrupted)
@@ -233,6 +230,8 @@ class Runner:
             compiled, before = (spent.on[name][0] for name in ("compilation", "steps"))
             with spent.counted("steps"):
                 status = simulation.advance(int(target) - step)
+            if simulation.signal and not self.interrupted:
+                self._note(simulation.signal)
             elapsed = spent.on["steps"][0] - before
             if status != DONE:
                 if status == STOPPED and boundary.delete_leaving(hub, simulation, self.snapshot):
@@ -315,33 +314,16 @@ class Runner:
 
     # --- around the loop ----------------------------------------------------------------------
 
-    @contextmanager
-    def _interruptible(self) -> Iterator[None]:
+    def _note(self, number: int, _: Any = None) -> None:
         """Ctrl-C ends the run after the present chunk; a second one at once.
 
         So do the signals of batch systems and of terminals that are closed.
         """
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-
-        def note(number: int, frame: Any) -> None:
-            if self.interrupted:
-                raise KeyboardInterrupt
-            self.interrupted = number
-            if number == getattr(signal, "SIGHUP", None):
-                self.hub.console.leave()
-
-        before = {number: signal.getsignal(number) for number in ENDING}
-        # Whoever started the program may have it go on when the terminal is closed (nohup).
-        heeded = [number for number, handler in before.items() if handler != signal.SIG_IGN]
-        for number in heeded:
-            signal.signal(number, note)
-        try:
-            yield
-        finally:
-            for number in heeded:
-                signal.signal(number, before[number])
+        if self.interrupted:
+            raise KeyboardInterrupt
+        self.interrupted = number
+        if number == getattr(signal, "SIGHUP", None):
+            self.hub.console.leave()
 
     def _banner(self, simulation: Simulation, going_on: bool) -> None:
         hub, why = self.hub, unknown_work(self.hub)

@@ -48,6 +48,7 @@ class Simulation(Lowered):
 
     processes: ClassVar[dict[str, str]] = {}  # what a banner says of those that share the scene
     taken_up = False  # a step goes on whose first moment has been, with other arrays
+    signal = 0  # that another process was sent, which all are to end with
     follows = False  # another process says what this one does in a run
 
     @contextmanager
