@@ -144,10 +144,16 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         values, named = [], {}
         for parameter in expected:
             for argument in bound.get(parameter.name, ()):
+                number = None if parameter.keyword else len(values) + 1
+                try:
+                    value = convert(hub, parameter, argument, number)
+                except ScriptError as error:
+                    error.hint = _swapped(hub, expected, bound, parameter) or error.hint
+                    raise
                 if parameter.keyword:
-                    named[parameter.name] = convert(hub, parameter, argument)
+                    named[parameter.name] = value
                 else:
-                    values.append(convert(hub, parameter, argument, len(values) + 1))
+                    values.append(value)
         try:
             return make(target, hub, name, *values, **named)
         except OSError as error:
@@ -270,6 +276,32 @@ def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | No
         error.place = error.place or argument.place
         error.expected = error.expected or f"{parameter.name}: {parameter.kind.text}"
         raise
+
+
+def _swapped(
+    hub: Any, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
+) -> str | None:
+    """What to say where another argument does not fit either, and each fits in the other's place."""
+
+    def fits(parameter: Parameter, argument: Argument) -> bool:
+        kind = parameter.kind
+        try:
+            convert(hub, parameter, argument)
+        except ScriptError:
+            return False
+        return not kind.family or registry.knows(kind.family, argument.word() or "")
+
+    single = [p for p in expected if len(bound.get(p.name, ())) == 1 and not p.variadic]
+    if wrong not in single:
+        return None
+    (given,) = bound[wrong.name]
+    for other in single:
+        (there,) = bound[other.name]
+        if other != wrong and not fits(other, there) and fits(wrong, there) and fits(other, given):
+            return f"swap {given.text} and {there.text}: {wrong.name} {there.text}, " + (
+                f"{other.name} {given.text}"
+            )
+    return None
 
 
 def _misfit(
