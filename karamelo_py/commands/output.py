@@ -49,7 +49,7 @@ def dump(
     --------
     delete_dump
     """
-    target = registry.find("dump", style)
+    target = registry.called("dump", ID, style)
     _check_order(hub, arguments)
     new = signature.call(target, hub, list(arguments), f"dump {style}")
     new.style = style
