@@ -85,6 +85,14 @@ def test_defaults_and_words_are_told(capsys):
     assert "a number, 0 when left out" in out
 
 
+@pytest.mark.parametrize("word", ["on_trouble", "halve"])
+def test_help_finds_an_argument_and_what_it_may_be(capsys, word):
+    status, out, _ = call(capsys, "help", word)
+    assert status == 0
+    assert "argument of run, run_time, run_until, run_while" in out
+    assert "tries half the step" in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -96,6 +104,7 @@ def test_defaults_and_words_are_told(capsys):
         (["styles", "comput"], "did you mean 'compute'?"),
         (["styles", "fix", "compute"], "too many arguments"),
         (["help", "kinetic_energy"], "karamelo-py help fix kinetic_energy"),
+        (["hepl"], "did you mean 'karamelo-py help'?"),
     ],
 )
 def test_what_is_unknown_or_means_several_things(capsys, arguments, message):

@@ -1,5 +1,9 @@
 """The command line: what it says when it is not used as meant."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 from scenes import block
 
@@ -148,3 +152,13 @@ def test_what_a_slip_of_the_pen_says(tmp_path, monkeypatch, capsys, words, says)
     (tmp_path / "log.mpm").write_text("Step Time Ek Es\n0 0 1 2\n")
     assert main(words.split()) == 1
     assert says in capsys.readouterr().err
+
+
+def test_nobody_reads_what_is_written():
+    """As with ``karamelo-py help run | true``: no word of it."""
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "karamelo_py.app.cli", "help", "run"]
+    ended = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, check=False)
+    os.close(write)
+    assert (ended.returncode, ended.stderr) == (1, b"")

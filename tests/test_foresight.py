@@ -431,3 +431,5 @@ def test_a_large_step_of_a_later_run_is_told_before_the_first(
     result = run_interpreted(text, command=command)
     assert result.err.count("the step ") == told
     assert (TOO_LARGE in result.err) == told
+    # The line that asks for the step is marked.
+    assert ("| set_dt(0.1)" in result.err) == told

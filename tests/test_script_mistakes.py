@@ -104,6 +104,9 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("my speed = 3", "a name has no blanks: my_speed = ..."),
         ("x AND y", "write and"),
         ("w = sin(t)", "did you mean 'time'?"),
+        ("units(lj)", "units(m, kg, s)"),
+        ("units(kg, m, s)", "swap kg and m: length m, mass kg"),
+        ("a = Es", "compute(Es, strain_energy, all)"),
     ],
 )
 def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):
@@ -146,3 +149,32 @@ def test_slips_in_a_plot(run_interpreted, line, hint):
 )
 def test_names_of_commands_and_styles_depend_on_nothing(run_interpreted, lines, wrong):
     assert [line for line, _ in places(run_interpreted(lines, status=1).err)] == wrong
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("solid(s, region, rubber, 2, box, 0.1)", "swap rubber and box: region box, mat"),
+        ("solid(s, region, box, rubber, 2, 0.1)", "swap rubber and 2: ppc 2, mat"),
+        ("solid(s, region, box, 2, 0.1, rubber)", "swap 0.1 and rubber: material rubber, h 0.1"),
+        ("group(g, region, particles, box, all)", "swap region and particles: kind particles"),
+        ("dump(d, particle, all, 1, d.*, x)", "swap particle and all: group all, style particle"),
+        ("solid(region, s, box, 2, rubber, 0.1)", "'region' is a style, and the ID comes first"),
+        ("material(linear, steel, 1, 1, 0.3)", "'linear' is a style, and the ID comes first"),
+        ("material(steel, 1, 1, 0.3)", "must be one of eos-strength, linear, neo-hookean, rigid"),
+        ("run(1)\nprecision(single)", "the precision cannot change after the first run"),
+        ("run(1)\nset_output(1, csv)", "the form of the log cannot change after the first run"),
+    ],
+)
+def test_words_in_each_others_places(run_interpreted, line, told):
+    """What does not fit where it stands, but there where another does not; all before a step."""
+    result = run_interpreted(block(2, *line.split("\n")), status=1)
+    assert told in result.err
+    assert not (result.folder / "log.mpm").exists()
+
+
+def test_what_may_stand_after_a_run(run_interpreted):
+    """The form that the log has already; a precision behind an element, which is no run."""
+    lines = ["set_output(1, csv)", "run(1)", "set_output(2, csv)", "run(1)"]
+    element = "load_path(p, 1, exx=1e-3)\nelement(e, rubber, p)\nprecision(single)"
+    run_interpreted(block(2, element, *lines))

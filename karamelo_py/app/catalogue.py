@@ -4,6 +4,7 @@ import inspect
 import sys
 import textwrap
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from io import TextIOWrapper
 
 from karamelo_py.language import registry
@@ -103,7 +104,7 @@ def print_help(given: Sequence[str]) -> int:
     Parameters
     ----------
     given
-        The name of a command, style or family, or a family and a name.
+        The name of a command, style, family or argument, or a family and a name.
 
     Raises
     ------
@@ -125,6 +126,8 @@ def print_help(given: Sequence[str]) -> int:
         )
     if _singular(name) in families():
         return print_styles([name])
+    if found := _arguments(name):
+        return _explain_argument(name, found)
     raise _unknown("command or style", name, {n for f in families() for n in registry.names(f)})
 
 
@@ -191,6 +194,36 @@ def _explain(family: str, name: str) -> int:
                 page.line(f"  {line}")
         else:
             page.paragraph(content, indent=2)
+    return 0
+
+
+def _arguments(word: str) -> dict[str, Parameter]:
+    """Arguments of this name, or that may be this word, by the command or style they belong to."""
+    found = {}
+    for family in families():
+        for name in registry.names(family):
+            with suppress(ScriptError):  # a broken plug-in is not what this is about
+                help_ = help_of(family, name)
+                for parameter in help_.parameters:
+                    if word == parameter.name or word in parameter.kind.words:
+                        found[help_.name] = parameter
+    own = {owner: p for owner, p in found.items() if p.name == word}
+    return own or found
+
+
+def _explain_argument(word: str, found: dict[str, Parameter]) -> int:
+    """What is said of an argument where most is said of it, and where else there is one."""
+    page = _Page()
+    owner, parameter = max(found.items(), key=lambda item: len(item[1].description))
+    page.line(word, "bold")
+    page.line()
+    of = f"{parameter.name}, an argument of " if word != parameter.name else "an argument of "
+    page.paragraph(of + ", ".join(found))
+    page.line()
+    page.paragraph(describe_parameter(parameter), indent=6)
+    page.paragraph(parameter.description, indent=6)
+    page.line()
+    page.line(f"karamelo-py help {owner} explains the rest.")
     return 0
 
 

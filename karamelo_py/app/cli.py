@@ -73,11 +73,12 @@ def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
         return Outcome(act())
     except KeyboardInterrupt:
         return Outcome(INTERRUPTED, render_message("error", "interrupted"))
-    except BrokenPipeError:
-        # Whoever read our output has gone; what was written stays.
-        sys.stderr.close()
-        return Outcome(ERROR)
     except FAILURES as error:
+        # Rich makes a SystemExit of it.
+        if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
+            # Whoever read our output has gone; what was written stays.
+            sys.stderr.close()
+            return Outcome(ERROR)
         if debugging:
             traceback.print_exc()
         return Outcome(ERROR, _rendered(error))
@@ -121,7 +122,8 @@ def _dispatch(arguments: list[str]) -> int:
     first = arguments[0]
     if first not in (*COMMANDS, "-h", "--help", "--version"):
         close = nearest(first, COMMANDS)
-        if close and len(arguments) > 1 and not Path(first).exists():
+        alone = len(arguments) == 1 and "." in first
+        if close and not alone and not Path(first).exists():
             raise ScriptError(
                 f"there is no file {first} and no such subcommand",
                 expected="a script, or one of " + ", ".join(COMMANDS),

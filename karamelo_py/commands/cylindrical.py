@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from karamelo_py.commands.points import has_run, refuse_chosen, replace_points
+from karamelo_py.commands.points import refuse_chosen, replace_points
 from karamelo_py.language.by_dimension import Forms, place_of
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
@@ -62,7 +62,7 @@ def populate_cylindrical_coordinates(
     --------
     solid, region
     """
-    if has_run(hub):
+    if hub.has_run:
         raise ScriptError(
             f"the points of solid '{solid.id}' have been in a run",
             argument="solid",

@@ -202,7 +202,7 @@ def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) ->
     dimension, group, solid
     """
     require_domain(hub)
-    target = registry.find("region", style)
+    target = registry.called("region", ID, style)
     hub.regions.add(ID, signature.call(target, hub, list(arguments), f"region {style}"))
 
 

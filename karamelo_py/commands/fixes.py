@@ -32,7 +32,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     delete_fix, group, compute
     """
     _refuse_wrong_order("fix", ID, style, arguments)
-    target = registry.find("fix", style)
+    target = registry.called("fix", ID, style)
     _refuse_shared_id(ID, target, "compute", hub.computes)
     _check_names(hub, "fix", ID, target)
     new = signature.call(target, hub, list(arguments), f"fix {style}")
@@ -89,7 +89,7 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
     delete_compute, log_modify, fix
     """
     _refuse_wrong_order("compute", ID, style, arguments)
-    target = registry.find("compute", style)
+    target = registry.called("compute", ID, style)
     _refuse_shared_id(ID, target, "fix", hub.fixes)
     _check_names(hub, "compute", ID, target)
     new = signature.call(target, hub, list(arguments), f"compute {style}")
@@ -119,15 +119,9 @@ def delete_compute(hub: Hub, ID: str) -> None:
 
 
 def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argument, ...]) -> None:
-    """Tell of a style in the place of the ID, or behind the group as in LAMMPS."""
-    if registry.knows(kind, style):
+    """Tell of a style behind the group, as in LAMMPS."""
+    if registry.knows(kind, style) or registry.knows(kind, ID):
         return
-    if registry.knows(kind, ID):
-        raise ScriptError(
-            f"'{ID}' is a style, and the ID comes first",
-            argument="ID",
-            expected=f"{kind}(ID, {ID}, {style}, ...)",
-        )
     third = arguments[0].word() if arguments else None
     if third and registry.knows(kind, third):
         raise ScriptError(

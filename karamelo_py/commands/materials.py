@@ -104,7 +104,7 @@ temperature = _part(
 def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Sequence[Argument]):
     """File under `ID` what the style makes of the arguments; an ID in use is an error first."""
     kind = catalogue.kind
-    target = registry.find(kind, style)
+    target = registry.called(kind, ID, style)
     catalogue.refuse(ID)
     made = signature.call(target, hub, list(arguments), f"{kind} {style}")
     entry = (Material if kind == "material" else Part)(kind, style, made)

@@ -120,8 +120,11 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
     -----
     Comes before the first run.
     """
-    if hub.update.step > 0:
-        raise ScriptError("the precision cannot change after the first run")
+    if hub.has_run:
+        raise ScriptError(
+            "the precision cannot change after the first run",
+            expected="precision(...) before the first run",
+        )
     hub.settings.precision = kind
 
 

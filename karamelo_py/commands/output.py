@@ -49,7 +49,7 @@ def dump(
     --------
     delete_dump
     """
-    target = registry.find("dump", style)
+    target = registry.called("dump", ID, style)
     _check_order(hub, arguments)
     new = signature.call(target, hub, list(arguments), f"dump {style}")
     new.style = style
@@ -129,9 +129,9 @@ def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> N
     """
     hub.output.log.every = every
     if form == "csv" and hub.output.log.file.suffix != ".csv":
-        if hub.output.log.is_open:
+        if hub.begun:
             raise ScriptError(
-                f"the log is already written to {hub.output.log.file}",
+                "the form of the log cannot change after the first run",
                 argument="form",
                 expected="set_output(..., csv) in front of the first run",
             )

@@ -61,7 +61,7 @@ def delete_particles(hub: Hub, solids: Solids, by: Literal["region"], region: Re
     if not any(inside.any() for inside in found.values()) and not region.unknown:
         hub.warn(f"region '{region.id}' holds no points: nothing is deleted")
         return
-    if has_run(hub):
+    if hub.has_run:
         _delete_later(hub, found)
         return
     for solid, inside in found.items():
@@ -129,7 +129,7 @@ def translate_particles(
     delete_particles, solid
     """
     formulas = per_direction(hub, "d", shift)
-    if has_run(hub):
+    if hub.has_run:
         raise ScriptError(
             "the points have been in a run, which they would not have come out of",
             argument="solids",
@@ -178,11 +178,6 @@ def _chosen(solid: Solid, kept: np.ndarray) -> Placement:
 
 
 # ---- what commands that replace points share ---------------------------------------------------
-
-
-def has_run(hub: Hub) -> bool:
-    """Whether the first run has begun, in fact or in the rehearsal of what follows it."""
-    return bool(hub.rehearsed or hub.update.step)
 
 
 def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:

@@ -29,7 +29,7 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     --------
     dt_factor
     """
-    hub.update.fixed_dt = dt
+    hub.update.fixed_dt, hub.update.dt_place = dt, hub.place
     hub.values.set("dt", dt)
     if hub.update.dt_factor is not None:
         _warn_of_factor(hub)
@@ -56,7 +56,9 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     set_dt
     """
     hub.update.dt_factor = factor
-    if hub.update.fixed_dt is not None:
+    if hub.update.fixed_dt is None:
+        hub.update.dt_place = hub.place
+    else:
         _warn_of_factor(hub)
 
 

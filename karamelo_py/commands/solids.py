@@ -67,7 +67,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
                 expected="one of " + ", ".join(registry.names("solid")),
                 hint=hint,
             )
-    target = registry.find("solid", kind)
+    target = registry.called("solid", ID, kind)
     new = signature.call(target, hub, list(arguments), f"solid {kind}")
     warn_of_coinciding(hub, new, ID)
     hub.solids.add(ID, new)

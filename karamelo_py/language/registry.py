@@ -114,6 +114,23 @@ def find(family: str, name: str) -> Any:
     return _loaded[key]
 
 
+def called(family: str, ID: str, name: str) -> Any:
+    """The same of a statement that has an ID in front of it.
+
+    Raises
+    ------
+    ScriptError
+        See `find`; also where the style stands in the place of the ID.
+    """
+    if not knows(family, name) and knows(family, ID):
+        raise ScriptError(
+            f"'{ID}' is a style, and the ID comes first",
+            argument="ID",
+            expected=f"{family}(ID, {ID}, {name}, ...)",
+        )
+    return find(family, name)
+
+
 def _entries(family: str, name: str) -> list[EntryPoint]:
     styles = _families().get(family, {})
     if name in styles:

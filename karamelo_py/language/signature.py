@@ -21,7 +21,7 @@ from functools import cache
 from typing import Any, Literal, get_type_hints
 
 from karamelo_py.language import registry
-from karamelo_py.language.arguments import NULL, Argument, with_gap
+from karamelo_py.language.arguments import NULL, NUMBER, Argument, with_gap
 from karamelo_py.language.faults import told
 from karamelo_py.language.kinds import (
     AtLeast,
@@ -39,6 +39,7 @@ from karamelo_py.language.kinds import (
 )
 from karamelo_py.language.own_words import longer
 from karamelo_py.script.errors import Place, ScriptError, meant, nearest
+from karamelo_py.script.other_programs import OTHERWISE
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
@@ -144,10 +145,16 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         values, named = [], {}
         for parameter in expected:
             for argument in bound.get(parameter.name, ()):
+                number = None if parameter.keyword else len(values) + 1
+                try:
+                    value = convert(hub, parameter, argument, number)
+                except ScriptError as error:
+                    error.hint = _swapped(hub, expected, bound, parameter) or error.hint
+                    raise
                 if parameter.keyword:
-                    named[parameter.name] = convert(hub, parameter, argument)
+                    named[parameter.name] = value
                 else:
-                    values.append(convert(hub, parameter, argument, len(values) + 1))
+                    values.append(value)
         try:
             return make(target, hub, name, *values, **named)
         except OSError as error:
@@ -213,7 +220,7 @@ def _bind(
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
         gap = with_gap(given)
-        hint = longer(name, given) if len(given) < needed else None
+        hint = longer(name, given) or OTHERWISE.get(name) if len(given) < needed else None
         if surplus is not None:
             values = {word: f"{p.name}={word}" for p in by_name.values() for word in p.kind.words}
             word = surplus.text if surplus.text in values else nearest(surplus.text, values)
@@ -272,15 +279,44 @@ def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | No
         raise
 
 
+def _swapped(
+    hub: Any, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
+) -> str | None:
+    """What to say where another argument does not fit, either, and each fits in its place."""
+
+    def fits(parameter: Parameter, argument: Argument) -> bool:
+        kind = parameter.kind
+        try:
+            convert(hub, parameter, argument)
+        except ScriptError:
+            return False
+        return not kind.family or registry.knows(kind.family, argument.word() or "")
+
+    single = [p for p in expected if len(bound.get(p.name, ())) == 1 and not p.variadic]
+    if wrong not in single:
+        return None
+    (given,) = bound[wrong.name]
+    for other in single:
+        (there,) = bound[other.name]
+        if other != wrong and not fits(other, there) and fits(wrong, there) and fits(other, given):
+            return f"swap {given.text} and {there.text}: {wrong.name} {there.text}, " + (
+                f"{other.name} {given.text}"
+            )
+    return None
+
+
 def _misfit(
     parameter: Parameter, argument: Argument, number: int | None, unfit: Unfit
 ) -> ScriptError:
     which = f"argument {number} '{parameter.name}'" if number else f"'{parameter.name}'"
+    family, text, hint = parameter.kind.family, parameter.kind.text, unfit.hint
+    if family and NUMBER.fullmatch(argument.text):
+        text, hint = f"one of {', '.join(registry.names(family))}", None
     return ScriptError(
-        f"{which} must be {parameter.kind.text}, not {unfit.got}",
+        f"{which} must be {text}, not {unfit.got}",
         place=unfit.place or argument.place,
-        expected=parameter.kind.text,
-        hint=unfit.hint,
+        expected=text,
+        hint=hint,
     )
 
 

@@ -11,7 +11,7 @@ from karamelo_py.script.evaluation import usage
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.mistakes import BLOCKS, NO_BLOCKS
-from karamelo_py.script.other_programs import KARAMELO_COMMANDS, instead
+from karamelo_py.script.other_programs import ENERGIES, KARAMELO_COMMANDS, instead
 from karamelo_py.script.syntax import Assignment, Call
 
 MEANINGS = {
@@ -122,7 +122,8 @@ def unknown_name(script: Names, name: str, place: Any) -> ScriptError:
         else nearest(name, known) or by_style.get(nearest(name, by_style) or "")
     )
     later = {} if close else _further_down(script)
-    hint = f"did you mean '{close}'?" if close else f"set it first: {name} = ..."
+    first = ENERGIES.get(name) or f"set it first: {name} = ..."
+    hint = f"did you mean '{close}'?" if close else first
     if below := nearest(name, later):
         hint = f"did you mean '{below}', which stands further down, in line {later[below]}?"
     if re.match("leq|geq", name) and not close:

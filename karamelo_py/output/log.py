@@ -50,11 +50,6 @@ class Log(Rhythmic):
         """Where it is written."""
         return self.hub.folder / self.file
 
-    @property
-    def is_open(self) -> bool:
-        """Whether it has been begun."""
-        return self._file is not None
-
     def default(self) -> None:
         """Log step, dt and time."""
         self.columns = []

@@ -39,7 +39,7 @@ class Trouble(NamedTuple):
 def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
     """What went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
-        return Trouble(*_above_limit(hub, simulation))
+        return Trouble(*_above_limit(hub, simulation), hub.update.dt_place)
     if status == SHRUNK:
         return Trouble(*_shrunk(hub, simulation))
     if status == GAINED:

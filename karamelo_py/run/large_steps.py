@@ -11,7 +11,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Step(NamedTuple):
-    """The step that a run asks for, where that is, and what its stable limit depends on.
+    """The step that a run has, where the script asks for it, and what its stable limit depends on.
 
     `span` says how long the run is, in time or in steps; infinite where a condition ends it.
     """
@@ -37,7 +37,7 @@ def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> S
         *(hub.domain.h, *hub.solids.values(), method, update.thermal),
         *(type(scheme), scheme, type(transfer), transfer),
     )
-    return Step(hub.place, update.fixed_dt, update.dt_factor, halves, scene, span)
+    return Step(update.dt_place, update.fixed_dt, update.dt_factor, halves, scene, span)
 
 
 def warn_about_steps(
@@ -83,7 +83,7 @@ def _warn_about_step(
             f"{asked / of_heat:.3g} times the stable one of conduction: temperatures would swing"
         )
         if not later:
-            raise ScriptError(words, hint=hint)
+            raise ScriptError(words, place=step.place, hint=hint)
     else:
         words += f"above the stable limit {limit:.4g}"
         words += (

@@ -74,6 +74,7 @@ class Runner:
             return
         if hub.pausing:
             raise Pause
+        hub.begun = True
         hub.rehearse()
         if hub.checking:
             report(hub, self.end_time)

@@ -118,6 +118,8 @@ class Hub:
         The run in progress, or None.
     runs
         The published values at the end of each run so far.
+    begun
+        Whether a run has begun, in fact or in the rehearsal of what follows it.
     later
         What the runs ask for that a rehearsal came to (`run.large_steps.Step`).
     restart
@@ -137,6 +139,7 @@ class Hub:
         self.place: Place | None = None
         self.rehearsing = False
         self.rehearsed = False
+        self.begun = False
         self.answered = False
         self.checking = False
         self.pausing = False
@@ -170,6 +173,11 @@ class Hub:
         """All that has names."""
         mine = [item for item in vars(self).values() if isinstance(item, Catalogue)]
         return [*self.parts.values(), *mine]
+
+    @property
+    def has_run(self) -> bool:
+        """Whether there is a state that a run has led to, or will have in a rehearsal."""
+        return bool(self.begun or self.update.step)
 
     @property
     def simulation(self) -> Any:
@@ -244,6 +252,7 @@ class Hub:
         other.update.values = other.values
         other.output = Output(other)
         other.output.files = dict(self.output.files)
+        other.output.log.file = self.output.log.file
         for curve in self.output.plots:
             other.output.plots.add(curve.id, curve)
         other.output.plots.file = self.output.plots.file

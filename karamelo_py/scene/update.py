@@ -29,6 +29,8 @@ class Update:
         The constant step of set_dt, or None: the step follows the fastest point.
     dt_factor
         Share of the stable step that the script asks for, or None: the program chooses.
+    dt_place
+        Where the script asks for its step.
     boundary
         What happens to points that reach the edge of the domain: error, delete or reflect.
     boundary_place
@@ -53,6 +55,7 @@ class Update:
         self.anti_locking = False
         self.fixed_dt: float | None = None
         self.dt_factor: float | None = None
+        self.dt_place: Place | None = None
         self.boundary = "error"
         self.boundary_place: Place | None = None
         self.warned_of_bounces = False

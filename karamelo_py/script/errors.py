@@ -184,13 +184,16 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     for candidate in names:
         if candidate.lower() == lowered and candidate != name:
             return candidate
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    # Of short names a longer one says something else: Ek_s is not Es.
+    like = names if len(name) > 3 else [n for n in names if len(n) - len(name) < 2]
+    close = difflib.get_close_matches(name, like, n=1, cutoff=0.6)
     if close:
         return close[0]
-    by_lower = {candidate.lower(): candidate for candidate in names}
+    by_lower = {candidate.lower(): candidate for candidate in like}
     close = difflib.get_close_matches(lowered, by_lower, n=1, cutoff=0.6)
     if close:
         return by_lower[close[0]]
     # A part of the name: cubic of cubic-spline.
+    by_lower = {candidate.lower(): candidate for candidate in names}
     parts = (c for c in by_lower if len(lowered) > 2 and lowered in re.split("[-_/ ]", c))
     return by_lower.get(next(parts, ""))

@@ -119,6 +119,17 @@ INSTEAD = {
 }
 
 
+# Usual names of energies, and what gives them.
+ENERGIES = {
+    name: f"compute({ID}, {style}, all) gives {ID}"
+    for names, ID, style in (
+        ("Ek Ekin ke KE", "Ek", "kinetic_energy"),
+        ("Es Epot Ep pe PE", "Es", "strain_energy"),
+        ("E Etot etotal", "E", "energy_balance"),
+    )
+    for name in names.split()
+}
+
 # Commands that there are here, too, with other arguments.
 OTHERWISE = {"units": "units(m, kg, s) names the units of all numbers; or leave it out"}
 
