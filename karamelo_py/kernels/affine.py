@@ -6,7 +6,7 @@ node: half of the work of a scatter, in space two thirds.
 
 from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.lanes.arrays import Eights
+from karamelo_py.compiler.lanes import Eights, Fours
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.tuples import add, add_scaled, scale
 from karamelo_py.kernels.arrays import MASS, of_force
@@ -106,6 +106,7 @@ def joined(width, kin, parts):
     return parts
 
 
+@joined.on(Fours)
 @joined.on(Eights)
 def _(width, kin, parts):
     if len(parts) != 2 or of_force(kin) != 4:
@@ -139,18 +140,16 @@ def _(task, w, stencil, total):
     factor = by_arms(w.transfer, inverse_spread(w.basis, w.grid))
     if not len(factor):
         return ()
-    count = support(w.basis, w.kin)
-    width = len(stencil.lines[0].weights)
-    seen = [entry(w.basis, w.kin, w.grid, stencil, k)[:2] for k in range(count)]
-    found = [(weight, *update_at(w.kin, w.nodes, i, total[0])) for i, weight in seen]
-    change = total[1]
-    for weight, _, dv in found:
-        change = add_scaled(change, weight, dv)
+    nodes = [entry(w.basis, w.kin, w.grid, stencil, k)[0] for k in range(support(w.basis, w.kin))]
+    found = [update_at(w.kin, w.nodes, i, total[0]) for i in nodes]
     # sum N v (X - x)^T from sum N v and sum N v k, X being k nodes from the first: of rows, then of
-    # planes.
-    sums = tuple([(scale(weight, v),) for weight, v, _ in found])
-    for _ in range(dimension(w.kin)):
-        sums = tuple([_row_sums(sums[k : k + width]) for k in range(0, len(sums), width)])
+    # planes, as the weights are products.
+    sums = tuple([(v,) for v, _ in found])
+    changes = tuple([dv for _, dv in found])
+    for line in reversed(stencil.lines):
+        rows = range(0, len(sums), len(line.weights))
+        sums = tuple([_with_moment(line.weights, sums[k:]) for k in rows])
+        changes = tuple([_tails(line.weights, changes[k:])[-1] for k in rows])
     v, *moments = sums[0]
     arm = reach(w.basis, w.kin, w.grid, stencil, 0)
     step = w.grid.h * spacing(w.basis, arm[0])
@@ -158,16 +157,25 @@ def _(task, w, stencil, total):
     moment = from_columns(
         planar(w.kin), tuple([add_scaled(scale(step, m), way, v) for m, way in pairs])
     )
-    return v, change, scale(real(factor[0], step), moment)
+    return v, add(total[1], changes[0]), scale(real(factor[0], step), moment)
 
 
 @shared
-def _row_sums(row):
+def _tails(weights, vectors):
+    """Sums of weights times vectors: of the last one, of the last two, ... of all."""
+    last = len(weights) - 1
+    sums = (scale(weights[last], vectors[last]),)
+    for k in range(last - 1, -1, -1):
+        sums = (*sums, add_scaled(sums[-1], weights[k], vectors[k]))
+    return sums
+
+
+@shared
+def _with_moment(weights, row):
     """Of the sums of the nodes of a row: the sum of the first, and k times that; all the others."""
-    by_place = [scale(real(k, one[0][0]), one[0]) for k, one in enumerate(row)]
-    columns_of = zip(*row, strict=True)
-    first, *others = [_sum(tuple(column)) for column in columns_of]
-    return first, _sum(tuple(by_place[1:])), *others
+    first, *others = zip(*row[: len(weights)], strict=True)
+    *tails, total = _tails(weights, first)
+    return total, _sum(tuple(tails)), *[_tails(weights, other)[-1] for other in others]
 
 
 @shared
