@@ -25,7 +25,6 @@ from karamelo_py.compiler.lanes.registers import (
     vector_of,
 )
 
-
 AHEAD = 256  # bytes by which arrays of points are asked of the memory ahead of their use
 
 
