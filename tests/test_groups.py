@@ -1,5 +1,8 @@
 """Groups of points and of nodes."""
 
+import tracemalloc
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hubs import SmallHub, arguments
@@ -54,6 +57,31 @@ def test_an_id_again_adds_members():
     np.testing.assert_array_equal(kept.ids, np.arange(32))
     with pytest.raises(ScriptError, match="is a group of particles"):
         group(hub, "g", "nodes", "region", hub.regions["r1"], "all")
+
+
+def test_points_made_later_are_no_members():
+    hub = scene()
+    group(hub, "g", "particles", "region", hub.region("e", Block, *["INF"] * 4), "all")
+    hub.solid("s3", hub.region("r3", Block, 0.5, 0.7, 0, 0.2))
+    kept, everyone = hub.groups["g"], ParticleGroup(hub, everything=True)
+    ids = np.array([47, 31, 0, 32])
+    assert kept.has(ids).tolist() == [False, True, True, False] and everyone.has(ids).all()
+    assert len(kept) == 32 and len(everyone) == 48
+    assert [kept.touches(solid) for solid in hub.solids.values()] == [True, True, False]
+
+
+def test_a_group_is_a_bit_a_point():
+    """Which of ten points of ten million are members takes a few bytes to say."""
+    count = 10**7
+    solid = SimpleNamespace(id="s", first_id=0, count=count)
+    one = ParticleGroup.of(SimpleNamespace(solids={"s": solid}), solid)
+    tracemalloc.start()
+    assert one.has(np.arange(count - 5, count + 5)).tolist() == [True] * 5 + [False] * 5
+    assert tracemalloc.get_traced_memory()[1] < 10_000
+    assert len(one.bits(count)) == count / 8
+    assert len(one) == count
+    assert tracemalloc.get_traced_memory()[1] < count
+    tracemalloc.stop()
 
 
 def test_nodes_by_position():

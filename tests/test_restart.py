@@ -343,7 +343,7 @@ def test_another_scene(run_interpreted, old, new, says):
     assert "read_restart(w.h5)" in result.err
 
 
-@pytest.mark.parametrize("content", [None, b"", b"no HDF5", "other HDF5", "version 99", "half"])
+@pytest.mark.parametrize("content", [None, b"", b"no HDF5", "other HDF5", 4, 99, "half"])
 def test_no_file_to_go_on_from(run_interpreted, content):
     folder = run_interpreted(with_files(FLY)).folder
     path = folder / "bad.h5"
@@ -354,12 +354,16 @@ def test_no_file_to_go_on_from(run_interpreted, content):
     elif content == "half":
         whole = (folder / "r.2.h5").read_bytes()
         path.write_bytes(whole[: len(whole) // 2])
-    elif content:
+    elif content is not None:
         shutil.copy(folder / "r.2.h5", path)
         with h5py.File(path, "r+") as file:
-            file.attrs["version"] = 99
+            file.attrs["version"] = content
     result = run_interpreted(FLY, "-restart", "bad.h5", status=1)
-    says = {None: "there is no file bad.h5", "version 99": "has version 99"}
+    says = {
+        None: "there is no file bad.h5",
+        4: "bad.h5 has format 4, of an older karamelo-py",
+        99: "without this file, or go on with the newer karamelo-py that wrote it",
+    }
     assert says.get(content, "is no file that this program can go on") in result.err
     assert result.err.count("error:") == 1
     assert (folder / "log.mpm").read_text().count("\n") == 6  # nothing was begun anew

@@ -197,8 +197,9 @@ def _users(hub: Hub, solid: Solid) -> Iterable[tuple]:
     for fix in hub.fixes.values():
         yield "fix", fix, bool(fix.point_fields)
     for group in hub.groups.values():
-        chosen = isinstance(group, ParticleGroup) and len(group)
-        yield "group", group, chosen and group.ids[-1] >= solid.first_id
+        later = (one for one in hub.solids.values() if one.index >= solid.index)
+        of_points = isinstance(group, ParticleGroup)
+        yield "group", group, of_points and any(map(group.touches, later))
 
 
 def replace_points(

@@ -115,29 +115,22 @@ class ById:
     def total(self, name: str, group: Any = None) -> float:
         """What all points, or those of a group, have together of `SUMMED`; without rounding."""
         limbs = np.zeros((1, LIMBS), np.int64)
-        among = self._among(group)
         for block in self.stepped.blocks:
             values = SUMMED[name](self.stepped, block)
+            if values is not None and not (group is None or group.all):
+                values = values[group.has(block.points.id)]
             if values is not None:
-                rows = slice(None) if among is None else among[block.points.id]
-                add_all(limbs, 0, values[rows])
+                add_all(limbs, 0, values)
         return rounded(self.of_all(limbs)[0])
-
-    def _among(self, group: Any) -> np.ndarray | None:
-        """(N,) whether points are of a group, by id; None where it has all."""
-        if group is None or group.all:
-            return None
-        return group.among(self.count)
 
     def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
         """The points of a group that are at hand, so many at a time: a block, and rows of it."""
-        among = self._among(group)
         for block in self.stepped.blocks:
             ids = block.points.id
             for first in range(0, len(ids), PIECE):
                 rows = np.arange(first, min(first + PIECE, len(ids)))
-                if among is not None:
-                    rows = rows[among[ids[rows]]]
+                if not group.all:
+                    rows = rows[group.has(ids[rows])]
                 if len(rows):
                     yield block, rows
 

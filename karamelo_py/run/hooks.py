@@ -127,8 +127,7 @@ class _Builder:
         if hook.on_nodes:
             members = np.unique(fix.nodes)
         else:
-            bits = np.packbits(fix.group.among(-(-self.points // 64) * 64), bitorder="little")
-            members = bits.view("<i8").astype(np.int64, copy=False)
+            members = fix.group.bits(self.points).view("<i8").astype(np.int64, copy=False)
         begin = sum(len(m) for m in self.members)
         self.members.append(members)
         return begin, begin + len(members)

@@ -157,11 +157,14 @@ class Restart:
                     raise ScriptError(what, argument="file", expected=expected)
                 version = int(root.attrs["version"])
                 if version != VERSION:
+                    age = "an older" if version < VERSION else "a newer"
                     raise ScriptError(
-                        f"{path} has version {version} of the format of karamelo-py "
-                        f"{root.attrs['program']}, and this program reads version {VERSION}",
+                        f"{path} has format {version}, of {age} karamelo-py "
+                        f"({root.attrs['program']}), and this one ({__version__}) reads format "
+                        f"{VERSION} alone",
                         argument="file",
-                        expected="the version of karamelo-py that wrote it",
+                        hint="run the script from its beginning, without this file, or go on with "
+                        f"the {age.split()[1]} karamelo-py that wrote it",
                     )
                 self.content = json.loads(root["content"][()].tobytes())
                 _ = root["state"]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.scene.domain import require_grid
+from karamelo_py.scene.domain import CHUNK, require_grid
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.region import Region, look_up
 from karamelo_py.scene.solid import Solid
@@ -86,7 +86,19 @@ class ParticleGroup(Group):
 
     kind = "particles"
     script_kind = "a group of points, or all"
-    _bits = np.empty(0, np.uint8)  # one for each point that there was when members were added
+    # Whether each point is a member, from the lowest bit of a byte on, and of 64 that are none.
+    _bits = np.zeros(8, np.uint8)
+
+    @classmethod
+    def of(cls, hub: Scene, solid: Solid) -> ParticleGroup:
+        """The points of a solid."""
+        group = cls(hub)
+        group.id = solid.id
+        group._take(_numbers_of(solid))
+        return group
+
+    def __len__(self) -> int:
+        return sum(map(len, self.pieces()))
 
     @property
     def ids(self) -> np.ndarray:
@@ -99,30 +111,53 @@ class ParticleGroup(Group):
 
     def chosen(self) -> np.ndarray:
         """See `Group.chosen`."""
-        return np.flatnonzero(np.unpackbits(self._bits))
+        return np.concatenate([np.empty(0, np.int64), *self.pieces()])
 
-    def among(self, count: int) -> np.ndarray:
-        """(count,) whether the points with the first so many numbers are members."""
-        found = np.full(count, self.all)
-        if not self.all:
-            own = np.unpackbits(self._bits)[:count]
-            found[: len(own)] = own
+    def pieces(self) -> Iterator[np.ndarray]:
+        """Numbers of the members, ascending, so many at a time."""
+        for solid in self.hub.solids.values():
+            for ids in _numbers_of(solid):
+                yield ids[self.has(ids)]
+
+    def has(self, ids: np.ndarray) -> np.ndarray:
+        """(n,) whether points are members, by their numbers."""
+        if self.all:
+            return np.ones(len(ids), np.bool_)
+        return (self._bits.take(ids >> 3, mode="clip") >> (ids & 7) & 1).astype(np.bool_)
+
+    def touches(self, solid: Solid) -> bool:
+        """Whether points of a solid are members."""
+        return any(self.has(ids).any() for ids in _numbers_of(solid))
+
+    def bits(self, count: int) -> np.ndarray:
+        """Whether each of `count` points is a member, one bit each, as bytes of whole words."""
+        found = np.zeros(-(-count // 64) * 8, np.uint8)
+        own = self._bits[: len(found)]
+        found[: len(own)] = own
         return found
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
         """See `Group.add`."""
-        members, count = self.among(self.total()), 0
-        for found in self._pieces(region, solids):
-            members[found] = True
-            count += len(found)
-        self._bits = np.packbits(members)
+        return self._take(self._found(region, solids))
+
+    def _take(self, pieces: Iterable[np.ndarray]) -> int:
+        """Make members of points, which come ascending, so many at a time; how many."""
+        bits, count = self.bits(self.total() + 64), 0
+        for ids in pieces:
+            if len(ids):
+                own = bits[ids[0] >> 3 : (ids[-1] >> 3) + 1]
+                members = np.unpackbits(own, bitorder="little")
+                members[ids - (ids[0] & ~7)] = 1
+                own[:] = np.packbits(members, bitorder="little")
+                count += len(ids)
+        self._bits = bits
         return count
 
     def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
         """Points of `solids` whose reference position lies in `region`."""
-        return np.concatenate([np.empty(0, np.int64), *self._pieces(region, solids)])
+        return np.concatenate([np.empty(0, np.int64), *self._found(region, solids)])
 
-    def _pieces(self, region: Region, solids: Sequence[Solid] | None) -> Iterator[np.ndarray]:
+    def _found(self, region: Region, solids: Sequence[Solid] | None) -> Iterator[np.ndarray]:
         if region.unknown:
             return
         if solids is None:
@@ -130,6 +165,13 @@ class ParticleGroup(Group):
         for solid in sorted(set(solids), key=lambda solid: solid.first_id):
             for start, x in solid.pieces():
                 yield np.flatnonzero(region.inside(x)) + (solid.first_id + start)
+
+
+def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
+    """The numbers of the points of a solid, so many at a time."""
+    end = solid.first_id + solid.count
+    for first in range(solid.first_id, end, CHUNK):
+        yield np.arange(first, min(first + CHUNK, end))
 
 
 def united(a: np.ndarray, b: np.ndarray) -> np.ndarray:

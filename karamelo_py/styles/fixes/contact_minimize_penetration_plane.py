@@ -5,6 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from karamelo_py.language.signature import NonNegative
+from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.expressions import Expression
@@ -12,7 +13,6 @@ from karamelo_py.styles.fixes.friction import judge_friction
 from karamelo_py.styles.fixes.tools import (
     Bodies,
     PointForceFix,
-    SolidPoints,
     apart,
     place,
     rubbed,
@@ -64,7 +64,7 @@ class ContactMinimizePenetrationPlane(PointForceFix):
         nz: Expression,
         mu: Annotated[float, NonNegative],
     ):
-        super().__init__(hub, SolidPoints(hub, solid))
+        super().__init__(hub, ParticleGroup.of(hub, solid))
         self.mu = mu
         judge_friction(hub, mu)
         self.origin = place(hub, x, y, z)

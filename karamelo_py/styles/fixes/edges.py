@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.output.fields import PIECE
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
@@ -70,9 +69,8 @@ class EdgeFix(Fix):
     def __init__(self, hub: Hub, group: ParticleGroup, region: Region):
         super().__init__(hub, group)
         self.region = region
-        self._ids = np.empty(0, np.int64)  # of the points that were seen last
-        self._known: Faces | None = None  # their faces, by number
-        self._rows: Faces | None = None  # and by row in the view
+        # The points that were seen last, and their faces, by their rows there.
+        self._seen: tuple[np.ndarray, Faces] | None = None
 
     def defined(self) -> None:
         """Warn where there is nothing to load.
@@ -83,16 +81,14 @@ class EdgeFix(Fix):
             If a region has cut the boxes of points.
         """
         for solid in self.hub.solids.values():
-            own = self.group.ids - solid.first_id
-            if getattr(solid, "cut", False) and ((own >= 0) & (own < solid.count)).any():
+            if getattr(solid, "cut", False) and self.group.touches(solid):
                 raise ScriptError(
                     f"the points of solid '{solid.id}' are cut at its edge: no faces are whole",
                     hint="points=regular in its line",
                 )
         if not self.hub.rehearsing and not self.region.unknown:
-            ids = self.group.ids
-            pieces = (ids[k : k + PIECE] for k in range(0, len(ids), PIECE))
-            if len(ids) and not any(len(self._find(piece).point) for piece in pieces):
+            pieces = self.group.pieces()
+            if len(self.group) and not any(len(self._find(ids).point) for ids in pieces):
                 self.hub.warn(
                     f"no point of the group lies at this edge of region '{self.region.id}'"
                 )
@@ -115,18 +111,18 @@ class EdgeFix(Fix):
 
     def _faces_of(self, ids: np.ndarray) -> Faces:
         """The faces of the points in a view, by their rows there; what was found stays known."""
-        if self._rows is not None and np.array_equal(self._ids, ids):
-            return self._rows
-        order = np.argsort(ids)
-        new = np.setdiff1d(ids, self._ids, assume_unique=True)
-        parts = [self._find(new), *([self._known] if self._known is not None else [])]
-        found = Faces(*map(np.concatenate, zip(*parts, strict=True)))
-        # The forces on a point are added up in this order, whenever its faces were found.
-        found = _some(found, np.lexsort((found.sign, found.axis)))
-        self._ids, self._known = ids.copy(), _some(found, np.isin(found.point, ids))
-        at = np.searchsorted(ids, self._known.point, sorter=order)
-        self._rows = self._known._replace(point=order[at])
-        return self._rows
+        before, faces = self._seen or (ids[:0], self._find(ids[:0]))
+        if self._seen is None or not np.array_equal(before, ids):
+            new = self._find(np.setdiff1d(ids, before, assume_unique=True))
+            known = faces._replace(point=before[faces.point])
+            found = Faces(*map(np.concatenate, zip(new, known, strict=True)))
+            found = _some(found, np.isin(found.point, ids))
+            # The forces on a point are added up in this order, whenever its faces were found.
+            found = _some(found, np.lexsort((found.sign, found.axis)))
+            order = np.argsort(ids)
+            rows = order[np.searchsorted(ids, found.point, sorter=order)]
+            self._seen = ids.copy(), found._replace(point=rows)
+        return self._seen[1]
 
     def _find(self, ids: np.ndarray) -> Faces:
         return self.chosen(faces_on(self.hub, self.region, ids))

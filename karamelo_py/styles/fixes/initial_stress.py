@@ -1,7 +1,5 @@
 """fix initial_stress: stress of points before the first step."""
 
-import numpy as np
-
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.scene.group import ParticleGroup
@@ -51,10 +49,7 @@ class InitialStress(Fix):
         super().__init__(hub, group)
         self.formulas = (sxx, syy, szz, syz, sxz, sxy)
         for solid in hub.solids.values():
-            in_group = group.all or np.any(
-                (group.ids >= solid.first_id) & (group.ids < solid.first_id + solid.count)
-            )
-            if in_group and not can(elastic_law(solid.material.law), with_stress):
+            if group.touches(solid) and not can(elastic_law(solid.material.law), with_stress):
                 raise ScriptError(
                     f"the stress of solid '{solid.id}' follows from its deformation "
                     "and cannot be set",

@@ -36,8 +36,8 @@ class Bodies:
         The step, and how long forces act in it.
     """
 
-    def __init__(self, hub: Hub, group: ParticleGroup, points: PointsView):
-        self._hub, self._group, self._points = hub, group, points
+    def __init__(self, hub: Hub, points: PointsView):
+        self._hub, self._points = hub, points
         self.dt, self.kick = points.dt, points.kick
         self._d = hub.domain.dimension
         self.total = points.total
@@ -73,7 +73,8 @@ class Bodies:
     @cached_property
     def stiffness(self) -> np.ndarray:
         solid = self._column("type").astype(int) - 1
-        return _moduli(self._hub, self._group)[solid] * (1 - self._column("damage"))
+        moduli = np.array([_shear_modulus(one) for one in self._hub.solids.values()])
+        return moduli[solid] * (1 - self._column("damage"))
 
     def _column(self, name: str) -> np.ndarray:
         return self._points.column(name)
@@ -95,8 +96,14 @@ class PointForceFix(Fix):
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
-        if self.needs_stiffness:
-            _moduli(hub, group)
+        soft = (s for s in hub.solids.values() if not _shear_modulus(s) and group.touches(s))
+        if self.needs_stiffness and (solid := next(soft, None)):
+            raise ScriptError(
+                f"material '{solid.material.id}' of solid '{solid.id}' has no shear modulus, "
+                "with which the force would go",
+                argument="group",
+                expected="a group of points of elastic materials",
+            )
 
     def push(self, bodies: Bodies) -> np.ndarray:
         """The forces (n, d) on the points."""
@@ -104,31 +111,13 @@ class PointForceFix(Fix):
 
     def initial_integrate(self, points: PointsView) -> None:
         """Give the points their forces and publish the sum."""
-        force = self.push(Bodies(self.hub, self.group, points))
+        force = self.push(Bodies(self.hub, points))
         points.force = points.force + force
         self.publish_components(points.total(force))
 
     def now(self, formulas: Sequence[Expression]) -> np.ndarray:
         """The present numbers (d,) of formulas of time, one for each direction."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
-
-
-class SolidPoints(ParticleGroup):
-    """The points of one solid as a group."""
-
-    def __init__(self, hub: Hub, solid: Solid):
-        super().__init__(hub)
-        self.id = solid.id
-        self.solid = solid
-
-    def chosen(self) -> np.ndarray:
-        """See `Group.chosen`."""
-        return np.arange(self.solid.first_id, self.solid.first_id + self.solid.count)
-
-    def among(self, count: int) -> np.ndarray:
-        """See `ParticleGroup.among`."""
-        numbers = np.arange(count) - self.solid.first_id
-        return (numbers >= 0) & (numbers < self.solid.count)
 
 
 def place(hub: Hub, x: Expression, y: Expression, z: Expression, name: str = "") -> tuple:
@@ -173,20 +162,7 @@ def rubbed(
     return slip * np.divide(rub, speed, out=np.zeros_like(speed), where=speed > 0)[:, None]
 
 
-def _moduli(hub: Hub, group: ParticleGroup) -> np.ndarray:
-    """Shear moduli by solid; those whose points are in the group have to have one."""
-    members = group.ids
-    moduli = []
-    for solid in hub.solids.values():
-        law: Any = elastic_law(solid.material.law)
-        G = getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None)
-        inside = (members >= solid.first_id) & (members < solid.first_id + solid.count)
-        if not G and inside.any():
-            raise ScriptError(
-                f"material '{solid.material.id}' of solid '{solid.id}' has no shear modulus, "
-                "with which the force would go",
-                argument="group",
-                expected="a group of points of elastic materials",
-            )
-        moduli.append(float(G or 0.0))
-    return np.array(moduli)
+def _shear_modulus(solid: Solid) -> float:
+    """The shear modulus of a solid, 0 where it has none."""
+    law: Any = elastic_law(solid.material.law)
+    return float(getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None) or 0)
