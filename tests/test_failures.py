@@ -203,6 +203,25 @@ def test_a_step_that_is_given_may_be_large_beside_what_moves(run_interpreted):
     assert "fallen" not in run_interpreted(script).err
 
 
+def test_the_last_good_state_is_nearest_to_where_energy_began_to_grow(run_interpreted):
+    """A body meets a wall at step 33, by a step 1.3 times the stable one: before, nothing strains.
+
+    The energy is looked at in steps 1, 11, 21 and so on.
+    """
+    lines = (
+        "region(wall, block, 1.2, INF)", "group(wall, nodes, region, wall, all)",
+        "fix(v, initial_velocity_particles, all, 1)", "fix(w, velocity_nodes, wall, 0)",
+        "set_dt(0.016)", *OUTPUT, "run(1000)",
+    )  # fmt: skip
+    script = block(1, *lines, law="neo-hookean").replace("0, 1.2", "0, 2.4")
+    result = run_interpreted(script, status=1)
+    assert "after energy had come from nowhere" in result.err
+    [good] = result.folder.glob("last_good.*.h5")
+    assert good.name == "last_good.31.h5"
+    with h5py.File(good) as file:
+        assert file["state/points/0/v"][:] == pytest.approx(1, rel=1e-12)
+
+
 # The clock is told that energy has grown: a scene in which it does, and fails, takes thousands.
 GROWN = """
 from karamelo_py import Simulation, SimulationError

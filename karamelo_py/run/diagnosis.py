@@ -11,8 +11,8 @@ import numpy as np
 
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block
-from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK, STOPPED
-from karamelo_py.kernels.watch import sum_energies
+from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, STOPPED
+from karamelo_py.kernels.watch import GROWTH, LOOK, sum_energies, unit_of
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.no_number import culprit
@@ -60,13 +60,15 @@ def stop(
 ) -> NoReturn:
     """Return to the last good state, write it, and raise what the user should know.
 
-    Where energy has grown before, that is the state from before it was seen to; log and dumps end
+    Where energy has grown before, that is the last state in which it had not; log and dumps end
     with the last state that has no trouble of its own.
     """
     step = simulation.step
     message, hint, at_fault = trouble(hub, simulation, status)
     grown = not grown_little(simulation)
-    if grown or status in (GAINED, HEATED, STOPPED):
+    if grown:
+        _go_back(simulation, snapshot, step)
+    elif status in (HEATED, STOPPED):
         simulation.restore(snapshot)
     path = _write_last_good(hub) if grown else None
     if status not in (GAINED, HEATED) and step > simulation.step:
@@ -78,9 +80,9 @@ def stop(
         ):
             # The watch looks at means of a hundred steps, and has not seen it yet.
             grown = True
-            simulation.restore(snapshot)
+            _go_back(simulation, snapshot, step)
             path = _write_last_good(hub)
-            simulation.advance(step - kept)
+            simulation.advance(step - simulation.step)
     path = path or _write_last_good(hub)
     _end_outputs(hub)
     if path is not None:
@@ -90,6 +92,23 @@ def stop(
     error = ScriptError(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error
+
+
+def _go_back(simulation: Simulation, snapshot: dict, end: int) -> None:
+    """Return to the last state before step `end` whose energy has not grown since the `snapshot`.
+
+    These steps are taken once more, from one look at the energy to the next.
+    """
+    simulation.restore(snapshot)
+    clock = simulation.control.clock[0]
+    before = float(clock.balance)
+    while clock.watch_energy and simulation.step + LOOK < end:
+        healthy = simulation.advance(LOOK - (simulation.step - 1) % LOOK) == DONE
+        if not (healthy and grown_little(simulation)):
+            break
+        if clock.balance - before < GROWTH * unit_of(clock):
+            snapshot = simulation.snapshot(snapshot)
+    simulation.restore(snapshot)
 
 
 def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
