@@ -22,7 +22,7 @@ from karamelo_py.compiler.lanes import Eights, Fours, group
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.powers import exponential, logarithm, power
-from karamelo_py.compiler.tuples import add_scaled, row, scale
+from karamelo_py.compiler.tuples import row, scale
 from karamelo_py.kernels.arrays import arrays_of, with_nodes
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.g2p import empty, gathered, settled
@@ -34,7 +34,6 @@ from karamelo_py.output.console import Console
 from karamelo_py.points.basis import (
     carried,
     carrier,
-    carriers,
     carry,
     deformed,
     entry,
@@ -304,10 +303,7 @@ def _grown(basis, grid, stencil, here, seen):
     """The place behind a step in which `seen` is the displacement of the nodes."""
     new = deformed(basis, KIN, here, tuple(real(c, here[0]) for c in (0.1, 0.2, -0.1, 0.05)))
     for corner in range(carried(basis, KIN)):
-        u = real(0, here[0]), real(0, here[0])
-        for j in range(carriers(basis, KIN)):
-            i, weight = carrier(basis, KIN, grid, stencil, corner, j)
-            u = add_scaled(u, weight, row(seen, i, 0, u))
+        u = row(seen, carrier(basis, KIN, grid, stencil, corner), 0, here[:2])
         new = carry(basis, KIN, new, here, corner, scale(real(1e-3, u[0]), u))
     return (*new, extent(basis, KIN, grid, new) + real(0, here[0]))
 

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 from numba import config
@@ -272,11 +272,22 @@ def of_present(p: int, value: float) -> float:
 of_numbers(of_present)(lambda p, value: lambda p, value: value)
 
 
+class Weighted(NamedTuple):
+    """Rows of an array in the place of one: read, their weighted sum; given to, each its share."""
+
+    rows: tuple[int, ...]
+    weights: tuple[float, ...]
+
+
 @shared(unless=lambda *kinds: lanes_of(kinds))
-def accumulate(array: Any, i: int, first: int, values: tuple) -> None:
+def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None:
     """array[i, first + k] += values[k], lane after lane."""
-    for k, value in enumerate(values):
-        array[i, first + k] += value
+    if isinstance(i, Weighted):
+        for one, weight in zip(i.rows, i.weights, strict=True):
+            accumulate(array, one, first, tuple([weight * value for value in values]))
+    else:
+        for k, value in enumerate(values):
+            array[i, first + k] += value
 
 
 def largest(a: float) -> float:

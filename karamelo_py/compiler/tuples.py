@@ -4,7 +4,7 @@ Comprehensions, which Numba does not know of tuples: kernels run them (`compiler
 are of lists, which Python makes in two thirds of the time where all is interpreted.
 """
 
-from karamelo_py.compiler.compile import choose, fma, lanes_of, shared
+from karamelo_py.compiler.compile import Weighted, choose, fma, lanes_of, shared
 
 
 @shared
@@ -47,6 +47,11 @@ def put_at(array, i, first, values):
 @shared(unless=lambda array, i, first, like: lanes_of(i))
 def row(array, i, first, like):
     """(array[i, first], ..., array[i, first + len(like) - 1])."""
+    if isinstance(i, Weighted):
+        total = subtract(like, like)
+        for one, weight in zip(i.rows, i.weights, strict=True):
+            total = add_scaled(total, weight, row(array, one, first, like))
+        return total
     return tuple([array[i, first + k] for k in range(len(like))])
 
 

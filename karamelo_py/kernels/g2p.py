@@ -23,7 +23,8 @@ from karamelo_py.kernels.averaging import (
 )
 from karamelo_py.kernels.loss import Rubbed, in_company, reflect, warm, warm_by_friction
 from karamelo_py.kernels.visit import deformation_of, for_tags, in_turn, law_of, place_at, state_of
-from karamelo_py.points.basis import carried, carrier, carriers, carry, deformed, entry, extent
+from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
+from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.boundary import Bounces, reflected
 from karamelo_py.points.frames import (
     DeformationGradient,
@@ -37,7 +38,6 @@ from karamelo_py.points.kinematics import (
     deform,
     dimension,
     largest_component,
-    vector_at,
     volume_ratio,
     zero_tensor,
 )
@@ -173,11 +173,19 @@ def _(task, w, stencil, k, total):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
     v, dv = update_at(w.kin, w.nodes, i, total[0])
+    corners = (*total[3:], v) if moves_corners(w.basis, w.kin) else ()
     return (
         add_scaled(total[0], weight, v),
         add_scaled(total[1], weight, dv),
         add_moment(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, g, v, total[2]),
+        *corners,
     )
+
+
+@shared
+def moves_corners(basis, kin):
+    """Whether what is gathered is corners of domains that go with the velocity there."""
+    return isinstance(basis, AtCorners) and carried(basis.basis, kin) > 0
 
 
 @shared
@@ -227,7 +235,7 @@ def _(task, w, stencil, k, total):
 @gathered.on(AverageStress)
 def _(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    return fma(weight, field(w.nodes.fields, NodalStress)[i, 0], total)
+    return fma(weight, row(field(w.nodes.fields, NodalStress), i, 0, (total,))[0], total)
 
 
 @gathered.on(SeriesTerm)
@@ -326,10 +334,11 @@ def _move(w, stencil, p, dt, total):
         before = place_at(w.basis, w.kin, w.places.x, p)
         new = add_row(before, 0, step)
         for corner in range(carried(w.basis, w.kin)):
-            u = subtract(x, x)
-            for j in range(carriers(w.basis, w.kin)):
-                i, weight = carrier(w.basis, w.kin, w.grid, stencil, corner, j)
-                u = add_scaled(u, weight, vector_at(w.kin, w.nodes.update, i))
+            if len(total) > 3:
+                u = total[3 + corner]
+            else:
+                by = carrier(w.basis, w.kin, w.grid, stencil, corner)
+                u = row(w.nodes.update, by, 0, x)
             new = carry(w.basis, w.kin, new, before, corner, scale(dt, u))
         store(w.places.y, p, new)
         moved += further_reach(w.basis, w.kin, w.grid, before, new)

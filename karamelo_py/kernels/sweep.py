@@ -30,12 +30,14 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.affine import affine_parts, gathered_at_once_all, give_affine
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.clock import common_velocity
+from karamelo_py.kernels.corners import all_by_corners, gather_corners, scatter_corners
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.visit import Work, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
+from karamelo_py.points.basis.cpdi.corners import CornerStencil
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
 from karamelo_py.points.frames import Total, Updated, follows
 from karamelo_py.points.grid import inside, renumbered
@@ -257,6 +259,15 @@ def _(width, stencil, tasks, w, totals):
     return _gather_parts(tasks, w, stencil, totals)
 
 
+@gather_nodes.on(OneByOne, CornerStencil)
+@gather_nodes.on(Fours, CornerStencil)
+@gather_nodes.on(Eights, CornerStencil)
+def _(width, stencil, tasks, w, totals):
+    if all_by_corners(tasks, w):
+        return gather_corners(tasks, w, stencil, totals)
+    return _gather(tasks, w, stencil, totals)
+
+
 @shared
 def _gather_parts(tasks, w, stencil, totals):
     """What can be is gathered from all nodes at once, the rest node by node."""
@@ -282,6 +293,16 @@ def _(width, stencil, quantities, w, loads):
         _scatter_parts(width, quantities, w, with_one_node(stencil), loads, parts)
     else:
         _scatter_parts(width, quantities, w, stencil, loads, parts)
+
+
+@scatter_nodes.on(OneByOne, CornerStencil)
+@scatter_nodes.on(Fours, CornerStencil)
+@scatter_nodes.on(Eights, CornerStencil)
+def _(width, stencil, quantities, w, loads):
+    if all_by_corners(quantities, w):
+        scatter_corners(quantities, w, stencil, loads)
+    else:
+        _scatter(quantities, w, stencil, loads)
 
 
 @shared

@@ -8,7 +8,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from karamelo_py.compiler.compile import accumulate, by_type, lanes_of
+from karamelo_py.compiler.compile import Weighted, accumulate, by_type, lanes_of, tag_class
 from karamelo_py.compiler.lanes.arrays import Beside, at_lane, pointer_to
 from karamelo_py.compiler.lanes.registers import (
     I32,
@@ -57,10 +57,8 @@ def _chunks(count: int) -> list[tuple[int, int]]:
     return out
 
 
-def _gathered(builder: Any, of: Callable, lanes: Lanes, count: int) -> list:
-    """Lanes of `count` components from the records of different nodes."""
-    size = lanes.scalar.bitwidth // 8
-    rows = [builder.load(of(k), align=size) for k in range(lanes.width)]
+def _lanes_from(builder: Any, rows: list, lanes: Lanes, count: int) -> list:
+    """Lanes of `count` components from the records of the points."""
     if count == 1:
         return [pack(builder, [lane(builder, row, 0) for row in rows], lanes)]
     parts = [_transposed(builder, rows[k : k + 4]) for k in range(0, lanes.width, 4)]
@@ -80,22 +78,62 @@ def _gather_row(typing_context, array, nodes, first, like):
         for begin, count in _chunks(len(like)):
             column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
 
-            def of(k, column=column, count=count):
-                pointer = at_lane(
-                    context, builder, array, arguments[0], nodes, arguments[1], k, column
-                )
-                return _record(builder, array, pointer, count)
-
-            found += _gathered(builder, of, lanes, count)
+            rows = []
+            for k in range(lanes.width):
+                given = context, builder, array, arguments[0], nodes, arguments[1], k, column
+                at = _record(builder, array, at_lane(*given), count)
+                rows.append(builder.load(at, align=array.dtype.bitwidth // 8))
+            found += _lanes_from(builder, rows, lanes, count)
         return context.make_tuple(builder, made, found[: len(like)])
 
     return made(array, nodes, types.int64, like), codegen
+
+
+@intrinsic
+def _gather_weighted(typing_context, array, nodes, first, weights, like):
+    """The same of the weighted sum of the records of some nodes: each is read as it lies there."""
+    lanes = weights[0]
+    made = types.UniTuple(lanes, len(like))
+
+    def codegen(context, builder, sig, arguments):
+        size = array.dtype.bitwidth // 8
+        spread = _kept_in_memory(builder, cgutils.unpack_tuple(builder, arguments[3]))
+        at = cgutils.unpack_tuple(builder, arguments[1])
+        found = []
+        for begin, count in _chunks(len(like)):
+            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
+            record = Lanes(array.dtype, count)
+            rows = []
+            for j in range(lanes.width):
+                total = ir.Constant(vector_of(record), None)
+                for k, node in enumerate(at):
+                    given = context, builder, array, arguments[0], nodes[k], node, j, column
+                    pointer = _record(builder, array, at_lane(*given), count)
+                    weight = splat(builder, builder.load(spread(k, j), align=size), record)
+                    total = _fma(builder, weight, builder.load(pointer, align=size), total)
+                rows.append(total)
+            found += _lanes_from(builder, rows, lanes, count)
+        return context.make_tuple(builder, made, found[: len(like)])
+
+    return made(array, nodes, types.int64, weights, like), codegen
+
+
+def _fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
+    """a b + c of vectors, with one rounding."""
+    kind = a.type
+    name = f"llvm.fma.v{kind.count}{kind.element.intrinsic_name}"
+    function = cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(kind, [kind] * 3), name
+    )
+    return builder.call(function, [a, b, c])
 
 
 @by_type(row)
 def _row(array, i, first, like):
     if isinstance(i, Lanes | Beside):
         return lambda array, i, first, like: _gather_row(array, i, first, like)
+    if tag_class(i) is Weighted and lanes_of(i):
+        return lambda array, i, first, like: _gather_weighted(array, i.rows, first, i.weights, like)
     return None
 
 
@@ -194,6 +232,10 @@ def _records(builder: Any, parts: list) -> list:
 
 @by_type(accumulate)
 def _accumulate(array, i, first, values):
+    if tag_class(i) is Weighted and lanes_of(i):
+        return lambda array, i, first, values: _accumulate_affine(
+            array, i.rows, first, i.weights, values, ()
+        )
     if isinstance(array, types.Array) and (lanes_of(i) or lanes_of(values)):
         return lambda array, i, first, values: _scatter(array, i, first, values)
     return None
@@ -240,9 +282,6 @@ def _accumulate_affine(typing_context, array, nodes, first, weights, value, slop
             for slope in cgutils.unpack_tuple(builder, arguments[5])
         ]
         width = round(len(nodes) ** (1 / max(1, len(grow))))
-        fma = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(vector, [vector] * 3), f"llvm.fma.v{count}f{8 * size}"
-        )
         one = Lanes(array.dtype, count)
         at = {(): field}  # by the place of the node in the first directions
 
@@ -268,7 +307,7 @@ def _accumulate_affine(typing_context, array, nodes, first, weights, value, slop
                     pointer = builder.bitcast(pointer, vector.as_pointer())
                     total = builder.load(pointer, align=size)
                 weight = splat(builder, builder.load(spread(k, j), align=size), one)
-                total = builder.call(fma, [weight, record, total])
+                total = _fma(builder, weight, record, total)
                 if lanes_of(nodes[k]):
                     builder.store(total, pointer, align=size)
             if not lanes_of(nodes[k]):

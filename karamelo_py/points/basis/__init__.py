@@ -136,15 +136,9 @@ def placed(basis, kin):
 
 
 @point_function(otherwise=True)
-def carriers(basis, kin):
-    """How many nodes carry one corner."""
-    return 0
-
-
-@point_function(otherwise=True)
-def carrier(basis, kin, grid, stencil, corner, j):
-    """(node number, weight) of the j-th node that carries a corner."""
-    return grid.first, grid.h
+def carrier(basis, kin, grid, stencil, corner):
+    """The nodes that carry a corner, and their weights: a :class:`Weighted`."""
+    return ()
 
 
 @point_function(otherwise=True)

@@ -4,11 +4,11 @@ from math import prod
 from types import MappingProxyType
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, index, real, shared
+from karamelo_py.compiler.compile import Weighted, choose, index, real, shared
 from karamelo_py.compiler.powers import power
 from karamelo_py.compiler.symbols import Symbol, call
 from karamelo_py.compiler.tuples import scale
-from karamelo_py.points.basis import carried, carrier, carriers, carry, deformed, mapped_again
+from karamelo_py.points.basis import carried, carrier, carry, deformed, mapped_again
 from karamelo_py.points.basis.product import along, node_number, register
 from karamelo_py.points.basis.ugimp import averaged_hats, box
 from karamelo_py.points.frames import stretched_share
@@ -238,7 +238,6 @@ def _(basis, kin, place, dl):
 
 
 @carried.on(CPGIMPCorners)
-@carriers.on(CPGIMPCorners)
 def _(basis, kin):
     return 1 << dimension(kin)
 
@@ -251,19 +250,21 @@ def _side(line, corner, j):
 
 
 @formula()
-def _carrier(kin, grid: Number, stencil: Number, corner: Number, j: Number):
-    """Node number and weight of the j-th node that carries a corner."""
+def _carrier(kin, grid: Number, stencil: Number, corner: Number):
+    """The nodes that carry a corner, and their weights."""
     bits = kin.vector(lambda i: Symbol(f"{{}} & {1 << i}", corner))
-    nodes = kin.vector(lambda i: Symbol(f"{{}} & {1 << i}", j))
-    sides = kin.vector(lambda i: call(_side, stencil.lines[i], bits[i], nodes[i]))
     first = node_number(grid.first, kin.vector(lambda i: stencil.lines[i].first))
-    number = node_number(first, [side[0] for side in sides])
-    return call(index, number), prod(side[1] for side in sides)
+    rows, weights = [], []
+    for j in range(2**kin.dimension):
+        sides = kin.vector(lambda i, j=j: call(_side, stencil.lines[i], bits[i], j & 1 << i))
+        rows.append(call(index, node_number(first, [side[0] for side in sides])))
+        weights.append(prod(side[1] for side in sides))
+    return call(Weighted, rows, weights)
 
 
 @carrier.on(CPGIMPCorners)
-def _(basis, kin, grid, stencil, corner, j):
-    return _carrier(kin, grid, stencil, corner, j)
+def _(basis, kin, grid, stencil, corner):
+    return _carrier(kin, grid, stencil, corner)
 
 
 @formula()

@@ -2,16 +2,15 @@
 
 from collections.abc import Callable
 from math import inf, prod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, define, index, real, shared
+from karamelo_py.compiler.compile import Weighted, beside, choose, define, real, shared
 from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant, written
 from karamelo_py.compiler.tuples import add_row, add_scaled, scale
 from karamelo_py.points.basis import (
     affine_weight,
     carried,
     carrier,
-    carriers,
     carry,
     entry,
     extent,
@@ -36,7 +35,7 @@ class Corner(NamedTuple):
     x: tuple[float, ...]  # its position, on the grid
 
 
-class Stencil(NamedTuple):
+class CornerStencil(NamedTuple):
     """What the nodes that a point sees are made of. Nobody computes what nobody reads of it."""
 
     corners: tuple[Corner, ...]
@@ -45,6 +44,16 @@ class Stencil(NamedTuple):
     centre: tuple[float, ...]  # sum_I N_I X_I
     spread: tuple[float, ...]  # D of the affine transfers: xx yy (zz) xy (xz yz)
     inv_r: float  # 1 / r of an axisymmetric point
+
+
+class AtCorners(NamedTuple):
+    """In the place of a basis: the point sees the corners of its domain as it else sees nodes.
+
+    A node number is then a :class:`~karamelo_py.compiler.compile.Weighted`. Serves what takes the
+    weight or the gradient of a node once, as a factor.
+    """
+
+    basis: NamedTuple
 
 
 # --- one corner -------------------------------------------------------------------------------
@@ -86,7 +95,15 @@ def _hat(kin, corner: Number, j: Number):
 def _node(kin, grid: Number, corner: Number, j: Number):
     """The number of the j-th node of a corner's cell."""
     first = node_number(grid.first, kin.vector(lambda i: corner.cell[i]))
-    return call(index, node_number(first, digits("j", 2, kin.dimension)))
+    return call(beside, first, node_number(0, digits("j", 2, kin.dimension)))
+
+
+@formula()
+def _around(kin, grid: Number, corner: Number):
+    """The nodes around a corner, and their weights."""
+    tag, nodes = Symbol("kin"), range(2**kin.dimension)
+    rows = [call(_node, tag, grid, corner, j) for j in nodes]
+    return call(Weighted, rows, [call(_hat, tag, corner, j) for j in nodes])
 
 
 @shared
@@ -106,7 +123,7 @@ def _away(kin, grid: Number, corner: Number, centre: Vector, j: Number):
 
 
 def _spread_pairs(kin: Components) -> list[tuple[int, int]]:
-    """Rows and columns of D in the layout of :class:`Stencil`."""
+    """Rows and columns of D in the layout of :class:`CornerStencil`."""
     return [pair for pair in kin.symmetric_pairs if max(pair) < kin.dimension]
 
 
@@ -133,6 +150,15 @@ def _solve(kin, spread: Vector, a: Vector):
     return kin.vector(lambda i: k * sum(cofactor(m, d, i, j) * a[j] for j in range(d)))
 
 
+def _seen(tag: type, c: Any) -> tuple[Symbol, Symbol, list[Symbol]]:
+    """The c-th corner of a stencil, its weight, and its gradient."""
+    stencil = Symbol("stencil")
+    weight, gradient = stencil.weights[c], [stencil.gradients[c][i] for i in range(tag.dimension)]
+    if tag is Axisymmetric:
+        gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
+    return stencil.corners[c], weight, gradient
+
+
 def _domain_functions(tag: type, corners: int) -> dict[Callable, Callable]:
     """The point functions of domains of so many corners."""
     basis, kin, grid, place, stencil = map(Symbol, ("basis", "kin", "grid", "place", "stencil"))
@@ -146,16 +172,13 @@ def _domain_functions(tag: type, corners: int) -> dict[Callable, Callable]:
     for c in range(corners):
         spread = call(_add_spread, kin, grid, spread, weights[c], at[c], centre)
     inv_r = call(inverse_radius, centre[0])
-    located = call(Stencil, at, weights, gradients, centre, spread, inv_r)
+    located = call(CornerStencil, at, weights, gradients, centre, spread, inv_r)
 
     d = tag.dimension
     c, j = (Symbol(f"({{}} {operation} {2**d})", Symbol("k")) for operation in ("//", "%"))
-    corner = stencil.corners[c]
+    corner, weight, gradient = _seen(tag, c)
     hat = call(_hat, kin, corner, j)
-    weight = stencil.weights[c] * hat
-    gradient = [hat * stencil.gradients[c][i] for i in range(d)]
-    if tag is Axisymmetric:
-        gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
+    weight, gradient = weight * hat, [hat * g for g in gradient]
     away = call(_away, kin, grid, corner, stencil.centre, j)
     solved = call(_solve, kin, stencil.spread, away)
     seen = "basis, kin, grid, stencil, k"
@@ -185,11 +208,6 @@ def register(basis: type, d: int, corners: int) -> None:
     themselves show wanders by a thousandth of what it does with FLIP (a spinning square, Q4).
     """
 
-    @carrier.on(basis)
-    def _(basis, kin, grid, stencil, corner, j):
-        at = stencil.corners[corner]
-        return _node(kin, grid, at, j), _hat(kin, at, j)
-
     for kin in tags_of(d):
         for function, implementation in _domain_functions(kin, corners).items():
             function.on(basis, kin)(implementation)
@@ -201,7 +219,11 @@ def register_carried(basis: type) -> None:
     register(basis, d, corners)
     carried.on(basis)(define("basis, kin", f"return {corners}"))
     placed.on(basis)(define("basis, kin", f"return {corners}"))
-    carriers.on(basis)(define("basis, kin", f"return {2**d}"))
+
+    @carrier.on(basis)
+    def _(basis, kin, grid, stencil, corner):
+        return _around(kin, grid, stencil.corners[corner])
+
     carry.on(basis)(
         define(
             "basis, kin, place, old, corner, displacement",
@@ -216,3 +238,20 @@ def register_carried(basis: type) -> None:
         far = call(max, abs(place[k] - place[k % d]), far)
     reached = call(choose, call(upright, basis_, kin, place), far * grid.inv_h, inf)
     extent.on(basis)(written("basis, kin, grid, place", reached, "place[0]"))
+
+
+for _tag in (tag for tag in TAGS if tag.dimension > 1):
+    support.on(AtCorners, _tag)(
+        define(
+            "basis, kin",
+            f"return support(basis.basis, kin) // {2**_tag.dimension}",
+            support=support,
+        )
+    )
+    _corner_seen, *_shares = _seen(_tag, Symbol("k"))
+    entry.on(AtCorners, _tag)(
+        written(
+            "basis, kin, grid, stencil, k",
+            (call(_around, Symbol("kin"), Symbol("grid"), _corner_seen), *_shares),
+        )
+    )

@@ -1,0 +1,92 @@
+"""What is gathered and given at the corners of domains, each in the place of a node.
+
+The functions of CPDI are sums over corners, N_I = sum_c w_c N_I^lin(x_c). What takes the weight or
+the gradient of a node once, as a factor, is therefore done with the few corners: a corner shows
+what the nodes around it have, and shares out among them what it is given.
+"""
+
+from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.fields import field
+from karamelo_py.kernels.g2p import (
+    AverageStress,
+    Move,
+    SecondStrain,
+    SeriesTerm,
+    Strain,
+    StrainInMove,
+    TrialStrain,
+    gathered_all,
+)
+from karamelo_py.kernels.loss import Lost
+from karamelo_py.kernels.p2g import (
+    AveragedForce,
+    InternalForce,
+    MassMomentum,
+    MomentumAgain,
+    SeriesBack,
+    Volumes,
+    scattered_all,
+)
+from karamelo_py.kernels.visit import Work
+from karamelo_py.points.basis import support
+from karamelo_py.points.basis.cpdi.corners import AtCorners
+from karamelo_py.points.transfers import add_moment, add_momentum, gradient_weight
+
+
+@point_function(otherwise=True)
+def by_corners(part, w):
+    """Whether a task or quantity takes the weight or the gradient of a node once, as a factor."""
+    return False
+
+
+def _always(part, w):
+    return True
+
+
+def _without_moments(part, w):
+    """Moments are of the velocities and places of nodes."""
+    asked = add_moment, add_momentum, gradient_weight
+    return not any(function.defined(type(w.transfer)) for function in asked)
+
+
+for _part in (AverageStress, SeriesTerm, Volumes, SeriesBack):
+    by_corners.on(_part)(_always)
+for _part in (Move, Strain, SecondStrain, StrainInMove, TrialStrain, InternalForce, AveragedForce):
+    by_corners.on(_part)(_without_moments)
+by_corners.on(MomentumAgain)(_without_moments)
+
+
+@by_corners.on(MassMomentum)
+def _(part, w):
+    return _without_moments(part, w) and field(w.nodes.fields, Lost) is None
+
+
+@shared
+def all_by_corners(parts, w):
+    """Whether all tasks or quantities of a visit do."""
+    return all(by_corners(part, w) for part in parts)
+
+
+@shared
+def _at_corners(w):
+    return Work(
+        w.frame, w.kin, AtCorners(w.basis), w.grid, w.transfer, w.averaging, w.nodes, w.points,
+        w.laws, w.places, w.common,
+    )  # fmt: skip
+
+
+@shared
+def gather_corners(tasks, w, stencil, totals):
+    """The totals of the tasks over all corners."""
+    at = _at_corners(w)
+    for c in range(support(at.basis, w.kin)):
+        totals = gathered_all(tasks, at, stencil, c, totals)
+    return totals
+
+
+@shared
+def scatter_corners(quantities, w, stencil, loads):
+    """Give all corners their parts."""
+    at = _at_corners(w)
+    for c in range(support(at.basis, w.kin)):
+        scattered_all(quantities, at, stencil, c, loads)
