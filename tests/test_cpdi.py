@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from numba import njit
 from states import final_hub, same_bits, state_of
 
+from karamelo_py.compiler.compile import accumulate
+from karamelo_py.compiler.tuples import row
 from karamelo_py.points.basis import (
     affine_weight,
     carried,
@@ -24,6 +26,7 @@ from karamelo_py.points.basis import (
     support,
 )
 from karamelo_py.points.basis.cpdi import CUBE, SQUARE, domain
+from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.basis.cpdi.hexahedron import H8
 from karamelo_py.points.basis.cpdi.parallel import R4, R8
 from karamelo_py.points.basis.cpdi.quadrilateral import Q4
@@ -129,6 +132,26 @@ def test_linear_functions(basis, kin, seed, size):
     affine = np.array([affine_weight(basis(), kin, grid, stencil, k) for k in range(count)])
     assert affine.sum(axis=0) == pytest.approx(np.zeros(d), abs=1e-11)
     assert affine.T @ arms == pytest.approx(np.eye(d), abs=1e-11)
+
+
+@every_domain
+def test_corners_in_the_place_of_nodes(basis, kin):
+    """What corners show and give, by N_I = sum_c w_c N_I^lin(x_c), is what the nodes do."""
+    grid = lattice(kin).numbers(float)
+    stencil, nodes, weights, gradients = stencil_of(basis, kin, grid, a_place(basis, kin, 7, 1.2))
+    expected, found = np.zeros((2, lattice(kin).node_count, 1 + len(gradients[0])))
+    by = AtCorners(basis())
+    shares = np.column_stack([weights, gradients])
+    np.add.at(expected, nodes.astype(int), shares)
+    field = np.random.default_rng(2).normal(size=(len(expected), 3))
+    shown = 0
+    for c in range(support(by, kin)):
+        corner, weight, gradient = entry(by, kin, grid, stencil, c)
+        accumulate(found, corner, 0, (weight, *gradient))
+        shown += np.outer((weight, *gradient), row(field, corner, 0, (0.0,) * 3))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(shares).sum())
+    sums = shares.T @ field[nodes.astype(int)]
+    np.testing.assert_allclose(shown, sums, rtol=0, atol=1e-12 * np.abs(shares).sum())
 
 
 @every_domain

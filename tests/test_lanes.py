@@ -43,6 +43,7 @@ from karamelo_py.points.basis import (
 )
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpdi import SQUARE
+from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.basis.cpdi.parallel import R4
 from karamelo_py.points.basis.cpdi.quadrilateral import Q4
 from karamelo_py.points.basis.cpdi.simplex import T3
@@ -309,13 +310,16 @@ def _grown(basis, grid, stencil, here, seen):
 
 
 @kernel
-def _map(basis, grid, x, mass, nodes, seen, out, p):
-    """Mass and position to the nodes, and a field of the nodes to the points and their domains."""
+def _map(basis, by, grid, x, mass, nodes, seen, out, p):
+    """Mass and position to the nodes, and a field of the nodes to the points and their domains.
+
+    `by` is the basis, or what takes its place at the corners of domains.
+    """
     here = place_at(basis, KIN, x, p)
     stencil = locate(basis, KIN, grid, here)
     total = real(0, here[0]), real(0, here[0]), real(0, here[0])
-    for k in range(support(basis, KIN)):
-        i, weight, gradient = entry(basis, KIN, grid, stencil, k)
+    for k in range(support(by, KIN)):
+        i, weight, gradient = entry(by, KIN, grid, stencil, k)
         part = of_present(p, mass[p]) * weight
         accumulate(nodes, i, 0, (part, part * here[0], part * here[1]))
         found = row(seen, i, 0, total)
@@ -328,15 +332,15 @@ def _map(basis, grid, x, mass, nodes, seen, out, p):
 
 
 @kernel
-def _map_alone(basis, grid, x, mass, nodes, seen, out, n):
+def _map_alone(basis, by, grid, x, mass, nodes, seen, out, n):
     for p in range(n):
-        _map(basis, grid, x, mass, nodes, seen, out, p)
+        _map(basis, by, grid, x, mass, nodes, seen, out, p)
 
 
 @kernel
-def _map_in_lanes(basis, grid, x, mass, nodes, seen, out, n):
+def _map_in_lanes(basis, by, grid, x, mass, nodes, seen, out, n):
     for q in range(0, n, 4):
-        _map(basis, grid, x, mass, nodes, seen, out, group(Fours(), q, min(4, n - q)))
+        _map(basis, by, grid, x, mass, nodes, seen, out, group(Fours(), q, min(4, n - q)))
 
 
 HALF = (0.125, 0.125)
@@ -356,9 +360,12 @@ DOMAINS = {
 }
 
 
-@pytest.mark.parametrize("kind", DOMAINS)
+@pytest.mark.parametrize(
+    "kind, by",
+    [*((kind, kind()) for kind in DOMAINS), *((kind, AtCorners(kind())) for kind in (R4, Q4, T3))],
+)
 @pytest.mark.parametrize("spread", [0.1, 2.4], ids=["one cell", "many cells"])
-def test_weights_gather_and_scatter(kind, spread):
+def test_weights_gather_and_scatter(kind, by, spread):
     """Points of one cell take the short way; sums at nodes differ by the order of additions."""
     n, basis = 14, kind()
     rng = np.random.default_rng(3)
@@ -377,8 +384,8 @@ def test_weights_gather_and_scatter(kind, spread):
     seen = rng.normal(size=(count, 4))
     alone, together = np.zeros((2, count, 4))
     of_alone, of_together = np.zeros((2, 3 + len(x) + 1, n))
-    _map_alone(basis, grid, x, mass, alone, seen, of_alone, n)
-    _map_in_lanes(basis, grid, x, mass, together, seen, of_together, n)
+    _map_alone(basis, by, grid, x, mass, alone, seen, of_alone, n)
+    _map_in_lanes(basis, by, grid, x, mass, together, seen, of_together, n)
     assert of_together.tobytes() == of_alone.tobytes()
     assert np.isfinite(of_alone).all()
     assert alone[:, 0].sum() == pytest.approx(mass.sum(), rel=1e-14)

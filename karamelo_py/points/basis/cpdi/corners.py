@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import inf, prod
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, beside, choose, define, real, shared
+from karamelo_py.compiler.compile import Weighted, beside, choose, define, index, real, shared
 from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant, written
 from karamelo_py.compiler.tuples import add_row, add_scaled, scale
 from karamelo_py.points.basis import (
@@ -95,15 +95,16 @@ def _hat(kin, corner: Number, j: Number):
 def _node(kin, grid: Number, corner: Number, j: Number):
     """The number of the j-th node of a corner's cell."""
     first = node_number(grid.first, kin.vector(lambda i: corner.cell[i]))
-    return call(beside, first, node_number(0, digits("j", 2, kin.dimension)))
+    return call(index, node_number(first, digits("j", 2, kin.dimension)))
 
 
 @formula()
 def _around(kin, grid: Number, corner: Number):
     """The nodes around a corner, and their weights."""
-    tag, nodes = Symbol("kin"), range(2**kin.dimension)
-    rows = [call(_node, tag, grid, corner, j) for j in nodes]
-    return call(Weighted, rows, [call(_hat, tag, corner, j) for j in nodes])
+    first = node_number(grid.first, kin.vector(lambda i: corner.cell[i]))
+    nodes = range(2**kin.dimension)
+    rows = [call(beside, first, node_number(0, digits(str(j), 2, kin.dimension))) for j in nodes]
+    return call(Weighted, rows, [call(_hat, Symbol("kin"), corner, j) for j in nodes])
 
 
 @shared
