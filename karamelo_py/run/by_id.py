@@ -129,7 +129,7 @@ class ById:
             ids = block.points.id
             for first in range(0, len(ids), PIECE):
                 rows = np.arange(first, min(first + PIECE, len(ids)))
-                if not group.all:
+                if not (group is None or group.all):
                     rows = rows[group.has(ids[rows])]
                 if len(rows):
                     yield block, rows
