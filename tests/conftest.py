@@ -125,7 +125,7 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
 
     With ``boxes=True`` points give to boxes of small tiles, as many points do, not to the nodes;
     with ``plainly=True`` every function is called as it is (see `straight.py`); with ``ranks=N``
-    so many share them. Files are kept in `out`.
+    so many share them. Files are kept in `out`. Of a script that ``fails`` it is the message.
     """
 
     def run(
@@ -135,16 +135,19 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
         plainly: bool = False,
         ranks: int = 1,
         out: str = "",
-    ) -> dict[str, np.ndarray]:
+        fails: bool = False,
+    ) -> dict[str, np.ndarray] | str:
         path = _prepared(tmp_path, script)
         file = str(tmp_path / "state.npz")
         request = {"folder": str(tmp_path), "arguments": [str(path)], "state": file}
         request |= {"columns": columns, "boxes": boxes, "plainly": plainly}
         if out:
             (tmp_path / out).mkdir()
-        request["ranks"], request["out"] = ranks, out and str(tmp_path / out)
+        request |= {"ranks": ranks, "out": out and str(tmp_path / out), "fails": fails}
         answer = _ask(_interpreter, request)
         assert answer["status"] == 0, answer["err"]
+        if fails:
+            return answer["err"]
         with np.load(file) as arrays:
             return dict(arrays)
 

@@ -149,6 +149,49 @@ def test_a_step_that_is_halved(state_interpreted, tmp_path, method):
     assert float(log[-2]) < 0.6 * float(log[4])
 
 
+LARGE_STEPS = "fix(g, body_force, all, 5)", "set_dt(0.008)", "set_output(1000)", "run(500)"
+FAILING = {
+    "fix g gets NaN from sqrt(0.02 - time)": block(
+        2, "fix(g, body_force, all, sqrt(0.02-time), 0)", "set_dt(0.005)", "run(9)"
+    ),
+    "fix g gets inf at (0.5, 0.3) from": block(
+        2, "fix(g, body_force, all, if(time < 0.02, 0, 1/(x-0.5)), 0)", "set_dt(0.005)", "run(9)"
+    ),
+    "fix g gets NaN at (0.": block(
+        2, "fix(g, force_particles, all, if(time < 0.02, 0, sqrt(0.4-x0)), 0)", "set_dt(0.005)",
+        "run(9)",
+    ),
+    "leaves the domain at (1.2": block(
+        2, "fix(v, initial_velocity_particles, all, 10+3*y0, 0)", "set_dt(0.004)", "run(20)"
+    ),
+    "is turned inside out": block(
+        2, "fix(v, velocity_nodes, all, -100*(x0-0.35), 0)", "set_dt(0.02)", "run(5)",
+        size=(0.1, 0.2),
+    ),
+    "the stable limit, which has fallen to": block(1, *LARGE_STEPS).replace("0, 1.2", "0, 120"),
+    "domain of point": block(
+        2, "fix(v, initial_velocity_particles, all, 3*sin(17*y0), 3*sin(13*x0))", "run(50)",
+        law="soft",
+    ).replace("(ulmpm, FLIP, linear, 1", "(ulcpdi, FLIP, linear, 1, Q4"),
+    "less than a millionth of the first": block(
+        1, "fix(push, velocity_nodes, all, -(x0-0.3))", "set_output(1000)", "run_time(1)",
+        law="soft",
+    ).replace("(ulmpm", "(tlmpm").replace("linear, 2", "neo-hookean, 2"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("says", FAILING)
+def test_what_went_wrong(state_interpreted, tmp_path, says):
+    """Each process looks at its own points: message, log and last good state are those of one."""
+    script = FAILING[says] + "\n"
+    one, three = (
+        state_interpreted(script, boxes=True, ranks=ranks, out=f"of {ranks}", fails=True)
+        for ranks in (1, 3)
+    )
+    assert says in one and one.replace("of 1/", "of 3/") == three
+    same_files(tmp_path / "of 1", tmp_path / "of 3")
+
+
 COMPUTES = """\
 region(left, block, INF, 0.55, INF, INF)
 group(left, particles, region, left, all)

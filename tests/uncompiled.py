@@ -18,15 +18,18 @@ from pathlib import Path
 def save_state(request: dict) -> int:
     """Run a script and save its final state or columns; a failure is told, not raised."""
     import numpy as np
-    from crews import learn_at_random
-    from states import final_columns, final_state
+    from crews import learn_at_random, together
+    from states import final_columns, final_hub, final_state
 
     from karamelo_py.run import by_id, by_number, part, ranks, shares, storing, tiles, work
+    from karamelo_py.script.errors import ScriptError
     from karamelo_py.styles.dumps import hdf5, look
 
     script, columns = request["arguments"][0], request["columns"]
-    usual = tiles.DIRECT_UP_TO, tiles.TILES
+    usual = tiles.DIRECT_UP_TO, tiles.TILES, ranks.Ranks.gather
     part.LEARN_EVERY, shares.IMBALANCE, work.Work.learn = 2, 1.0, learn_at_random
+    if request["fails"]:  # no process may need the whole scene to say why
+        ranks.Ranks.gather = None
     if request["boxes"]:
         tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 2, 3: 2}
     # One process has all points in a piece, several a few; files of HDF5 are the same then, too.
@@ -35,16 +38,22 @@ def save_state(request: dict) -> int:
     ranks.SAMPLES, hdf5.PIECE, look.MARKS = 8, 16, 16
     try:
         folder = request["out"] and Path(request["out"])
+        if request["fails"]:
+            together(request["ranks"], lambda crew: final_hub(script, crew=crew, folder=folder))
+            return 0
         if columns:
             arrays = final_columns(script, columns)
         else:
             arrays = final_state(script, ranks=request["ranks"], folder=folder)
         np.savez(request["state"], **arrays)
-    except Exception:
+    except Exception as error:
+        if request["fails"] and isinstance(error, ScriptError):
+            print(error.render(), file=sys.stderr)
+            return 0
         traceback.print_exc()
         return 1
     finally:
-        tiles.DIRECT_UP_TO, tiles.TILES = usual
+        tiles.DIRECT_UP_TO, tiles.TILES, ranks.Ranks.gather = usual
     return 0
 
 

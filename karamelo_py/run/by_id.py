@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,8 @@ from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
 from karamelo_py.output.fields import PIECE, SUMMED, Fields
 from karamelo_py.run.lowering import chosen
 from karamelo_py.scene.hub import Hub
+
+LAST = 2**62  # behind all numbers of points
 
 
 class ById:
@@ -129,7 +132,7 @@ class ById:
             ids = block.points.id
             for first in range(0, len(ids), PIECE):
                 rows = np.arange(first, min(first + PIECE, len(ids)))
-                if not group.all:
+                if not (group is None or group.all):
                     rows = rows[group.has(ids[rows])]
                 if len(rows):
                     yield block, rows
@@ -197,6 +200,15 @@ class ById:
         of_all = np.concatenate(keys)
         order = np.argsort(of_all)
         return of_all[order], np.concatenate(rows, axis=1)[:, order]
+
+    def seen(self, say: Callable, *arguments: Any) -> list:
+        """What a function says of the points at hand, of each process."""
+        return [say(self, *arguments)]
+
+    def largest(self, of: Callable[[Fields], np.ndarray]) -> tuple[float, int]:
+        """The largest number that a function says of all points, and the first point with it."""
+        value, number = max(self.seen(_largest, of))
+        return value, -number
 
     def counts(self) -> list[int]:
         """How many points each block has."""
@@ -272,6 +284,17 @@ class ById:
         ordered = list(map(Ordered, s.blocks))
         for first, end in self.ranges():
             yield Piece(self, first, end, s, (one.between(first, end) for one in ordered))
+
+
+def _largest(points: ById, of: Callable[[Fields], np.ndarray]) -> tuple[float, int]:
+    """As `largest` of the points at hand: (value, -number), -infinity without a number."""
+    found = -inf, 0
+    for some in points.some(None):
+        values = of(Fields(points.hub, some))
+        value = np.fmax.reduce(values, initial=-inf)
+        first = some.ids[values == value].min(initial=LAST)
+        found = max(found, (float(value), -int(first)))
+    return found
 
 
 class Piece(ById):

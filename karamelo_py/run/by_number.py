@@ -57,13 +57,18 @@ class ByNumber:
         nodes = np.intersect1d(
             self.nodes_with_mass(), self.hub.groups[ID].members, assume_unique=True
         )
-        x, mass = np.empty((len(nodes), 3)), self.stepped.nodes.sums[nodes, MASS].astype(float)
+        mass = self.stepped.nodes.sums[nodes, MASS].astype(float)
+        ones = np.ones(len(nodes))
+        return self.summed(mass[:, None] * np.column_stack([ones, self.places_of(nodes)]))
+
+    def places_of(self, nodes: np.ndarray) -> np.ndarray:
+        """(n, 3) positions of nodes, of ascending numbers."""
+        x = np.empty((len(nodes), 3))
         for lattice in self.hub.lattices:
-            rows = slice(
-                *np.searchsorted(nodes, (lattice.first, lattice.first + lattice.node_count))
-            )
+            ends = lattice.first, lattice.first + lattice.node_count
+            rows = slice(*np.searchsorted(nodes, ends))
             x[rows] = lattice.positions(nodes[rows])
-        return self.summed(mass[:, None] * np.column_stack([np.ones(len(nodes)), x]))
+        return x
 
     def occupied_nodes(self) -> tuple[int, int]:
         """How many nodes have mass, and the last of them."""

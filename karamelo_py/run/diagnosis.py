@@ -3,24 +3,23 @@
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import nan
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 import numpy as np
 
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, STOPPED
-from karamelo_py.kernels.watch import GROWTH, LOOK, sum_energies, unit_of
+from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
+from karamelo_py.output.fields import Fields
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.no_number import culprit
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead
-from karamelo_py.run.tiles import in_tiles
-from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain, grown_little, has_grown
+from karamelo_py.run.watch import IN_ALL, WHOLE, cause_of_gain, grown_little, has_grown, swelling
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import named, solid_with
 from karamelo_py.script.errors import Place, ScriptError
 
 LAST_GOOD = "last_good.*.h5"
@@ -72,10 +71,10 @@ def stop(
         simulation.restore(snapshot)
     path = _write_last_good(hub) if grown else None
     if status not in (GAINED, HEATED) and step > simulation.step:
-        before = _energy(simulation)
+        before = simulation.energy()
         kept = simulation.step
         simulation.advance(step - kept)
-        if path is None and _energy(simulation) - before > IN_ALL * max(
+        if path is None and simulation.energy() - before > IN_ALL * max(
             abs(before), float(simulation.control.clock[0].energy_floor)
         ):
             # The watch looks at means of a hundred steps, and has not seen it yet.
@@ -121,28 +120,14 @@ def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
         return False
     step = simulation.step
     simulation.restore(snapshot)
-    before, steps = _energy(simulation), step - simulation.step
+    before, steps = simulation.energy(), step - simulation.step
     if steps:
         simulation.advance(steps)
-    gain = _energy(simulation) - before
+    gain = simulation.energy() - before
     floor = float(simulation.control.clock[0].energy_floor)
     healthy = gain <= IN_ALL * max(abs(before), floor) and not simulation.above_limit()
     simulation.advance(1)  # which goes wrong again, for others to look at
     return healthy
-
-
-def _energy(simulation: Simulation) -> float:
-    """Kinetic, stored and dissipated energy less the work; NaN where nobody watches it."""
-    s = simulation.setup
-    clock = s.control.clock
-    covered = all(in_tiles(block.tiling) == block.points.mass.size for block in s.blocks)
-    if not (clock[0].watch_energy and covered):
-        return nan
-    present = clock.copy()
-    sum_energies(s, simulation.mode)
-    energy = float(clock[0].kinetic + clock[0].stored - clock[0].work)
-    clock[:] = present
-    return energy
 
 
 def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
@@ -151,10 +136,13 @@ def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         f"step {simulation.step}, time {simulation.time:.6g}: the step {simulation.dt:g} is above "
         f"the stable limit, which has fallen to {limit:.4g}"
     )
-    speeds = np.abs(simulation.v).max(axis=1)
-    fastest = int(np.argmax(speeds))
-    message += f" ({_named(hub, simulation, fastest)} moves at {speeds[fastest]:.4g})"
+    speed, fastest = simulation.largest(_speeds)
+    message += f" ({named(hub, fastest)} moves at {speed:.4g})"
     return message, own_step_instead(hub)
+
+
+def _speeds(points: Fields) -> np.ndarray:
+    return np.abs(points.velocity).max(axis=1, initial=0.0)
 
 
 def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
@@ -185,15 +173,12 @@ def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 
 
 def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    here = np.flatnonzero(simulation.present)
-    speeds = np.abs(simulation.v[here]).max(axis=1)
-    volumes = hub.fields.particle("volume") / hub.fields.reference_volume[here]
-    fastest, widest = int(np.argmax(speeds)), int(np.argmax(volumes))
+    (speed, fastest), (volume, widest) = map(simulation.largest, (_speeds, swelling))
     message = (
         f"step {simulation.step}, time {simulation.time:.6g}: the stable step has fallen to "
         f"{simulation.limit:.3g}, less than a millionth of the first "
-        f"({_named(hub, simulation, here[fastest])} moves at {speeds[fastest]:.3g}, "
-        f"{_named(hub, simulation, here[widest])} has {volumes[widest]:.3g} times its volume)"
+        f"({named(hub, fastest)} moves at {speed:.3g}, "
+        f"{named(hub, widest)} has {volume:.3g} times its volume)"
     )
     smaller = _smaller_step(hub, simulation)
     return message, f"something went wrong before: look at the dumps; {smaller}"
@@ -214,9 +199,29 @@ def _no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Tro
     )
 
 
+class Wrong(NamedTuple):
+    """A point that went wrong in a step."""
+
+    number: int
+    old: np.ndarray  # its position before the step and after it, with corners that it carries
+    new: np.ndarray
+    v: np.ndarray
+    grid: int
+
+
+def _first_wrong(simulation: Simulation) -> Wrong | None:
+    """The first of the points at hand that went wrong."""
+    wrong = [(int(block.points.id[p]), block.points, p) for block, p in simulation.wrong_points()]
+    if not wrong:
+        return None
+    number, points, p = min(wrong, key=lambda item: item[0])
+    old, new = (points.x[k][:, p].astype(float) for k in (simulation.now, 1 - simulation.now))
+    return Wrong(number, old, new, points.v[:, p], int(points.grid[p]))
+
+
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     """What is wrong with the first point that went wrong, and what can be done."""
-    wrong = [(int(block.points.id[p]), block, p) for block, p in simulation.wrong_points()]
+    wrong = [one for one in simulation.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
         return _no_number(
             hub,
@@ -226,11 +231,9 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
         )
     if not wrong:
         return "a point went wrong", "use a smaller step"
-    number, block, p = min(wrong, key=lambda item: item[0])
-    now = simulation.now
-    d = hub.domain.dimension
-    old, new = (block.points.x[k][:d, p].astype(float) for k in (now, 1 - now))
-    name = _named(hub, simulation, number)
+    number, old, place, v, grid = min(wrong, key=lambda one: one.number)
+    d, h, name = hub.domain.dimension, hub.lattices[grid].h, named(hub, number)
+    old, new = old[:d], place[:d]
     smaller = _smaller_step(hub, simulation)
     if not np.isfinite(old).all():
         return _no_number(
@@ -239,7 +242,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
             f"{name} has no position (NaN)",
             f"look for a formula that gives NaN; {smaller}",
         )
-    if not np.isfinite(new).all() or not np.isfinite(block.points.v[:, p]).all():
+    if not np.isfinite(new).all() or not np.isfinite(v).all():
         return _no_number(
             hub,
             simulation,
@@ -251,7 +254,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
         if simulation.above_limit():
             return f"{name} at {_place(old)} is thrown out of the domain", smaller
-        loose = _loose(hub, simulation, block, p)
+        loose = _loose(simulation, number, old, LOOSE * h)
         why = f", come loose from its solid ({APART}: numerical fracture)," if loose else ""
         keep = f"; against fracture, {WHOLE}" if loose else ""
         return (
@@ -260,15 +263,14 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
             "make the domain larger, hold the point back with fix velocity_nodes at the wall, let "
             f"it go with boundary(delete), or, if it should not have got there, {smaller}{keep}",
         )
-    move = float(np.abs(new - old).max()) / hub.lattices[block.points.grid[p]].h
+    move = float(np.abs(new - old).max()) / h
     if move > 1:
         return (
             f"{name} at {_place(old)} moves by {move:.3g} cells in one step",
             f"the run is unstable: {smaller}",
         )
-    tangled = _tangled(simulation, block, p)
-    if tangled is not None:
-        plain = "R4" if d == 2 else "R8"
+    if any(simulation.seen(_is_tangled, place, grid)):
+        tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
         instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
         return (
             f"the domain of {name} at {_place(old)} is tangled: one of its corners folds over",
@@ -281,24 +283,28 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     )
 
 
-def _loose(hub: Hub, simulation: Simulation, block: Block, p: int) -> bool:
-    """Whether a point has a solid of others, none of which is within a cell."""
-    number, now = int(block.points.id[p]), simulation.now
-    d, h = hub.domain.dimension, hub.lattices[block.points.grid[p]].h
-    others = simulation.present & (simulation.solid_of == simulation.solid_of[number])
-    others[number] = False
-    apart = np.abs(simulation.x[others][:, :d] - block.points.x[now][:d, p].astype(float))
-    return len(apart) > 0 and bool(np.all(apart.max(axis=1) > LOOSE * h))
+def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> bool:
+    """Whether a point has a solid of others, none of which is near."""
+    others, near = np.sum(simulation.seen(_others, number, x, reach), axis=0)
+    return others > 0 and near == 0
 
 
-def _tangled(simulation: Simulation, block: Block, p: int) -> str | None:
-    """The name of the basis where the domain of a point, whose corners move, is folded over."""
-    s = simulation.setup
+def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> tuple[int, int]:
+    """How many other points of the solid of a point are at hand, and how many are near it."""
+    solid, others, near = solid_with(simulation.hub, number), 0, 0
+    for some in simulation.some(None):
+        own = (some.solid_of == solid.index) & (some.ids != number)
+        apart = np.abs(some.x[own] - x).max(axis=1, initial=0.0)
+        others, near = others + len(apart), near + int(np.sum(~(apart > reach)))
+    return others, near
+
+
+def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
+    """Whether the domain of a point, whose corners move, is folded over."""
+    s = simulation.stepped
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
-        return None
-    grid = record(s.grids, int(block.points.grid[p]))
-    place = tuple(float(a) for a in block.points.x[1 - simulation.now][:, p])
-    return None if np.isfinite(extent(s.basis, s.kin, grid, place)) else type(s.basis).__name__
+        return False
+    return not np.isfinite(extent(s.basis, s.kin, record(s.grids, grid), tuple(place.tolist())))
 
 
 def _smaller_step(hub: Hub, simulation: Simulation) -> str:
@@ -310,11 +316,6 @@ def _smaller_step(hub: Hub, simulation: Simulation) -> str:
         )
     fixed = hub.update.fixed_dt is not None
     return "use a smaller step (set_dt)" if fixed else "use a smaller dt_factor"
-
-
-def _named(hub: Hub, simulation: Simulation, number: int) -> str:
-    solid = list(hub.solids.values())[int(simulation.solid_of[number])]
-    return f"point {number + 1} of solid '{solid.id}'"
 
 
 def _place(x: np.ndarray) -> str:

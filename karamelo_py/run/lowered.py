@@ -262,8 +262,8 @@ class Lowered(ById, ByNumber):
             take_arrays(self, {name: array[()] for name, array in state.items()})
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:
-        """Block and index of the points that the last sweep found wrong, one a tile at most."""
-        for block in self.setup.blocks:
+        """Block and index of points at hand that the last sweep found wrong, one a tile at most."""
+        for block in self.stepped.blocks:
             tiling = block.tiling
             for t in range(max(int(tiling.count[0]), 1)):
                 if tiling.report[t, 2] > 0:

@@ -26,20 +26,34 @@ def culprit(hub: Hub, simulation: Simulation) -> Culprit | None:
 
     A formula that reads what is NaN already shows the damage, and not where it comes from.
     """
-    for fix in hub.fixes.values():
+    found = [one for one in simulation.seen(_first_bad) if one is not None]
+    if not found:
+        return None
+    (which, k, _), value, x = min(found, key=lambda one: one[0])
+    fix = list(hub.fixes.values())[which]
+    return Culprit(fix, list(_formulas(tuple(vars(fix).values())))[k], value, x)
+
+
+def _first_bad(simulation: Simulation) -> tuple | None:
+    """The same by numbers, as far as places at hand tell: (fix, formula, place), value, place."""
+    hub = simulation.hub
+    for which, fix in enumerate(hub.fixes.values()):
         over = simulation.step > 0 and fix.id in simulation.begun
         if over or not fix.hooks():
             continue
-        for formula in _formulas(tuple(vars(fix).values())):
-            if not formula.is_constant and _readable(formula, hub.values):
-                x, x0 = np.empty((1, 0)), None
-                if formula.names.intersection(POINT_SEEDS):
-                    x, x0 = _places(hub, simulation, fix.group)
-                found = formula.evaluate_points(hub.values, x, x0)
-                bad = np.flatnonzero(~np.isfinite(found))
-                if len(bad):
-                    first = bad[0]
-                    return Culprit(fix, formula, found[first], x[first] if x.shape[1] else None)
+        for k, formula in enumerate(_formulas(tuple(vars(fix).values()))):
+            if formula.is_constant or not _readable(formula, hub.values):
+                continue
+            bad = []
+            for numbers, x, x0 in _places(simulation, fix.group, formula):
+                values = formula.evaluate_points(hub.values, x, x0)
+                rows = np.flatnonzero(~np.isfinite(values))
+                if len(rows):
+                    p = rows[np.argmin(numbers[rows])]
+                    key = which, k, int(numbers[p])
+                    bad.append((key, float(values[p]), x[p] if x.size else None))
+            if bad:
+                return min(bad, key=lambda one: one[0])
     return None
 
 
@@ -58,15 +72,16 @@ def _readable(formula: Expression, values: Values) -> bool:
     return all(name in values and np.isfinite(values.get(name)) for name in read)
 
 
-def _places(hub: Hub, simulation: Simulation, group: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Where a fix evaluates its formulas, (n, d), and where that was before the first step."""
-    if isinstance(group, NodeGroup):
-        x = np.concatenate([lattice.positions() for lattice in hub.lattices])
-        acted_on = np.zeros(len(x), np.bool_)
-        acted_on[slice(None) if group.all else group.nodes] = True
-        x = x[acted_on & (hub.fields.node("mass") > 0)]
-        return x, x
-    ids = np.flatnonzero(simulation.present) if group is None else simulation.members(group)
-    x = simulation.x[ids]
-    there = np.isfinite(x).all(axis=1)
-    return x[there], simulation.x0[ids][there]
+def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator[tuple]:
+    """Numbers of places at hand at which a fix evaluates a formula; now (n, d), and at first."""
+    if not formula.names.intersection(POINT_SEEDS):
+        yield np.zeros(1, np.int64), np.empty((1, 0)), None
+    elif isinstance(group, NodeGroup):
+        nodes = simulation.nodes_with_mass()
+        nodes = nodes if group.all else np.intersect1d(nodes, group.nodes, assume_unique=True)
+        x = simulation.places_of(nodes)
+        yield nodes, x, x
+    else:
+        for some in simulation.some(group):
+            there = np.isfinite(some.x).all(axis=1)
+            yield some.ids[there], some.x[there], some.x0[there]

@@ -99,7 +99,7 @@ class Ranks(Holding):
     remove = by_all(Simulation.remove)
 
     begin_to_look = by_all(Simulation.begin_to_look)
-
+    energy = by_all(Simulation.energy)
     measure = by_all(Simulation.measure)
     measure_heat = by_all(Simulation.measure_heat)
     fastest = by_all(Simulation.fastest)
@@ -132,6 +132,13 @@ class Ranks(Holding):
             return self.crew.gathered(found) if self._stepping else found
         found = self._all_do("ask", "each", *self._named(part), name, *arguments)
         return [one for of_rank in found for one in of_rank]
+
+    def seen(self, say: Callable, *arguments: Any) -> list:
+        """What a function says of the points at hand, of each process."""
+        if self._at_hand:
+            found = super().seen(say, *arguments)
+            return self.crew.gathered(found[0]) if self._stepping else found
+        return self._all_do("seen", say, *arguments)
 
     def counted_of(self, part: Any, name: str, size: int, *arguments: Any) -> np.ndarray:
         """How many points of a part's group have each of `size` numbers, which its method says."""

@@ -14,7 +14,7 @@ from karamelo_py.kernels.clock import STILL, choose_dt
 from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
 from karamelo_py.kernels.totals import agree_on_heat
-from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat
+from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
 from karamelo_py.run.lowered import Lowered
 from karamelo_py.run.motion import Motion, motions
 from karamelo_py.run.python_hooks import PythonHooks, sets_initial_state, views_of
@@ -238,6 +238,19 @@ class Simulation(Lowered):
             self.sort()
             self.mapped = False
         begin_to_look(s, self.mode, level, anew)
+
+    def energy(self) -> float:
+        """Kinetic, stored and dissipated energy less the work; NaN where nobody watches it."""
+        s = self.stepped
+        clock = s.control.clock
+        outside = sum(in_tiles(b.tiling) != b.points.mass.size for b in s.blocks)
+        if self.of_all(np.array([outside]))[0] or not clock[0].watch_energy:
+            return np.nan
+        present = clock.copy()
+        sum_energies(s, self.mode)
+        energy = float(clock[0].kinetic + clock[0].stored - clock[0].work)
+        clock[:] = present
+        return energy
 
     def measure_heat(self) -> None:
         """Measure the lowest and highest temperatures of all points."""

@@ -7,6 +7,7 @@ import numpy as np
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
 from karamelo_py.kernels.watch import BORNE, FEW, unit_of
 from karamelo_py.language import registry
+from karamelo_py.output.fields import Fields
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
 from karamelo_py.points.laws.temperatures import initial_heat
@@ -85,14 +86,14 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             f"{share:.2g} of the stable step",
             f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
-    if moves and _torn(hub):
+    if moves and simulation.largest(swelling)[0] > 1.5:  # what a cell cannot hold
         return (
             "points that are further apart than a cell (numerical fracture)",
             WHOLE,
         )
     if hub.fixes and any(isinstance(fix, PairContact) for fix in hub.fixes.values()):
         return "contact between points", "a smaller step, or method ulmpm/contacts"
-    if _strained_by_rates(hub, simulation):
+    if _strained_by_rates(simulation):
         return (
             "material linear at large strain: it adds up stress by rates, and gives back another "
             "work than it took",
@@ -116,23 +117,23 @@ def _step_of(hub: Hub, simulation: Any, share: float) -> str:
     return f"dt_factor({share:g})"
 
 
-def _strained_by_rates(hub: Hub, simulation: Any) -> bool:
+def _strained_by_rates(simulation: Any) -> bool:
     """Whether a law in rate form bears stresses of a quarter of its shear modulus."""
     rates = LinearElastic | FixedFrame
     softest = min(
-        (float(np.min(b.laws.G)) for b in simulation.setup.blocks if isinstance(b.laws, rates)),
+        (float(np.min(b.laws.G)) for b in simulation.blocks if isinstance(b.laws, rates)),
         default=np.inf,
     )
-    return float(np.nanmax(hub.fields.particle("seq"), initial=0.0)) > 0.25 * softest
+    return simulation.largest(_stress)[0] > 0.25 * softest
 
 
-def _volume_ratio(hub: Hub) -> np.ndarray:
-    return hub.fields.particle("volume") / hub.fields.reference_volume[hub.simulation.present]
+def _stress(points: Fields) -> np.ndarray:
+    return points.particle("seq")
 
 
-def _torn(hub: Hub) -> bool:
-    """Whether points have grown to what a cell cannot hold."""
-    return bool(np.nanmax(_volume_ratio(hub), initial=0.0) > 1.5)
+def swelling(points: Fields) -> np.ndarray:
+    """(n,) volumes over those before the first step."""
+    return points.particle("volume") / points.reference_volume
 
 
 def has_grown(simulation: Any) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 from karamelo_py.language import registry
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried
+from karamelo_py.scene.solid import named
 from karamelo_py.script.errors import ScriptError
 
 
@@ -58,10 +59,9 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
         simulation.advance(step - simulation.step)
     simulation.remove(gone)
     if first:
-        solid = [one for one in hub.solids.values() if one.first_id <= gone[0]][-1]
         hub.warn(
-            f"step {step + 1}, time {simulation.time:.6g}: point {gone[0] + 1} of solid "
-            f"'{solid.id}' leaves the domain and is deleted; more are only counted",
+            f"step {step + 1}, time {simulation.time:.6g}: {named(hub, gone[0])} "
+            "leaves the domain and is deleted; more are only counted",
             place=hub.update.boundary_place,
         )
     if not simulation.present.any():

@@ -214,6 +214,16 @@ class Solid:
             )
 
 
+def solid_with(hub: Scene, number: int) -> Solid:
+    """The solid that a point belongs to."""
+    return [solid for solid in hub.solids.values() if solid.first_id <= number][-1]
+
+
+def named(hub: Scene, number: int) -> str:
+    """How to speak of a point."""
+    return f"point {number + 1} of solid '{solid_with(hub, number).id}'"
+
+
 def own_grids(hub: Scene) -> bool:
     """Whether the method lays a grid of its own for each solid."""
     method = hub.update.method
