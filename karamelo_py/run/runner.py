@@ -16,7 +16,14 @@ from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.spending import Spent
 from karamelo_py.run.stable import ruling_limit, words_of_own_step, words_of_share
-from karamelo_py.run.watch import forget_growth, grown_little, growth, not_watched, unknown_work
+from karamelo_py.run.watch import (
+    change_of_energy,
+    forget_growth,
+    grown_little,
+    growth,
+    not_watched,
+    unknown_work,
+)
 from karamelo_py.scene import boundary
 from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
@@ -359,6 +366,7 @@ class Runner:
                 "wall time": f"{wall:.3g} s",
                 "steps": steps,
                 "time": simulation.time,
+                **change_of_energy(simulation),
                 "particle-steps/s": f"{rate:.3g}",
                 "processor time": f"{worked:.3g} s in steps, of all threads",
                 **boundary.counted(self.hub, simulation),

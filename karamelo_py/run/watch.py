@@ -174,6 +174,17 @@ def grown_little(simulation: Any) -> bool:
     return bool(clock.balance - before < IN_ALL * unit_of(clock))
 
 
+def change_of_energy(simulation: Any) -> dict[str, str]:
+    """What the end of a run says of its energy, which the columns of a log have at two times."""
+    clock = simulation.control.clock[0]
+    if not clock.watch_energy or clock.looks <= FEW:
+        return {}
+    mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
+    share = 100 * (mean - clock.first_few) / unit_of(clock)
+    words = "since the start (kinetic + stored + dissipated - work, at one time)"
+    return {"energy": f"{share:+.2f} % {words}"}
+
+
 def forget_growth(simulation: Any) -> None:
     """Count from the present state on what energy grows by: that it has grown was told."""
     clock = simulation.control.clock[0]

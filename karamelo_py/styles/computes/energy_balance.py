@@ -27,7 +27,9 @@ class EnergyBalance(Compute):
     Publishes ID, the sum; ID_total, the energies without the work; and ID_drift, the change of ID
     since the first output, relative to the largest of kinetic, stored and dissipated energy and
     work so far. Velocities lie half a step beside positions, so that a drift of the order of dt is
-    that of the way of counting. The energy that affine transfers keep within points is not in it.
+    that of the way of counting (a third in a body of a few cells); the end of a run says by how
+    much the energies of one time have changed. The energy that affine transfers keep within points
+    is not in it.
 
     See Also
     --------
