@@ -1,9 +1,10 @@
 """eos shock: Mie-Grueneisen equation of state."""
 
-from math import log1p, sqrt
+from math import sqrt
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import choose, point_function, real, shared
+from karamelo_py.compiler.powers import logarithm
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.eos import (
     bulk_modulus,
@@ -64,7 +65,7 @@ class Shock(NamedTuple):
     """
 
     in_lanes = True
-    one_by_one = ("compression_energy", "ratio_at_pressure")
+    one_by_one = ("ratio_at_pressure",)
 
     specific_volume: float  # reference volume per mass
     modulus: float  # rho0 c0^2
@@ -138,23 +139,21 @@ def _(eos, j, memory, heat):
 
 @compression_energy.on(Shock)
 def _(eos, j, memory):
-    one = real(1, j)
-    half = real(0.5, j)
+    one, half = real(1, j), real(0.5, j)
     closed = one - j
-    if closed < 0:
-        # rho0 c0^2 (1 - J) / J from J to 1
-        return -eos.modulus * (closed + log1p(-closed))
     inside = min(closed, tangent_from(eos, j))
     y = eos.S * inside
-    if y < real(1e-3, j):  # the closed form is a small difference there
-        energy = inside * inside * (half + y * (real(2 / 3, j) + real(0.75, j) * y))
-    else:
-        energy = (y / (one - y) + log1p(-y)) / (eos.S * eos.S)
     flat = one - y
+    in_tension, near = closed < 0, y < real(1e-3, j)
+    log_of = logarithm(choose(in_tension, j, flat))
+    # From J to 1 rho0 c0^2 (1 - J) / J in tension; the closed form is a small difference near 1.
+    few = inside * inside * (half + y * (real(2 / 3, j) + real(0.75, j) * y))
+    log_of_flat = log_of + ((one - flat) - y) / flat  # y is not what 1 - y is rounded to
+    energy = choose(near, few, (y / flat + log_of_flat) / choose(near, one, eos.S * eos.S))
     slope = (one + y) / (flat * flat * flat)
     further = closed - inside
     line = further * (inside / (flat * flat) + half * slope * further)
-    return eos.modulus * (energy + line)
+    return eos.modulus * choose(in_tension, -(closed + log_of), energy + line)
 
 
 @ratio_at_pressure.on(Shock)
