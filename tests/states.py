@@ -56,6 +56,8 @@ def state_of(hub: Hub) -> dict[str, np.ndarray]:
         "time": np.array([hub.update.time, hub.update.step]),
     }
     arrays["mass"] = hub.simulation.mass
+    clock = hub.simulation.control.clock[0]
+    arrays["watch"] = np.array([clock.kinetic, clock.stored, clock.work, clock.balance])
     arrays["nodal mass"] = hub.simulation.setup.nodes.sums[:, 0].sum()
     arrays |= {"-".join(k.__name__ for k in kind): a.T for kind, a in state.laws.items()}
     arrays |= {kind.__name__: a.T for kind, a in state.fields.items()}
