@@ -33,9 +33,11 @@ def final_hub(
 
 
 def final_columns(script: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Columns of all points by id, in full precision."""
+    """Columns of all points by id, in full precision; `work` and `balance` are the watch's."""
     hub = final_hub(script)
-    return {name: hub.fields.particle(name) for name in names}
+    clock = hub.simulation.control.clock[0]
+    watched = {"work": clock.work, "balance": clock.balance}
+    return {n: watched[n] if n in watched else hub.fields.particle(n) for n in names}
 
 
 def final_state(
@@ -56,8 +58,6 @@ def state_of(hub: Hub) -> dict[str, np.ndarray]:
         "time": np.array([hub.update.time, hub.update.step]),
     }
     arrays["mass"] = hub.simulation.mass
-    clock = hub.simulation.control.clock[0]
-    arrays["watch"] = np.array([clock.kinetic, clock.stored, clock.work, clock.balance])
     arrays["nodal mass"] = hub.simulation.setup.nodes.sums[:, 0].sum()
     arrays |= {"-".join(k.__name__ for k in kind): a.T for kind, a in state.laws.items()}
     arrays |= {kind.__name__: a.T for kind, a in state.fields.items()}

@@ -153,9 +153,9 @@ def test_work_against_stress_and_walls_is_that_of_the_mean_velocity(
     node in a step left out of the velocity that loads act at, F dt/(rho h) would be missing from
     that of a force F at the end: ten times what is stored by the time that it is pulled.
     """
-    _, _, work, balance = state_interpreted(PULLED.format(frame, scheme, load))["watch"]
-    assert work == pytest.approx(63.73 if load == PULL else 17.84, rel=0.12)
-    assert abs(balance) < 0.003 * work
+    found = state_interpreted(PULLED.format(frame, scheme, load), "work", "balance")
+    assert found["work"] == pytest.approx(63.73 if load == PULL else 17.84, rel=0.12)
+    assert abs(found["balance"]) < 0.003 * found["work"]
 
 
 def test_a_step_above_the_limit_is_named(run_interpreted):
