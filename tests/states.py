@@ -33,9 +33,11 @@ def final_hub(
 
 
 def final_columns(script: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Columns of all points by id, in full precision."""
+    """Columns of all points by id, in full precision; `work` and `balance` are the watch's."""
     hub = final_hub(script)
-    return {name: hub.fields.particle(name) for name in names}
+    clock = hub.simulation.control.clock[0]
+    watched = {"work": clock.work, "balance": clock.balance}
+    return {n: watched[n] if n in watched else hub.fields.particle(n) for n in names}
 
 
 def final_state(

@@ -148,6 +148,12 @@ ENTRIES = [
 ]
 
 
+def test_pages_show_command_lines():
+    """The next test finds them: 65, on most pages."""
+    found = [len(command_lines(page)) for page in PAGES]
+    assert sum(found) > 50 and sum(map(bool, found)) > 12
+
+
 @pytest.mark.parametrize("page", [p for p in PAGES if p.name != "atlas.md"], ids=lambda p: p.name)
 def test_command_lines_of_pages_are_understood(page):
     """Options and values; scripts and their variables are there, and tables are made above."""

@@ -140,11 +140,26 @@ HALVED = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("method", ["ulmpm", "ulmpm/contacts"])
-def test_a_step_that_is_halved(state_interpreted, tmp_path, method):
+# Two bodies that touch, of which usavg remembers what contact has done, in the place of one.
+TOUCHING = {
+    "method(ulmpm,": "method(ulmpm/contacts,",
+    "region(box, block, 0.3, 0.6,": "region(right, block, 0.45, 0.6, 0.3, 0.5)\n"
+    "region(box, block, 0.3, 0.45,",
+    "sin(40*x0)": "sin(20*x0)",
+    "solid(body,": "solid(other, region, right, 2, rubber, 0.1, 0)\nsolid(body,",
+}
+
+
+@pytest.mark.parametrize("changes", [{}, TOUCHING], ids=["one body", "contact"])
+def test_a_step_that_is_halved(state_interpreted, tmp_path, changes):
     """Each process goes back to what it kept; files hold it, as those of one process do."""
-    script = block(2, *HALVED, size=(0.3, 0.2)).replace("method(ulmpm,", f"method({method},")
+    script = block(2, *HALVED, size=(0.3, 0.2), scheme="usavg" if changes else "musl")
+    for old, new in changes.items():
+        assert old in script
+        script = script.replace(old, new)
     assert shared(state_interpreted, tmp_path, with_files(script, "restart(6, r.*.h5)\n"), ranks=3)
+    with h5py.File(tmp_path / "parts" / "r.12.h5") as file:
+        assert not changes or file["good/touched/rows"][()].any()
     log = (tmp_path / "parts" / "log.mpm").read_text(encoding="utf-8").split()
     assert float(log[-2]) < 0.6 * float(log[4])
 

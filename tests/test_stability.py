@@ -59,6 +59,7 @@ def test_the_courant_limit_of_a_bar_is_found(folder, capsys):
     (runs,) = re.findall(r"(\d+) of 21 cells were run", out)
     counted = re.findall(r"^run (\d+) of at most 21: ", out, re.M)
     assert counted == [str(k + 1) for k in range(int(runs))]
+    assert int(runs) == (table["run"] == "yes").sum() > 3
     assert "times the program's stable step" in out
 
 

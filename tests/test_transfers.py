@@ -204,6 +204,9 @@ def test_what_is_said_of_all_nodes_at_once(transfer, basis, kin, data):
         expected = met.weights[:, None] * (v + met.arms @ np.reshape(c, (d, d)).T)
         assert met.given(transfer, 1.0, tuple(v), moment) == pytest.approx(expected, abs=1e-10)
     factor = by_arms(transfer, inverse_d)
+    assert bool(factor) == (
+        type(transfer) in map(type, AFFINE) or (isinstance(transfer, MLS) and bool(inverse_d))
+    )
     if factor:
         field = np.reshape(data.draw(numbers(d * len(met.weights))), (-1, d))
         expected = factor[0] * (met.weights[:, None] * field).T @ met.arms

@@ -65,6 +65,10 @@ def waits(n, x):
 def nested(n, x):
     found = 0.0
     for i in range(n):
+        while found < 9:
+            for j in range(i):
+                found += j * i
+            found += 4
         for j in range(i):
             if (i * j) % 7 == 5:
                 found += x

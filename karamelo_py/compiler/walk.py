@@ -263,7 +263,8 @@ class _Walk(Terms):
         self.breaks, self.continues = [], []
         if counter:
             self.names[_COUNT] = counter.start
-        head, self.names = self.flow.loop(self.names, _stored(node) | {_COUNT})
+        changed = _stored(node) | ({_COUNT} if counter else frozenset())
+        head, self.names = self.flow.loop(self.names, changed)
         count = self.names.get(_COUNT)
         condition = counter.goes_on(count) if counter else self.do(node.test)
         ways = []

@@ -12,8 +12,21 @@ import numpy as np
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import name_of
+from karamelo_py.compiler.loops import subkernel
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.kinematics import dimension
+
+
+@subkernel
+def first_from(ascending, begin, end, x):
+    """The first place of these whose number is not below `x`; NumPy's search compiles for 0.4 s."""
+    while begin < end:
+        middle = (begin + end) // 2
+        if ascending[middle] < x:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin
 
 
 class Nodes(NamedTuple):

@@ -1,9 +1,9 @@
 """When fixes act: on nodes, and on points."""
 
 from karamelo_py.compiler.compile import over_blocks, point_function, shared
-from karamelo_py.kernels.arrays import Hooks
+from karamelo_py.kernels.arrays import ON_SUMS, Hooks
 from karamelo_py.kernels.clock import kick, step_size
-from karamelo_py.kernels.node_hooks import node_hooks, work_of_loads
+from karamelo_py.kernels.node_hooks import DONE, node_hooks
 from karamelo_py.kernels.point_hooks import Motion, clear_totals, point_hooks, publish_totals
 from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows
@@ -30,7 +30,8 @@ def add_work(hooks, s):
 
 @add_work.on(Hooks)
 def _(hooks, s):
-    work_of_loads(s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s))
+    kept = s.control.clock[0].kept
+    node_hooks(DONE, ON_SUMS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), kept)
 
 
 @shared

@@ -19,6 +19,7 @@ from karamelo_py.kernels.arrays import (
     POST_VELOCITIES_TO_GRID,
     TIME,
     VALUE,
+    first_from,
     of_change,
     of_force,
     of_momentum,
@@ -47,6 +48,7 @@ from karamelo_py.points.kinematics import dimension
 _call_node_function = caller_of(NODE_FUNCTION)
 
 COUNT, ACT, RUB, LOADS = 0, 1, 2, 3  # what is done with the members of a hook
+DONE = -1  # in the place of a stage
 END = np.iinfo(np.int64).max  # behind the last of them
 
 
@@ -142,7 +144,7 @@ def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, shar
                 if star == hooks.scratch[VALUE, q]:
                     before = _taken_over(hooks, control, h, n, c, total)
             if target == ON_SUMS:
-                hooks.loads[n, c] += force - old_force  # see work_of_loads
+                hooks.loads[n, c] += force - old_force  # see _work_of_loads
                 nodes.sums[n, of_force(kin) + c] = force
             elif target == ON_UPDATE:
                 # Impulse times the mean of the velocities before and after it.
@@ -201,7 +203,7 @@ def _choose_nodes(nodes, ranges, hooks, h, row, end, member):
         if of_all:
             member = max(member, low)
         elif member < behind and hooks.members[member] < low:
-            member += np.searchsorted(hooks.members[member:behind], low)
+            member = first_from(hooks.members, member, behind, low)
         n = _node(hooks, h, member)
         while n < high:
             member += 1
@@ -222,10 +224,9 @@ def _go_through(
     """Do `task` with the members that have mass in shares of the nodes; return their number."""
     heavy = 0
     for k in range(first, end):
+        count, row, member = BLOCK if task != LOADS else 0, ranges[k, 0], NONE
         if task == LOADS:
             _work_at_nodes(kin, nodes, ranges, hooks, control, dt, k)
-            continue
-        count, row, member = BLOCK, ranges[k, 0], NONE
         while count == BLOCK:
             count, row, member = _choose_nodes(nodes, ranges, hooks, h, row, ranges[k, 1], member)
             if task == COUNT:
@@ -337,13 +338,33 @@ def _(mode, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h
             clock.set_high = max(clock.set_high, hooks.apart.clock[k, 0].set_high)
 
 
+@subkernel
+def _work_of_loads(kin, grids, nodes, ranges, hooks, control, dt):
+    """Add up what the loads on nodes have done, and forget them; v* is that of the points now.
+
+    Force times the mean of the velocities before and after the step: what stress and those who hold
+    a node do to it in the same step counts, or the work would be of first order.
+    """
+    if hooks.loads.size == 0:
+        return
+    go_through(
+        hooks.mode, LOADS, ON_SUMS, kin, grids, nodes, ranges, hooks, control, dt, 0.0, NONE, 1.0
+    )
+    carry(control.totals[WORK])
+
+
 @entered
 def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
 
     `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
+    When all is `DONE` the work of the loads is added up: here, so that the way through the nodes is
+    compiled once.
     """
     dt = float(dt)
+    if stage == DONE:
+        _work_of_loads(kin, grids, nodes, ranges, hooks, control, dt)
+        return
     if target == ON_UPDATE:
         _clear_held(kin, ranges, hooks.held)
     for h in range(len(hooks.table)):
@@ -372,19 +393,3 @@ def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kep
             )
         if rubs or (hooks.table[h].holds and hooks.held.size > 0):
             publish_total(hooks, h, control)
-
-
-@entered
-def work_of_loads(kin, grids, nodes, ranges, hooks, control, dt):
-    """Add up what the loads on nodes have done, and forget them; v* is that of the points now.
-
-    Force times the mean of the velocities before and after the step: what stress and those who hold
-    a node do to it in the same step counts, or the work would be of first order.
-    """
-    if hooks.loads.size == 0:
-        return
-    go_through(
-        hooks.mode, LOADS, ON_SUMS, kin, grids, nodes, ranges, hooks, control, float(dt), 0.0,
-        NONE, 1.0,
-    )  # fmt: skip
-    carry(control.totals[WORK])

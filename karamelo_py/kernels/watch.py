@@ -11,15 +11,13 @@ of mass: large as that may be, from the start or by loads, it cannot hide what v
 
 from math import inf
 
-import numpy as np
-
 from karamelo_py.compiler.compile import added, in_all, index, of_present, over_blocks, real, shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import TIMESTEP
+from karamelo_py.kernels.arrays import TIMESTEP, first_from
 from karamelo_py.kernels.sweep import lanes_of_law, points_from, width_of
 from karamelo_py.kernels.totals import KINETIC, STORED, WORK, add_to, agree_on_heat, collect
 from karamelo_py.points.kinematics import dimension, free_from
@@ -74,6 +72,12 @@ def _note(report, t, total):
         report[t, OF_SOLID + 1 + k] = part
 
 
+@shared
+def _solid_of(firsts, number):
+    """The solid that a point of this id belongs to."""
+    return first_from(firsts, 0, firsts.size, number + 1) - 1
+
+
 @subkernel
 def _look_at_share(kin, points, laws, tiling, firsts, k):
     """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
@@ -82,7 +86,7 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
         start, end = tiling.range[t, 0], tiling.range[t, 1]
-        solid = np.searchsorted(firsts, points.id[start], side="right") - 1
+        solid = _solid_of(firsts, points.id[start])
         begin, behind = firsts[solid], _behind(firsts, solid)
         kinetic = stored = 0.0
         total = _nothing(kin)
@@ -158,7 +162,7 @@ def _add_momenta(kin, points, tiling, control):
             for p in range(tiling.range[t, 0], tiling.range[t, 1]):
                 if not begin <= points.id[p] < end:
                     _add_momentum(control, solid, d)
-                    solid = np.searchsorted(firsts, points.id[p], side="right") - 1
+                    solid = _solid_of(firsts, points.id[p])
                     begin, end = firsts[solid], _behind(firsts, solid)
                 mass = float(points.mass[p])
                 sums[0] += mass
