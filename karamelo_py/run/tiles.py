@@ -190,13 +190,13 @@ class Tiles:
         drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
         return far + drift if far < cells else cells  # also where it is not a number
 
-    def _places(self, s: Setup, points: Points) -> np.ndarray:
+    def _where(self, s: Setup, points: Points) -> np.ndarray:
         """The places (w, n) that weights belong to."""
         return points.x[s.control.clock[0].now] if points.home is None else points.home
 
     def tiles_of(self, s: Setup, points: Points) -> np.ndarray:
         """(n,) the tile of each point."""
-        x, ends = self._places(s, points), np.empty((self.threads, self.count), np.int64)
+        x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
         find_tiles(self.mode, s.kin, s.grids, self._cut, x, points.grid, ends, tile)
         return tile
@@ -204,7 +204,7 @@ class Tiles:
     def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
         """Sort the points of a block; the numbers of the tiles that they are in."""
         points, tiling = block.points, block.tiling
-        x = self._places(s, points)
+        x = self._where(s, points)
         reach = self._reach(s, block, x)
         # Some parts for each thread: tiles are not of like size, and others may need a core.
         parts = 1 if self.threads == 1 else 4 * self.threads
