@@ -285,8 +285,8 @@ class Tiles:
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
         """Spans and ranges of the nodes in tiles that boxes reach; first of each share, and parts.
 
-        Nodes are of the share of points that have most of them: what a thread has given to is in
-        its caches, and to get it from those of another takes longer than to sum it.
+        Nodes are in the order of the shares of points that have most of them: what a thread has
+        given to is in its caches, and to get it from those of another takes longer than to sum it.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
@@ -310,7 +310,10 @@ class Tiles:
         own = self._parts(grid[starts], own_begin, own_end, 0, 0)
         parts = np.insert(parts, starts[more], own[more], axis=0)
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
-        owner = owner[order][starts]
+        if self.threads > 1:
+            owner = _evenly(own, beside[order][starts])
+        else:
+            owner = owner[order][starts]
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
         rows = np.stack(rows_of(own), axis=1)
         ranges = ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
@@ -436,6 +439,18 @@ def _as_rows(array: np.ndarray) -> tuple[np.ndarray, ...]:
     """(c, n) views of the bits of an array of points, as whole numbers."""
     bits = array.view(f"i{array.itemsize}")
     return tuple(bits) if bits.ndim > 2 else (np.atleast_2d(bits),)
+
+
+def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """(n,) shares of tiles of nodes with these parts, with as many nodes each, in this order.
+
+    Tiles with the same number in `beside` follow each other, and are of one share.
+    """
+    size = np.prod(parts[:, 2:5], axis=1)
+    middle = np.cumsum(size) - size / 2
+    firsts = np.diff(beside, prepend=-1) != 0
+    share = (middle[firsts] * (SHARES / max(size.sum(), 1))).astype(np.int64)
+    return share[np.cumsum(firsts) - 1]
 
 
 def in_use(tiling: Tiling) -> list[tuple[str, int]]:
