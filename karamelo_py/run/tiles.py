@@ -310,10 +310,7 @@ class Tiles:
         own = self._parts(grid[starts], own_begin, own_end, 0, 0)
         parts = np.insert(parts, starts[more], own[more], axis=0)
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
-        if self.threads > 1:
-            owner = _evenly(own, beside[order][starts])
-        else:
-            owner = owner[order][starts]
+        owner = _evenly(own, beside[order][starts])
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
         rows = np.stack(rows_of(own), axis=1)
         ranges = ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
