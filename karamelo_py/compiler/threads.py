@@ -266,7 +266,7 @@ def shared_out(function: Callable, parameters: str) -> Callable:
         call = (f"function({items}, k)",)
         return define(
             names,
-            f"distribute(mode.team, count, address_of(body), address(hold(({parameters}))))",
+            f"distribute(mode.team, count, address_of(body), address(hold(({parameters},))))",
             distribute=_distribute, address_of=_address_of, address=address, hold=hold,
             body=_task_of(function.__qualname__, arguments, call, function=function),
         )  # fmt: skip

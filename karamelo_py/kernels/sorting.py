@@ -1,13 +1,41 @@
 """Sorting the points by tile, and how far their domains reach."""
 
+from typing import NamedTuple
+
+import numpy as np
+
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import loop
+from karamelo_py.compiler.loops import entered, loop, subkernel
+from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent, first_node
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
+
+PARTS = 64  # of the columns of an array, which threads share out
+
+
+class Cut(NamedTuple):
+    """How g grids are cut into T tiles."""
+
+    size: np.ndarray  # (d,) cells of a tile
+    count: np.ndarray  # (g, d) number of tiles
+    first: np.ndarray  # (g + 1,) number of the first
+
+
+class Order(NamedTuple):
+    """What is found where n points are sorted by threads, each of which has a part of them."""
+
+    width: int  # of groups of points
+    ends: np.ndarray  # (parts, T) the last row takes where the points of each tile end
+    share: np.ndarray  # (parts + 1,) takes the first tile of each share of as many points
+    boxes: np.ndarray  # (2, T, d) takes between what places the points of a tile lie, in cells
+    bins: np.ndarray  # (parts, 2, cells of a tile) scratch
+    order: np.ndarray  # (n,) takes the numbers that the points had
+    tile: np.ndarray  # (n,) takes the tile of each
+    room: np.ndarray  # (2, n) scratch
 
 
 @shared
@@ -19,80 +47,169 @@ def cell_of(grid, direction, at):
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
-@loop
-def order_points(kin, grids, size, tiles, first, x, of, start, tile, order):
-    """Stable counting sort of places `x` (w, n) by tile.
-
-    Tiles have `size` (d,) cells; grid g has ``tiles[g]`` of them (g, 3), numbered from
-    ``first[g]``. `of` (n,) is the grid of each point. `tile` (n,) takes the tile of each point,
-    `order` (n,) the points by tile, and ``start[t]`` ends as the end of tile t, which is the start
-    of tile t + 1.
-    """
-    grids = at_hand(grids)
-    start[:] = 0
-    for p in range(x.shape[1]):
+@subkernel
+def _find_tiles(kin, grids, tiles, x, of, ends, tile, k):
+    """The tiles of the k-th part of the points, and how many of these each tile has."""
+    grids, tiles = at_hand(grids), at_hand(tiles)
+    parts = ends.shape[0]
+    for t in range(ends.shape[1]):
+        ends[k, t] = 0
+    for p in range(of.size * k // parts, of.size * (k + 1) // parts):
         g = of[p]
         grid = record(grids, g)
         number = 0
-        for k in range(dimension(kin)):
-            number = number * tiles[g, k] + cell_of(grid, k, in_cells(grid, k, x[k, p])) // size[k]
-        number += first[g]
+        for i in range(dimension(kin)):
+            cell = cell_of(grid, i, in_cells(grid, i, x[i, p]))
+            number = number * tiles.count[g, i] + cell // tiles.size[i]
+        number += tiles.first[g]
         tile[p] = number
-        start[number + 1] += 1
-    for t in range(start.size - 1):
-        start[t + 1] += start[t]
-    for p in range(x.shape[1]):
+        ends[k, number] += 1
+
+
+@subkernel
+def _begin_tiles(found):
+    """Where what each part gives to each tile begins; shares of the tiles, with as many points."""
+    ends, share, points = found.ends, found.share, found.order.size
+    parts = ends.shape[0]
+    place = shares = 0
+    for t in range(ends.shape[1]):
+        begin = place
+        for k in range(parts):
+            count = ends[k, t]
+            ends[k, t] = place
+            place += count
+        while shares < parts and 2 * points * shares <= (begin + place) * parts:
+            share[shares] = t
+            shares += 1
+    share[shares:] = ends.shape[1]
+
+
+@subkernel
+def _order_part(found, k):
+    """Put the k-th part of the points into their places; what begins at `ends` ends there then."""
+    ends, tile, order = found.ends, found.tile, found.order
+    parts = ends.shape[0]
+    for p in range(tile.size * k // parts, tile.size * (k + 1) // parts):
         t = tile[p]
-        order[start[t]] = p
-        start[t] += 1
+        order[ends[k, t]] = p
+        ends[k, t] += 1
 
 
-@loop
-def order_in_tiles(kin, grids, basis, size, points, x, ranges, width, boxes, bins, cell, order):
-    """Sort the points of each tile by the first node that they see, then by id.
+@subkernel
+def _order_in_tiles(kin, grids, basis, tiles, points, x, found, k):
+    """Sort the points of each tile of the k-th share by the first node that they see, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
-    first. The order follows from where the points are, not from where they were. `boxes` (2, T, d)
-    takes between what places the points lie, in cells. `bins` (2, cells of a tile)
-    and `cell` (2, n) are scratch; `order` (n,) is by tile.
+    first. The order follows from where the points are, not from where they were.
     """
-    grids, points = at_hand(grids), at_hand(points)
+    grids, points, tiles, found = at_hand(grids), at_hand(points), at_hand(tiles), at_hand(found)
+    boxes, bins, cell, order = found.boxes, found.bins, found.room, found.order
+    ends, cells = found.ends[found.ends.shape[0] - 1], bins.shape[2]
     d = dimension(kin)
-    for t in range(len(ranges)):
-        begin, end = ranges[t, 0], ranges[t, 1]
-        bins[0, :] = 0
-        bins[1, :] = -1
+    for t in range(found.share[k], found.share[k + 1]):
+        begin, end = ends[t - 1] if t > 0 else 0, ends[t]
+        if begin == end:
+            continue
+        for c in range(cells):
+            bins[k, 0, c] = 0
+            bins[k, 1, c] = -1
         for q in range(begin, end):
             p = order[q]
             grid = record(grids, points.grid[p])
             number = 0
-            for k in range(d):
-                at = in_cells(grid, k, x[k, p])
+            for i in range(d):
+                at = in_cells(grid, i, x[i, p])
                 first = max(int(at + first_node(basis, grid.h)), 0)
-                number = number * size[k] + first % size[k]
+                number = number * tiles.size[i] + first % tiles.size[i]
                 at = at if at > 0 else real(0, at)  # so written, NaN is 0 too
-                boxes[0, t, k] = at if q == begin else min(boxes[0, t, k], at)
-                boxes[1, t, k] = at if q == begin else max(boxes[1, t, k], at)
+                boxes[0, t, i] = at if q == begin else min(boxes[0, t, i], at)
+                boxes[1, t, i] = at if q == begin else max(boxes[1, t, i], at)
             cell[0, q] = number
             cell[1, q] = p
-            bins[0, number] += 1
+            bins[k, 0, number] += 1
         # Twice: whole groups, then the others. From here on, where a cell begins and where it ends.
         place = begin
         for rest in (False, True):
-            for c in range(bins.shape[1]):
-                here = bins[0, c]
-                if bins[1, c] < 0 and (here % width != 0) == rest:
-                    bins[:, c] = place
+            for c in range(cells):
+                here = bins[k, 0, c]
+                if bins[k, 1, c] < 0 and (here % found.width != 0) == rest:
+                    bins[k, 0, c] = bins[k, 1, c] = place
                     place += here
         for q in range(begin, end):
             c, p = cell[0, q], cell[1, q]
-            at = bins[1, c]
-            bins[1, c] += 1
+            at = bins[k, 1, c]
+            bins[k, 1, c] += 1
             # Nearly all were in this order before.
-            while at > bins[0, c] and points.id[order[at - 1]] > points.id[p]:
+            while at > bins[k, 0, c] and points.id[order[at - 1]] > points.id[p]:
                 order[at] = order[at - 1]
                 at -= 1
             order[at] = p
+
+
+@subkernel
+def _pick_columns(array, first, rows, order, room, k):
+    """Copy the k-th part of some rows of an array to `room`, in order."""
+    for c in range(rows):
+        for p in range(order.size * k // PARTS, order.size * (k + 1) // PARTS):
+            room[c, p] = array[first + c, order[p]]
+
+
+@subkernel
+def _put_columns(array, first, rows, room, k):
+    """Copy the k-th part of some rows back."""
+    for c in range(rows):
+        for p in range(array.shape[1] * k // PARTS, array.shape[1] * (k + 1) // PARTS):
+            array[first + c, p] = room[c, p]
+
+
+_find_all_tiles = shared_out(_find_tiles, "kin, grids, tiles, x, of, ends, tile")
+_order_parts = shared_out(_order_part, "found")
+_order_in_all_tiles = shared_out(_order_in_tiles, "kin, grids, basis, tiles, points, x, found")
+_pick_all_columns = shared_out(_pick_columns, "array, first, rows, order, room")
+_put_all_columns = shared_out(_put_columns, "array, first, rows, room")
+
+
+@entered
+def _permute(mode, array, order, room):
+    """Put the columns of an array (c, n) of whole numbers into `order`, a few rows at a time.
+
+    A copy of a whole field would be the peak of the set-up.
+    """
+    first = 0
+    while first < array.shape[0]:
+        rows = min(room.shape[0], array.shape[0] - first)
+        _pick_all_columns(mode, PARTS, array, first, rows, order, room)
+        _put_all_columns(mode, PARTS, array, first, rows, room)
+        first += rows
+
+
+def _sort(mode, kin, grids, basis, tiles, points, x, found, arrays):
+    parts = found.ends.shape[0]
+    _find_all_tiles(mode, parts, kin, grids, tiles, x, points.grid, found.ends, found.tile)
+    _begin_tiles(found)
+    _order_parts(mode, parts, found)
+    _order_in_all_tiles(mode, parts, kin, grids, basis, tiles, points, x, found)
+    for array in arrays:
+        _permute(mode, array, found.order, found.room)
+    return 0
+
+
+_sort_by_team = by_team(_sort, "kin, grids, basis, tiles, points, x, found, arrays")
+
+
+@loop
+def sort_points(mode, kin, grids, basis, tiles, points, x, found, arrays):
+    """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
+
+    `arrays` are all that they carry, (c, n) whole numbers each.
+    """
+    _sort_by_team(mode, kin, grids, basis, tiles, points, x, found, arrays)
+
+
+@loop
+def find_tiles(mode, kin, grids, tiles, x, of, ends, tile):
+    """The tile of each of some points at `x` (w, n), of the grids `of` (n,); `ends` is scratch."""
+    _find_all_tiles(mode, ends.shape[0], kin, grids, tiles, x, of, ends, tile)
 
 
 @loop

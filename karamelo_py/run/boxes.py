@@ -70,6 +70,16 @@ def used(spans: np.ndarray) -> np.ndarray:
     return spans[: 1 + spans[0, 0]]
 
 
+def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """(k, 2) what of spans is in none of the others; neither of them overlap."""
+    edges = np.concatenate([spans.T.ravel(), others.T.ravel()])
+    steps = np.repeat([1, -1, 2, -2], [len(spans)] * 2 + [len(others)] * 2)
+    order = np.argsort(edges, kind="stable")
+    edges, covered = edges[order], np.cumsum(steps[order])
+    found = np.stack([edges[:-1], edges[1:]], axis=1)[covered[:-1] == 1]
+    return found[found[:, 0] < found[:, 1]]
+
+
 def numbers(spans: np.ndarray) -> np.ndarray:
     """The numbers of the nodes in spans, of which the first row is the count."""
     return between(*used(spans)[1:].T)

@@ -46,7 +46,7 @@ class Holding(Leading):
         if previous is None:
             self._held = Held.NOBODY
         self.part = Part(self.crew, hub, self._whole, self.count)
-        self.part.tiles.threads = self.threads
+        self.part.tiles.threads, self.part.tiles.mode = self.threads, self.mode
 
     # --- the whole --------------------------------------------------------------------------------
 

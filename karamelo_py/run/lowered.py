@@ -80,6 +80,7 @@ class Lowered(ById, ByNumber):
         self.threads = self.tiles.threads = thread_count(hub, self.count)
         self._team = new_team(self.threads)
         self.mode = Threaded(self._team.ctypes.data) if self.threads > 1 else Serial()
+        self.tiles.mode = self.mode
         self.version = 0  # grows when fields change without a step
         self._measured = -1  # the version whose fastest point is known
         self._watched = -1  # the version whose balance of energy is followed

@@ -117,7 +117,7 @@ class SharedTiles(Tiles):
 
     def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
         """Hand over the points that have gone to the tiles of others."""
-        tiles = [self._by_tile(s, block)[1] for block in s.blocks]
+        tiles = [self.tiles_of(s, block.points) for block in s.blocks]
         # Of nodes it is known what tiles reached from where their points were.
         loads = self.loads(s.blocks)
         loads[:-1] = [np.bincount(of, minlength=self.count) for of in tiles]

@@ -1,13 +1,13 @@
 """The grids cut into tiles: which points lie in which, which nodes they give to or are in use."""
 
 from collections.abc import Sequence
-from itertools import product
 from math import inf
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.compiler.lanes import lanes_for
+from karamelo_py.compiler.threads import Serial, Threaded
 from karamelo_py.kernels.arrays import (
     ADD,
     CLEAR,
@@ -15,12 +15,13 @@ from karamelo_py.kernels.arrays import (
     Block,
     Buffers,
     Nodes,
+    Points,
     Setup,
     Tiling,
     arrays_of,
 )
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.sorting import order_in_tiles, order_points, widest
+from karamelo_py.kernels.sorting import Cut, Order, find_tiles, sort_points, widest
 from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.points.basis import shape_size
 from karamelo_py.run.boxes import (
@@ -34,6 +35,7 @@ from karamelo_py.run.boxes import (
     rows_of,
     steps_of,
     used,
+    without,
 )
 from karamelo_py.run.buffers import buffers_of, grow, room_of, summed
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
@@ -75,11 +77,12 @@ class Tiles:
         How often points were sorted.
     rows
         How many rows of the buffers the boxes of all tiles take.
-    threads
-        How many sum at nodes.
+    threads, mode
+        How many sum at nodes and sort, and how.
     """
 
     threads = 1
+    mode: Serial | Threaded = Serial()
 
     def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int, sparse: bool):
         self.direct = points <= DIRECT_UP_TO
@@ -106,7 +109,7 @@ class Tiles:
         most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
         self._most_rows = inf if shape_size(type(basis), d) else most
         self.count = int(self.first[-1])
-        self._start = np.zeros(self.count + 1, np.int64)
+        self._cut = Cut(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
         self._tile_steps = steps_of(tiles)
         self._first_of_nodes = numbered(tiles)
@@ -154,19 +157,18 @@ class Tiles:
 
     def empty_nodes(self, s: Setup) -> None:
         """What points gave to the nodes in use becomes zero."""
-        of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
-        arrays = [array for nodes in of for array in summed(nodes)]
-        for begin, end in used(s.spans)[1:].tolist():
-            for array in arrays:
-                array[begin:end] = 0
+        _empty(s, used(s.spans)[1:])
         if not self.direct:
             for one in buffers_of(s):
                 for array in summed(one.nodes):
                     array[: self.rows] = 0
 
     def sort(self, s: Setup) -> None:
-        """Sort all points by tile and find the nodes in use; all sums at nodes are zero then."""
-        self.empty_nodes(s)
+        """Sort all points by tile and find the nodes in use; sums at others become zero.
+
+        Those of nodes in use begin anew in the next step, and boxes are zero between two steps.
+        """
+        before = used(s.spans)[1:].copy()
         clock = s.control.clock[0]
         most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (DRIFT, STEPS)
         limit = min(max(LEAST_DRIFT[self.dimension], steps * clock.pace), most)
@@ -175,6 +177,7 @@ class Tiles:
         occupied = [self._sort_block(s, block) for block in s.blocks]
         self.occupied = len(set().union(*(tiles.tolist() for tiles in occupied)))
         self.lay_out(s)
+        _empty(s, without(before, used(s.spans)[1:]))
         self.sorts += 1
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
@@ -187,23 +190,38 @@ class Tiles:
         drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
         return far + drift if far < cells else cells  # also where it is not a number
 
-    def _by_tile(self, s: Setup, block: Block) -> tuple[np.ndarray, ...]:
-        """The places (w, n) that weights belong to; the tile of each point, and points by tile."""
-        points = block.points
-        x = points.x[s.control.clock[0].now] if points.home is None else points.home
-        tile, order = np.empty((2, x.shape[1]), np.int64)
-        order_points(
-            s.kin, s.grids, self.size, self.shapes, self.first, x, points.grid, self._start, tile,
-            order,
-        )  # fmt: skip
-        return x, tile, order
+    def _where(self, s: Setup, points: Points) -> np.ndarray:
+        """The places (w, n) that weights belong to."""
+        return points.x[s.control.clock[0].now] if points.home is None else points.home
+
+    def tiles_of(self, s: Setup, points: Points) -> np.ndarray:
+        """(n,) the tile of each point."""
+        x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
+        tile = np.empty(x.shape[1], np.int64)
+        find_tiles(self.mode, s.kin, s.grids, self._cut, x, points.grid, ends, tile)
+        return tile
 
     def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
         """Sort the points of a block; the numbers of the tiles that they are in."""
         points, tiling = block.points, block.tiling
-        x, tile, order = self._by_tile(s, block)
-        ends = self._start[:-1]
-        begins = np.concatenate([[0], ends[:-1]])
+        x = self._where(s, points)
+        reach = self._reach(s, block, x)
+        # Some parts for each thread: tiles are not of like size, and others may need a core.
+        parts = 1 if self.threads == 1 else 4 * self.threads
+        scratch = np.empty((4, x.shape[1]), np.int64)
+        found = Order(
+            lanes_for(8 * x.itemsize).width,
+            np.empty((parts, self.count), np.int64),
+            np.empty(parts + 1, np.int64),
+            np.empty((2, self.count, self.dimension)),
+            np.empty((parts, 2, self.size.prod()), np.int32),
+            *scratch[:2],
+            scratch[2:],
+        )
+        arrays = tuple(rows for _, array in arrays_of(points) for rows in _as_rows(array))
+        sort_points(self.mode, s.kin, s.grids, s.basis, self._cut, points, x, found, arrays)
+        ends = found.ends[-1]
+        begins = np.append(0, ends[:-1])
         occupied = np.flatnonzero(ends > begins)
         count = len(occupied)
         shares = 1 if self.direct else SHARES
@@ -213,20 +231,7 @@ class Tiles:
         tiling.share[:] = shares_of(tiling.range[:count], shares, len(tiling.share))
         grid = np.searchsorted(self.first, occupied, side="right") - 1
         tiling.grid[:count] = grid
-        width = lanes_for(8 * x.itemsize).width
-        scratch = np.empty((2, x.shape[1]), np.int64)
-        bins = np.empty((2, self.size.prod()), np.int64)
-        boxes = np.empty((2, count, self.dimension))
-        order_in_tiles(
-            s.kin, s.grids, s.basis, self.size, points, x, tiling.range[:count], width, boxes, bins,
-            scratch, order,
-        )  # fmt: skip
-        reach = self._reach(s, block, x)
-        del tile, scratch, bins  # their memory is needed again at once
-        for _, array in arrays_of(points):
-            # Component by component: a copy of a whole field would be the peak of the set-up.
-            for k in product(*map(range, array.shape[:-1])):
-                array[k] = array[k][order]
+        boxes = found.boxes[:, occupied]
         top, least = self._nodes[grid] - 1, self.least_nodes - 1
         # Cells at a wall see as many nodes as others: those further inside.
         boxes[0] -= reach
@@ -280,8 +285,8 @@ class Tiles:
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
         """Spans and ranges of the nodes in tiles that boxes reach; first of each share, and parts.
 
-        Nodes are of the share of points that have most of them: what a thread has given to is in
-        its caches, and to get it from those of another takes longer than to sum it.
+        Nodes are in the order of the shares of points that have most of them: what a thread has
+        given to is in its caches, and to get it from those of another takes longer than to sum it.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
@@ -305,7 +310,7 @@ class Tiles:
         own = self._parts(grid[starts], own_begin, own_end, 0, 0)
         parts = np.insert(parts, starts[more], own[more], axis=0)
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
-        owner = owner[order][starts]
+        owner = _evenly(own, beside[order][starts])
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
         rows = np.stack(rows_of(own), axis=1)
         ranges = ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
@@ -416,6 +421,33 @@ class Tiles:
         parts[:, 8 - d : 7] = self._steps[grid][:, :-1]
         parts[:, 10 - d : 9] = np.broadcast_to(steps, begin.shape)[:, :-1]
         return parts
+
+
+def _empty(s: Setup, spans: np.ndarray) -> None:
+    """What points gave to the nodes of spans (k, 2) becomes zero."""
+    of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
+    arrays = [array for nodes in of for array in summed(nodes)]
+    for begin, end in spans.tolist():
+        for array in arrays:
+            array[begin:end] = 0
+
+
+def _as_rows(array: np.ndarray) -> tuple[np.ndarray, ...]:
+    """(c, n) views of the bits of an array of points, as whole numbers."""
+    bits = array.view(f"i{array.itemsize}")
+    return tuple(bits) if bits.ndim > 2 else (np.atleast_2d(bits),)
+
+
+def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """(n,) shares of tiles of nodes with these parts, with as many nodes each, in this order.
+
+    Tiles with the same number in `beside` follow each other, and are of one share.
+    """
+    size = np.prod(parts[:, 2:5], axis=1)
+    middle = np.cumsum(size) - size / 2
+    firsts = np.diff(beside, prepend=-1) != 0
+    share = (middle[firsts] * (SHARES / max(size.sum(), 1))).astype(np.int64)
+    return share[np.cumsum(firsts) - 1]
 
 
 def in_use(tiling: Tiling) -> list[tuple[str, int]]:
