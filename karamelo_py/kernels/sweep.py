@@ -27,7 +27,12 @@ from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.affine import affine_parts, gathered_at_once_all, give_affine
+from karamelo_py.kernels.affine import (
+    affine_parts,
+    gathered_at_once_all,
+    gathered_by_arms,
+    give_affine,
+)
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
@@ -233,6 +238,12 @@ def _scatter(quantities, w, stencil, loads):
         scattered_all(quantities, w, stencil, k, loads)
 
 
+@shared
+def _even(w, stencil, asked):
+    """Whether D^-1 is the same for all points of a group; not asked where nothing depends on it."""
+    return in_all(evenly(w.basis, w.grid, stencil)) if asked else True
+
+
 @point_function(tags=2, otherwise=True)
 def gather_nodes(width, stencil, tasks, w, totals):
     """The totals of the tasks over all nodes of the stencil."""
@@ -241,7 +252,7 @@ def gather_nodes(width, stencil, tasks, w, totals):
 
 @gather_nodes.on(OneByOne, Stencil)
 def _(width, stencil, tasks, w, totals):
-    if not evenly(w.basis, w.grid, stencil):
+    if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
     return _gather_parts(tasks, w, stencil, totals)
 
@@ -249,7 +260,7 @@ def _(width, stencil, tasks, w, totals):
 @gather_nodes.on(Fours, Stencil)
 @gather_nodes.on(Eights, Stencil)
 def _(width, stencil, tasks, w, totals):
-    if not in_all(evenly(w.basis, w.grid, stencil)):
+    if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
     if sees_same_nodes(stencil):
@@ -276,7 +287,7 @@ def scatter_nodes(width, stencil, quantities, w, loads):
 @scatter_nodes.on(Eights, Stencil)
 def _(width, stencil, quantities, w, loads):
     parts = affine_parts(quantities, w, stencil, loads)
-    if not in_all(evenly(w.basis, w.grid, stencil)):
+    if not _even(w, stencil, any(len(part) and len(part[-1]) for part in parts)):
         _scatter(quantities, w, stencil, loads)
     elif sees_same_nodes(stencil):
         _scatter_parts(width, quantities, w, with_one_node(stencil), loads, parts)
