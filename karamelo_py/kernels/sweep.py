@@ -39,7 +39,7 @@ from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.sums import sum_share
-from karamelo_py.kernels.visit import Work, place_at, present_stencil
+from karamelo_py.kernels.visit import Work, ask_ahead, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
 from karamelo_py.points.frames import Total, Updated, follows
@@ -329,6 +329,7 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     end = tiling.range[t, 1]
     for q in range(tiling.range[t, 0], end, width_of(width)):
         p = points_from(width, q, end)
+        ask_ahead(w, p, dt)
         stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
         moved = zero_of(width, dt)
         rate = fastest
