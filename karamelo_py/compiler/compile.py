@@ -279,6 +279,13 @@ class Weighted(NamedTuple):
     weights: tuple[float, ...]
 
 
+def prefetch(array: Any, at: tuple) -> None:
+    """Have the memory bring what a loop over groups of points reads soon behind an item."""
+
+
+of_numbers(prefetch)(lambda array, at: lambda array, at: None)
+
+
 @shared(unless=lambda *kinds: lanes_of(kinds))
 def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None:
     """array[i, first + k] += values[k], lane after lane."""

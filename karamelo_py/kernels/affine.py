@@ -129,6 +129,12 @@ def give_affine(width, w, stencil, parts):
         accumulate_affine(array, nodes, first, weights, value, growths)
 
 
+@shared
+def gathered_by_arms(w):
+    """(a,), where what a point keeps is a sum_I N_I v*_I (X_I - x)^T away from walls; else ()."""
+    return by_arms(w.transfer, inverse_spread(w.basis, w.grid))
+
+
 @point_function(otherwise=True)
 def gathered_at_once(task, w, stencil, total):
     """What a gather sums up over all nodes of a stencil; () where that goes node by node."""
@@ -137,7 +143,7 @@ def gathered_at_once(task, w, stencil, total):
 
 @gathered_at_once.on(Move)
 def _(task, w, stencil, total):
-    factor = by_arms(w.transfer, inverse_spread(w.basis, w.grid))
+    factor = gathered_by_arms(w)
     if not len(factor):
         return ()
     nodes = [entry(w.basis, w.kin, w.grid, stencil, k)[0] for k in range(support(w.basis, w.kin))]

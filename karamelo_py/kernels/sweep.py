@@ -27,7 +27,12 @@ from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.affine import affine_parts, gathered_at_once_all, give_affine
+from karamelo_py.kernels.affine import (
+    affine_parts,
+    gathered_at_once_all,
+    gathered_by_arms,
+    give_affine,
+)
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.corners import all_by_corners, gather_corners, scatter_corners
@@ -35,7 +40,7 @@ from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.sums import sum_share
-from karamelo_py.kernels.visit import Work, place_at, present_stencil
+from karamelo_py.kernels.visit import Work, ask_ahead, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
 from karamelo_py.points.basis.cpdi.corners import CornerStencil
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
@@ -235,6 +240,12 @@ def _scatter(quantities, w, stencil, loads):
         scattered_all(quantities, w, stencil, k, loads)
 
 
+@shared
+def _even(w, stencil, asked):
+    """Whether D^-1 is the same for all points of a group; not asked where nothing depends on it."""
+    return in_all(evenly(w.basis, w.grid, stencil)) if asked else True
+
+
 @point_function(tags=2, otherwise=True)
 def gather_nodes(width, stencil, tasks, w, totals):
     """The totals of the tasks over all nodes of the stencil."""
@@ -243,7 +254,7 @@ def gather_nodes(width, stencil, tasks, w, totals):
 
 @gather_nodes.on(OneByOne, Stencil)
 def _(width, stencil, tasks, w, totals):
-    if not evenly(w.basis, w.grid, stencil):
+    if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
     return _gather_parts(tasks, w, stencil, totals)
 
@@ -251,7 +262,7 @@ def _(width, stencil, tasks, w, totals):
 @gather_nodes.on(Fours, Stencil)
 @gather_nodes.on(Eights, Stencil)
 def _(width, stencil, tasks, w, totals):
-    if not in_all(evenly(w.basis, w.grid, stencil)):
+    if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
     if sees_same_nodes(stencil):
@@ -287,7 +298,7 @@ def scatter_nodes(width, stencil, quantities, w, loads):
 @scatter_nodes.on(Eights, Stencil)
 def _(width, stencil, quantities, w, loads):
     parts = affine_parts(quantities, w, stencil, loads)
-    if not in_all(evenly(w.basis, w.grid, stencil)):
+    if not _even(w, stencil, any(len(part) and len(part[-1]) for part in parts)):
         _scatter(quantities, w, stencil, loads)
     elif sees_same_nodes(stencil):
         _scatter_parts(width, quantities, w, with_one_node(stencil), loads, parts)
@@ -339,6 +350,7 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     end = tiling.range[t, 1]
     for q in range(tiling.range[t, 0], end, width_of(width)):
         p = points_from(width, q, end)
+        ask_ahead(w, p, dt)
         stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
         moved = zero_of(width, dt)
         rate = fastest

@@ -9,13 +9,14 @@ loop (:mod:`karamelo_py.kernels.sweep`) serves every scheme, fused or stage by s
 from collections.abc import Callable
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import index, point_function, real, shared
+from karamelo_py.compiler.compile import index, point_function, prefetch, real, shared
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.points.basis import blank, locate
 from karamelo_py.points.frames import DeformationGradient, Total
 from karamelo_py.points.kinematics import zero_tensor
 from karamelo_py.points.laws import deformation, initial_state
+from karamelo_py.points.transfers import Moment, zero_moment
 
 
 class Work(NamedTuple):
@@ -56,6 +57,26 @@ def state_of(w, law, p, like):
 def stored_or_own(f, law, kin, state):
     """The deformation gradient `f` that was stored, or that of the law's state."""
     return f if len(f) else deformation(law, kin, state)
+
+
+@shared
+def ask_ahead(w, p, like):
+    """Ask the memory for what the next points have, where they keep moments of velocity.
+
+    These are visited once a step, with all they have: in space that is more arrays side by side
+    than a processor sees the pattern of.
+    """
+    moment = zero_moment(w.transfer, w.kin, like)
+    if w.kin.dimension == 3 and len(moment):
+        rows = (
+            (w.places.x, w.kin.dimension),
+            (w.points.v, w.kin.dimension),
+            (field(w.points.fields, Moment), len(moment)),
+            (w.points.state, len(state_of(w, law_of(w, p), p, like))),
+        )
+        for array, count in rows:
+            for k in range(count):
+                prefetch(array, (k, p))
 
 
 @point_function(otherwise=True)

@@ -9,7 +9,15 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, register_model
 
-from karamelo_py.compiler.compile import beside, by_type, is_one, lanes_of, of_present, real
+from karamelo_py.compiler.compile import (
+    beside,
+    by_type,
+    is_one,
+    lanes_of,
+    of_present,
+    prefetch,
+    real,
+)
 from karamelo_py.compiler.lanes.numbers import select
 from karamelo_py.compiler.lanes.registers import (
     I32,
@@ -164,24 +172,8 @@ def _load(context, builder, array, pointer, p, lanes):
         loaded = builder.call(function, [at, ir.Constant(I32, size), mask, zero])
         return builder.select(mask, loaded, _first_everywhere(builder, loaded))
 
-    def whole():
-        _prefetch(builder, pointer)
-        return builder.load(at, align=size)
-
-    return _either(builder, _is_full(builder, p, lanes), whole, partly)
-
-
-def _prefetch(builder: Any, pointer: Any) -> None:
-    """Have the memory bring what a loop over groups will read soon.
-
-    A visit reads several dozen arrays side by side, more than a processor sees the pattern of.
-    """
-    byte = ir.IntType(8).as_pointer()
-    ahead = builder.gep(builder.bitcast(pointer, byte), [ir.Constant(I32, AHEAD)])
-    kind = ir.FunctionType(ir.VoidType(), [byte, I32, I32, I32])
-    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
-    read, near, data = 0, 3, 1
-    builder.call(function, [ahead, *(ir.Constant(I32, k) for k in (read, near, data))])
+    full = _is_full(builder, p, lanes)
+    return _either(builder, full, lambda: builder.load(at, align=size), partly)
 
 
 def _either(builder: Any, condition: Any, first: Callable, second: Callable) -> Any:
@@ -258,6 +250,26 @@ def _load_points(typing_context, array, at):
         return _load(context, builder, array, pointer, p, lanes)
 
     return lanes(array, at), codegen
+
+
+@intrinsic
+def _prefetch(typing_context, array, at):
+    def codegen(context, builder, sig, arguments):
+        pointer, _ = _points_at(context, builder, array, at, arguments)
+        byte = ir.IntType(8).as_pointer()
+        ahead = builder.gep(builder.bitcast(pointer, byte), [ir.Constant(I32, AHEAD)])
+        kind = ir.FunctionType(ir.VoidType(), [byte, I32, I32, I32])
+        function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        read, near, data = 0, 3, 1
+        builder.call(function, [ahead, *(ir.Constant(I32, k) for k in (read, near, data))])
+        return context.get_dummy_value()
+
+    return types.void(array, at), codegen
+
+
+@by_type(prefetch)
+def _prefetch_by_type(array, at):
+    return (lambda array, at: _prefetch(array, at)) if isinstance(_last(at), Group) else None
 
 
 @intrinsic

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, real, shared
+from karamelo_py.compiler.compile import choose, in_all, real, shared
 from karamelo_py.points.basis import first_node
 from karamelo_py.points.basis.product import Along, along, evenly, inverse_spread, register
 from karamelo_py.points.grid import cells_along, in_cells
@@ -44,8 +44,9 @@ def _(basis, kin, grid, place, direction):
     r = real(1, a) + t
     four = real(4, a) * grid.inv_h
     affine = (-four * r * weights[0], -four * t * weights[1], four * (left + half) * weights[2])
-    _at_wall(grid, a, last)
     line = Along(nearest - 1, r, weights, gradients, affine)
+    if in_all(bulk):
+        return line
     return choose(bulk, line, _at_wall(grid, a, last))
 
 
