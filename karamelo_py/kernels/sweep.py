@@ -30,13 +30,14 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.affine import affine_parts, gathered_at_once_all, give_affine
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.clock import common_velocity
-from karamelo_py.kernels.corners import all_by_corners, gather_corners, scatter_corners
+from karamelo_py.kernels.corners import all_by_corners, gather_corners, in_block, scatter_corners
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.visit import Work, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
+from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, of_one
 from karamelo_py.points.basis.cpdi.corners import CornerStencil
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
 from karamelo_py.points.frames import Total, Updated, follows
@@ -254,17 +255,26 @@ def _(width, stencil, tasks, w, totals):
     if not in_all(evenly(w.basis, w.grid, stencil)):
         return _gather(tasks, w, stencil, totals)
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
-    if sees_same_nodes(stencil):
+    if sees_same_nodes([line.first for line in stencil.lines]):
         return _gather_parts(tasks, w, with_one_node(stencil), totals)
     return _gather_parts(tasks, w, stencil, totals)
 
 
 @gather_nodes.on(OneByOne, CornerStencil)
+def _(width, stencil, tasks, w, totals):
+    if all_by_corners(tasks, w):
+        return gather_corners(tasks, w, stencil, totals)
+    return _gather(tasks, w, stencil, totals)
+
+
 @gather_nodes.on(Fours, CornerStencil)
 @gather_nodes.on(Eights, CornerStencil)
 def _(width, stencil, tasks, w, totals):
     if all_by_corners(tasks, w):
         return gather_corners(tasks, w, stencil, totals)
+    block = block_of(w.kin, w.grid, stencil)
+    if is_one_block(block):
+        return _gather(tasks, in_block(w), of_one(block), totals)
     return _gather(tasks, w, stencil, totals)
 
 
@@ -289,17 +299,28 @@ def _(width, stencil, quantities, w, loads):
     parts = affine_parts(quantities, w, stencil, loads)
     if not in_all(evenly(w.basis, w.grid, stencil)):
         _scatter(quantities, w, stencil, loads)
-    elif sees_same_nodes(stencil):
+    elif sees_same_nodes([line.first for line in stencil.lines]):
         _scatter_parts(width, quantities, w, with_one_node(stencil), loads, parts)
     else:
         _scatter_parts(width, quantities, w, stencil, loads, parts)
 
 
 @scatter_nodes.on(OneByOne, CornerStencil)
+def _(width, stencil, quantities, w, loads):
+    if all_by_corners(quantities, w):
+        scatter_corners(quantities, w, stencil, loads)
+    else:
+        _scatter(quantities, w, stencil, loads)
+
+
 @scatter_nodes.on(Fours, CornerStencil)
 @scatter_nodes.on(Eights, CornerStencil)
 def _(width, stencil, quantities, w, loads):
-    if all_by_corners(quantities, w):
+    block = block_of(w.kin, w.grid, stencil)
+    if is_one_block(block):
+        one, at = of_one(block), in_block(w)
+        _scatter_parts(width, quantities, at, one, loads, affine_parts(quantities, at, one, loads))
+    elif all_by_corners(quantities, w):
         scatter_corners(quantities, w, stencil, loads)
     else:
         _scatter(quantities, w, stencil, loads)
