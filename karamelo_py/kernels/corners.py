@@ -27,7 +27,7 @@ from karamelo_py.kernels.p2g import (
     Volumes,
     scattered_all,
 )
-from karamelo_py.points.basis import support
+from karamelo_py.points.basis import carried, support
 from karamelo_py.points.basis.cpdi.block import InBlock
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.transfers import add_moment, add_momentum, gradient_weight
@@ -78,6 +78,12 @@ def _seeing(basis, w):
 def in_block(w):
     """The work of points that see blocks of nodes."""
     return _seeing(InBlock(w.basis), w)
+
+
+@shared
+def shows_corners(tasks, w):
+    """Whether the velocities of the corners themselves are asked for."""
+    return carried(w.basis, w.kin) > 0 and any(isinstance(task, Move) for task in tasks)
 
 
 @shared

@@ -30,7 +30,13 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.affine import affine_parts, gathered_at_once_all, give_affine
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.clock import common_velocity
-from karamelo_py.kernels.corners import all_by_corners, gather_corners, in_block, scatter_corners
+from karamelo_py.kernels.corners import (
+    all_by_corners,
+    gather_corners,
+    in_block,
+    scatter_corners,
+    shows_corners,
+)
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
@@ -270,11 +276,14 @@ def _(width, stencil, tasks, w, totals):
 @gather_nodes.on(Fours, CornerStencil)
 @gather_nodes.on(Eights, CornerStencil)
 def _(width, stencil, tasks, w, totals):
-    if all_by_corners(tasks, w):
+    by_corners = all_by_corners(tasks, w)
+    if by_corners and shows_corners(tasks, w):
         return gather_corners(tasks, w, stencil, totals)
     block = block_of(w.kin, w.grid, stencil)
     if is_one_block(block):
         return _gather(tasks, in_block(w), of_one(block), totals)
+    if by_corners:
+        return gather_corners(tasks, w, stencil, totals)
     return _gather(tasks, w, stencil, totals)
 
 
