@@ -261,7 +261,7 @@ def _(width, stencil, tasks, w, totals):
     if not in_all(evenly(w.basis, w.grid, stencil)):
         return _gather(tasks, w, stencil, totals)
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
-    if sees_same_nodes([line.first for line in stencil.lines]):
+    if sees_same_nodes(stencil):
         return _gather_parts(tasks, w, with_one_node(stencil), totals)
     return _gather_parts(tasks, w, stencil, totals)
 
@@ -308,7 +308,7 @@ def _(width, stencil, quantities, w, loads):
     parts = affine_parts(quantities, w, stencil, loads)
     if not in_all(evenly(w.basis, w.grid, stencil)):
         _scatter(quantities, w, stencil, loads)
-    elif sees_same_nodes([line.first for line in stencil.lines]):
+    elif sees_same_nodes(stencil):
         _scatter_parts(width, quantities, w, with_one_node(stencil), loads, parts)
     else:
         _scatter_parts(width, quantities, w, stencil, loads, parts)

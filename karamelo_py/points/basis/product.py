@@ -43,9 +43,9 @@ class Stencil(NamedTuple):
 
 
 @shared
-def sees_same_nodes(numbers):
-    """Whether the points in all lanes see the same nodes: `numbers` of the first along each way."""
-    first, *rest = map(is_one, numbers)
+def sees_same_nodes(stencil):
+    """Whether the points in all lanes see the same nodes."""
+    first, *rest = (is_one(line.first) for line in stencil.lines)
     for same in rest:
         first = first & same
     return first

@@ -8,11 +8,20 @@ before it gets there. In space that takes more than it saves: 27 nodes, eight co
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import beside, define, first_lane, fma, in_all, real, shared
+from karamelo_py.compiler.compile import (
+    beside,
+    define,
+    first_lane,
+    fma,
+    in_all,
+    is_one,
+    real,
+    shared,
+)
 from karamelo_py.compiler.symbols import Symbol, call, written
 from karamelo_py.points.basis import affine_weight, entry, reach, support
 from karamelo_py.points.basis.cpdi.corners import CornerStencil, arm, solve
-from karamelo_py.points.basis.product import digits, hoop, node_number, sees_same_nodes
+from karamelo_py.points.basis.product import digits, hoop, node_number
 from karamelo_py.points.grid import cells_along
 from karamelo_py.points.kinematics import Axisymmetric, dimension
 from karamelo_py.points.kinematics.tags import TAGS
@@ -67,7 +76,10 @@ def block_of(kin, grid, stencil):
 @shared
 def is_one_block(block):
     """Whether the points in all lanes see the same block, and all that they see lies in it."""
-    return len(block) > 0 and in_all(block.holds) & sees_same_nodes(block.first)
+    if len(block) == 0:
+        return False
+    row, line = block.first
+    return in_all(block.holds) & is_one(row) & is_one(line)
 
 
 @shared
