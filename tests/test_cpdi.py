@@ -26,6 +26,7 @@ from karamelo_py.points.basis import (
     support,
 )
 from karamelo_py.points.basis.cpdi import CUBE, SQUARE, domain
+from karamelo_py.points.basis.cpdi.block import InBlock, block_of
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.basis.cpdi.hexahedron import H8
 from karamelo_py.points.basis.cpdi.parallel import R4, R8
@@ -40,6 +41,9 @@ FLAT = [(R4, PlaneStrain()), (Q4, PlaneStrain()), (T3, PlaneStrain())]
 ALL = [*FLAT, *((b, Axisymmetric()) for b, _ in FLAT), *((b, Space()) for b in (R8, H8, Tet4))]
 every_domain = pytest.mark.parametrize(
     "basis, kin", ALL, ids=lambda item: getattr(item, "__name__", type(item).__name__)
+)
+every_flat_domain = pytest.mark.parametrize(
+    "basis, kin", [pair for pair in ALL if pair[1].dimension == 2]
 )
 UNIT = {
     Q4: np.array(SQUARE), H8: np.array(CUBE), T3: np.array([(-1, -1), (1, -1), (0, 1)]),
@@ -154,6 +158,36 @@ def test_corners_in_the_place_of_nodes(basis, kin):
     np.testing.assert_allclose(shown, sums, rtol=0, atol=1e-12 * np.abs(shares).sum())
 
 
+@every_flat_domain
+@given(seed=st.integers(0, 10**6), size=st.sampled_from([0.3, 1.0, 1.5]))
+def test_blocks_of_nodes(basis, kin, seed, size):
+    """Where a block holds all corners, its nodes have what the corners' nodes have together."""
+    grid = lattice(kin).numbers(float)
+    place = a_place(basis, kin, seed, size)
+    stencil, nodes, weights, gradients = stencil_of(basis, kin, grid, place)
+    block, by = block_of(kin, grid, stencil), InBlock(basis())
+    positions = lattice(kin).positions()[:, :2]
+    corners = np.array([corner.at for corner in stencil.corners]) * H + LO[:2]
+    first = np.floor((np.array(place[:2]) - LO[:2]) / H - 0.5) * H + LO[:2]
+    there = (first > np.subtract(LO, H / 2)[:2]) & (first + 2 * H < np.add(HI, H / 2)[:2])
+    assert block.holds == (there & (corners >= first) & (corners <= first + 2 * H)).all()
+    if not block.holds:
+        return
+    found = np.zeros((len(positions), 1 + len(gradients[0]) + 4))
+    expected = np.zeros_like(found)
+    for k in range(support(by, kin)):
+        i, weight, gradient = entry(by, kin, grid, block, k)
+        arm = reach(by, kin, grid, block, k)
+        assert arm == pytest.approx(positions[int(i)] - np.array(stencil.centre) * H - LO[:2])
+        row = weight, *gradient, *affine_weight(by, kin, grid, block, k), *(weight * np.array(arm))
+        found[int(i)] += row
+    for k, (i, weight) in enumerate(zip(nodes, weights, strict=True)):
+        affine = affine_weight(basis(), kin, grid, stencil, k)
+        arm = np.array(reach(basis(), kin, grid, stencil, k))
+        expected[int(i)] += weight, *gradients[k], *affine, *(weight * arm)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
 @every_domain
 @given(seed=st.integers(0, 10**6), push=st.integers(0, 5))
 def test_corners_beyond_the_grid(basis, kin, seed, push):
@@ -187,7 +221,8 @@ def test_parallel_domains_are_one_thing(edges, corners, kin, seed):
     assert a[2] == pytest.approx(b[2], abs=1e-13)
     assert a[3] == pytest.approx(b[3], abs=1e-11)
     reaches = [extent(edges(), kin, grid, place), extent(corners(), kin, grid, other)]
-    assert reaches[0] == pytest.approx(np.abs(UNIT[corners] @ r).max() / H)
+    least = 0.5 if d == 2 else 0.0  # the nodes next to a point
+    assert reaches[0] == pytest.approx(max(np.abs(UNIT[corners] @ r).max() / H, least))
     assert reaches[0] == pytest.approx(reaches[1])
 
 

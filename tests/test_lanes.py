@@ -43,6 +43,7 @@ from karamelo_py.points.basis import (
 )
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpdi import SQUARE
+from karamelo_py.points.basis.cpdi.block import InBlock, block_of, of_one
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.basis.cpdi.parallel import R4
 from karamelo_py.points.basis.cpdi.quadrilateral import Q4
@@ -309,17 +310,23 @@ def _grown(basis, grid, stencil, here, seen):
     return (*new, extent(basis, KIN, grid, new) + real(0, here[0]))
 
 
+@shared
+def _nodes_of(by, grid, stencil):
+    return of_one(block_of(KIN, grid, stencil)) if isinstance(by, InBlock) else stencil
+
+
 @kernel
 def _map(basis, by, grid, x, mass, nodes, seen, out, p):
     """Mass and position to the nodes, and a field of the nodes to the points and their domains.
 
-    `by` is the basis, or what takes its place at the corners of domains.
+    `by` is the basis, or what takes its place at the corners of domains, or in a block of nodes.
     """
     here = place_at(basis, KIN, x, p)
     stencil = locate(basis, KIN, grid, here)
+    nodes_of = _nodes_of(by, grid, stencil)
     total = real(0, here[0]), real(0, here[0]), real(0, here[0])
     for k in range(support(by, KIN)):
-        i, weight, gradient = entry(by, KIN, grid, stencil, k)
+        i, weight, gradient = entry(by, KIN, grid, nodes_of, k)
         part = of_present(p, mass[p]) * weight
         accumulate(nodes, i, 0, (part, part * here[0], part * here[1]))
         found = row(seen, i, 0, total)
@@ -361,16 +368,20 @@ DOMAINS = {
 
 
 @pytest.mark.parametrize(
-    "kind, by",
-    [*((kind, kind()) for kind in DOMAINS), *((kind, AtCorners(kind())) for kind in (R4, Q4, T3))],
+    "kind, by, spread",
+    [
+        *((kind, kind(), spread) for kind in DOMAINS for spread in (0.1, 2.4)),
+        *((kind, AtCorners(kind()), spread) for kind in (R4, Q4, T3) for spread in (0.1, 2.4)),
+        *((kind, InBlock(kind()), 0.1) for kind in (R4, Q4, T3)),
+    ],
+    ids=lambda item: getattr(item, "__name__", str(item)),
 )
-@pytest.mark.parametrize("spread", [0.1, 2.4], ids=["one cell", "many cells"])
 def test_weights_gather_and_scatter(kind, by, spread):
     """Points of one cell take the short way; sums at nodes differ by the order of additions."""
     n, basis = 14, kind()
     rng = np.random.default_rng(3)
     mass = rng.uniform(1, 2, n)
-    x = 0.2 + spread * rng.uniform(size=(2, n))
+    x = (0.8 if isinstance(by, InBlock) else 0.2) + spread * rng.uniform(size=(2, n))
     domain = np.array(DOMAINS[kind])
     if domain.ndim == 2:  # corners
         x = np.concatenate([x, *(x + corner[:, None] for corner in domain)])

@@ -27,8 +27,8 @@ from karamelo_py.kernels.p2g import (
     Volumes,
     scattered_all,
 )
-from karamelo_py.kernels.visit import Work
-from karamelo_py.points.basis import support
+from karamelo_py.points.basis import carried, support
+from karamelo_py.points.basis.cpdi.block import InBlock
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.transfers import add_moment, add_momentum, gradient_weight
 
@@ -68,17 +68,28 @@ def all_by_corners(parts, w):
 
 
 @shared
-def _at_corners(w):
-    return Work(
-        w.frame, w.kin, AtCorners(w.basis), w.grid, w.transfer, w.averaging, w.nodes, w.points,
-        w.laws, w.places, w.common,
-    )  # fmt: skip
+def _seeing(basis, w):
+    """The work with something in the place of the basis."""
+    items = zip(w._fields, w, strict=True)
+    return type(w)(*[basis if name == "basis" else item for name, item in items])
+
+
+@shared
+def in_block(w):
+    """The work of points that see blocks of nodes."""
+    return _seeing(InBlock(w.basis), w)
+
+
+@shared
+def shows_corners(tasks, w):
+    """Whether the velocities of the corners themselves are asked for."""
+    return carried(w.basis, w.kin) > 0 and any(isinstance(task, Move) for task in tasks)
 
 
 @shared
 def gather_corners(tasks, w, stencil, totals):
     """The totals of the tasks over all corners."""
-    at = _at_corners(w)
+    at = _seeing(AtCorners(w.basis), w)
     for c in range(support(at.basis, w.kin)):
         totals = gathered_all(tasks, at, stencil, c, totals)
     return totals
@@ -87,6 +98,6 @@ def gather_corners(tasks, w, stencil, totals):
 @shared
 def scatter_corners(quantities, w, stencil, loads):
     """Give all corners their parts."""
-    at = _at_corners(w)
+    at = _seeing(AtCorners(w.basis), w)
     for c in range(support(at.basis, w.kin)):
         scattered_all(quantities, at, stencil, c, loads)

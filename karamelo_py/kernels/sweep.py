@@ -35,13 +35,20 @@ from karamelo_py.kernels.affine import (
 )
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.clock import common_velocity
-from karamelo_py.kernels.corners import all_by_corners, gather_corners, scatter_corners
+from karamelo_py.kernels.corners import (
+    all_by_corners,
+    gather_corners,
+    in_block,
+    scatter_corners,
+    shows_corners,
+)
 from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.visit import Work, ask_ahead, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
+from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, of_one
 from karamelo_py.points.basis.cpdi.corners import CornerStencil
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
 from karamelo_py.points.frames import Total, Updated, follows
@@ -271,10 +278,22 @@ def _(width, stencil, tasks, w, totals):
 
 
 @gather_nodes.on(OneByOne, CornerStencil)
+def _(width, stencil, tasks, w, totals):
+    if all_by_corners(tasks, w):
+        return gather_corners(tasks, w, stencil, totals)
+    return _gather(tasks, w, stencil, totals)
+
+
 @gather_nodes.on(Fours, CornerStencil)
 @gather_nodes.on(Eights, CornerStencil)
 def _(width, stencil, tasks, w, totals):
-    if all_by_corners(tasks, w):
+    by_corners = all_by_corners(tasks, w)
+    if by_corners and shows_corners(tasks, w):
+        return gather_corners(tasks, w, stencil, totals)
+    block = block_of(w.kin, w.grid, stencil)
+    if is_one_block(block):
+        return _gather(tasks, in_block(w), of_one(block), totals)
+    if by_corners:
         return gather_corners(tasks, w, stencil, totals)
     return _gather(tasks, w, stencil, totals)
 
@@ -307,10 +326,21 @@ def _(width, stencil, quantities, w, loads):
 
 
 @scatter_nodes.on(OneByOne, CornerStencil)
+def _(width, stencil, quantities, w, loads):
+    if all_by_corners(quantities, w):
+        scatter_corners(quantities, w, stencil, loads)
+    else:
+        _scatter(quantities, w, stencil, loads)
+
+
 @scatter_nodes.on(Fours, CornerStencil)
 @scatter_nodes.on(Eights, CornerStencil)
 def _(width, stencil, quantities, w, loads):
-    if all_by_corners(quantities, w):
+    block = block_of(w.kin, w.grid, stencil)
+    if is_one_block(block):
+        one, at = of_one(block), in_block(w)
+        _scatter_parts(width, quantities, at, one, loads, affine_parts(quantities, at, one, loads))
+    elif all_by_corners(quantities, w):
         scatter_corners(quantities, w, stencil, loads)
     else:
         _scatter(quantities, w, stencil, loads)

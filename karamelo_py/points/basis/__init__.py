@@ -119,7 +119,10 @@ def deformed(basis, kin, place, dl):
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, place):
-    """How far from the point the corners of its domain reach, in cells; 0 where none are kept."""
+    """How far from the point the corners of its domain reach, in cells; 0 where none are kept.
+
+    Or how far the nodes lie that they may give to, if that is further.
+    """
     return grid.h - grid.h
 
 

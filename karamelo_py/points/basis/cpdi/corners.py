@@ -14,14 +14,15 @@ from karamelo_py.points.basis import (
     carry,
     entry,
     extent,
+    first_node,
     locate,
     placed,
     reach,
     support,
 )
-from karamelo_py.points.basis.cpdi import domain, upright
+from karamelo_py.points.basis.cpdi import LEAST, domain, upright
 from karamelo_py.points.basis.product import digits, hoop, inverse_radius, node_number
-from karamelo_py.points.grid import cells_along, in_cells, pick
+from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.kinematics.components import Components, Number, Vector, formula
 from karamelo_py.points.kinematics.tags import TAGS
@@ -32,7 +33,7 @@ class Corner(NamedTuple):
 
     cell: tuple[int, ...]  # its cell, along each direction
     fractions: tuple[float, ...]  # how far into the cell, along each direction
-    x: tuple[float, ...]  # its position, on the grid
+    at: tuple[float, ...]  # both together, in cells from the corner of the grid
 
 
 class CornerStencil(NamedTuple):
@@ -41,7 +42,8 @@ class CornerStencil(NamedTuple):
     corners: tuple[Corner, ...]
     weights: tuple[float, ...]  # of the corners, and their gradients
     gradients: tuple[tuple[float, ...], ...]
-    centre: tuple[float, ...]  # sum_I N_I X_I
+    point: tuple[float, ...]  # where the point lies, in cells
+    centre: tuple[float, ...]  # sum_I N_I X_I, in cells
     spread: tuple[float, ...]  # D of the affine transfers: xx yy (zz) xy (xz yz)
     inv_r: float  # 1 / r of an axisymmetric point
 
@@ -61,7 +63,7 @@ class AtCorners(NamedTuple):
 
 @shared
 def along_cell(grid, direction, x):
-    """The cell of a corner in one direction, how far the corner lies in it (0 to 1), and where.
+    """The cell of a corner in one direction, how far the corner lies in it (0 to 1), and both.
 
     A corner beyond the grid counts as lying on its face: weights go on adding up to one.
     """
@@ -69,7 +71,7 @@ def along_cell(grid, direction, x):
     a = in_cells(grid, direction, x)
     a = min(max(real(0, a), a), real(cells, a))  # so written, NaN becomes 0
     i = min(int(a), cells - 1)
-    return i, a - real(i, a), pick(direction, grid.x0, grid.y0, grid.z0) + a * grid.h
+    return i, a - real(i, a), a
 
 
 @formula()
@@ -108,16 +110,16 @@ def _around(kin, grid: Number, corner: Number):
 
 
 @shared
-def _arm(grid, far, fraction):
-    return (real(far, fraction) - fraction) * grid.h
+def arm(grid, first, far, centre):
+    """From the weighted centre to the node that is `far` from the `first` along a direction."""
+    return (real(first + far, centre) - centre) * grid.h
 
 
 @formula()
 def _away(kin, grid: Number, corner: Number, centre: Vector, j: Number):
     """From the weighted centre to the j-th node of a corner's cell."""
     far = digits("j", 2, kin.dimension)
-    arms = kin.vector(lambda i: call(_arm, grid, far[i], corner.fractions[i]))
-    return kin.vector(lambda i: arms[i] + (corner.x[i] - centre[i]))
+    return kin.vector(lambda i: call(arm, grid, corner.cell[i], far[i], centre[i]))
 
 
 # --- all corners ------------------------------------------------------------------------------
@@ -131,18 +133,18 @@ def _spread_pairs(kin: Components) -> list[tuple[int, int]]:
 @formula()
 def _add_spread(kin, grid: Number, total: Vector, weight: Number, corner: Number, centre: Number):
     """total + the part of one corner in D, that is w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
-    away = kin.vector(lambda i: corner.x[i] - centre[i])
+    away = kin.vector(lambda i: corner.at[i] - centre[i])
     r = corner.fractions
 
     def part(i, j):
-        within = grid.h * grid.h * r[i] * (1 - r[i]) if i == j else 0
-        return weight * (away[i] * away[j] + within)
+        within = r[i] * (1 - r[i]) if i == j else 0
+        return weight * (grid.h * grid.h) * (away[i] * away[j] + within)
 
     return [total[n] + part(i, j) for n, (i, j) in enumerate(_spread_pairs(kin))]
 
 
 @formula()
-def _solve(kin, spread: Vector, a: Vector):
+def solve(kin, spread: Vector, a: Vector):
     """D^-1 a."""
     d = kin.dimension
     m = {pair: spread[n] for n, pair in enumerate(_spread_pairs(kin))}
@@ -166,14 +168,15 @@ def _domain_functions(tag: type, corners: int) -> dict[Callable, Callable]:
     described = call(domain, basis, kin, place)
     x, weights, gradients = (described[i] for i in range(3))
     at = [call(_corner, kin, grid, x[c]) for c in range(corners)]
-    centre = call(scale, weights[0], at[0].x)
+    centre = call(scale, weights[0], at[0].at)
     for c in range(1, corners):
-        centre = call(add_scaled, centre, weights[c], at[c].x)
+        centre = call(add_scaled, centre, weights[c], at[c].at)
     spread = (0,) * len(_spread_pairs(Components(tag)))
     for c in range(corners):
         spread = call(_add_spread, kin, grid, spread, weights[c], at[c], centre)
-    inv_r = call(inverse_radius, centre[0])
-    located = call(CornerStencil, at, weights, gradients, centre, spread, inv_r)
+    inv_r = call(inverse_radius, grid.x0 + centre[0] * grid.h)
+    point = [call(in_cells, grid, i, place[i]) for i in range(tag.dimension)]
+    located = call(CornerStencil, at, weights, gradients, point, centre, spread, inv_r)
 
     d = tag.dimension
     c, j = (Symbol(f"({{}} {operation} {2**d})", Symbol("k")) for operation in ("//", "%"))
@@ -181,7 +184,7 @@ def _domain_functions(tag: type, corners: int) -> dict[Callable, Callable]:
     hat = call(_hat, kin, corner, j)
     weight, gradient = weight * hat, [hat * g for g in gradient]
     away = call(_away, kin, grid, corner, stencil.centre, j)
-    solved = call(_solve, kin, stencil.spread, away)
+    solved = call(solve, kin, stencil.spread, away)
     seen = "basis, kin, grid, stencil, k"
     return {
         locate: written("basis, kin, grid, place", located, "place[0]"),
@@ -208,6 +211,10 @@ def register(basis: type, d: int, corners: int) -> None:
     linear momentum stays exact, and angular momentum is that about these centres: what the points
     themselves show wanders by a thousandth of what it does with FLIP (a spinning square, Q4).
     """
+
+    @first_node.on(basis)
+    def _(basis, like):
+        return real(0.5, like)
 
     for kin in tags_of(d):
         for function, implementation in _domain_functions(kin, corners).items():
@@ -237,7 +244,8 @@ def register_carried(basis: type) -> None:
     far = abs(place[d] - place[0])
     for k in range(d + 1, d + d * corners):
         far = call(max, abs(place[k] - place[k % d]), far)
-    reached = call(choose, call(upright, basis_, kin, place), far * grid.inv_h, inf)
+    far = call(max, far * grid.inv_h, LEAST[d])
+    reached = call(choose, call(upright, basis_, kin, place), far, inf)
     extent.on(basis)(written("basis, kin, grid, place", reached, "place[0]"))
 
 

@@ -2,7 +2,7 @@
 
 from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant
 from karamelo_py.points.basis import deformed, extent
-from karamelo_py.points.basis.cpdi import CUBE, SQUARE, Domain, domain
+from karamelo_py.points.basis.cpdi import CUBE, LEAST, SQUARE, Domain, domain
 from karamelo_py.points.basis.cpdi.corners import register, tags_of
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
 from karamelo_py.points.kinematics.components import Number, Tensor, Vector, formula
@@ -90,7 +90,7 @@ def _extent(kin, grid: Number, place: Vector):
     far = away[0]
     for other in away[1:]:  # so written, NaN comes through
         far = far + call(max, other - far, 0.0)
-    return far * grid.inv_h
+    return call(max, far * grid.inv_h, LEAST[kin.dimension])
 
 
 def domain_of(basis, kin, place):
