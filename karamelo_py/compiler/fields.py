@@ -28,6 +28,7 @@ A part names its fields in ``point_fields`` or ``node_fields``. Arrays of points
 
 import re
 from collections.abc import Iterable
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -111,9 +112,46 @@ def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
     return tuple(dict.fromkeys(kind for owner in owners for kind in getattr(owner, attribute, ())))
 
 
+def rows_of_points(
+    shape: tuple[int, ...], dtype: type, room: np.ndarray | None = None
+) -> np.ndarray:
+    """An array (..., n) for points: rows begin where lines of caches do, an odd number of them on.
+
+    Nothing that is loaded at once lies in two lines then, and a visit, which goes along dozens of
+    rows side by side, has them in different sets of a cache for any number of points; with rows one
+    after another all would be in one set for 512 points, say, or 512 000.
+
+    `room` (k,) is used where it is long enough: `length_of_rows`.
+    """
+    *rows, count = shape
+    size = np.dtype(dtype).itemsize
+    stride = (-(-count * size // LINE) | 1) * LINE // size
+    if room is None:
+        room = np.empty(length_of_rows(shape, dtype), dtype)
+    first = -room.ctypes.data % LINE // size
+    return room[first : first + prod(rows) * stride].reshape(*rows, stride)[..., :count]
+
+
+def length_of_rows(shape: tuple[int, ...], dtype: type) -> int:
+    """Of the memory that `rows_of_points` of this shape takes, in numbers."""
+    *rows, count = shape
+    line = LINE // np.dtype(dtype).itemsize
+    return (prod(rows) * (-(-count // line) | 1) + 1) * line
+
+
+def as_rows_of_points(array: np.ndarray) -> np.ndarray:
+    """`array`, which may have been read or received, as `rows_of_points`."""
+    array = np.asarray(array)
+    if array.ndim == 1 or not array.flags.c_contiguous:
+        return array
+    found = rows_of_points(array.shape, array.dtype)
+    found[...] = array
+    return found
+
+
 def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     """The field of `count` points, (components, count), as it starts."""
-    array = np.zeros((kind.shape(kin), count), real)
+    array = rows_of_points((kind.shape(kin), count), real)
     start = getattr(kind, "start", 0.0)
     array[:] = np.array(start(kin) if callable(start) else [start], real)[:, None]
     return kind(array)

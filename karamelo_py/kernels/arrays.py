@@ -5,7 +5,7 @@ Arrays of points have the shape (components, n), those of nodes (N, components).
 every scene has are declared by their owners (:mod:`karamelo_py.compiler.fields`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -99,6 +99,17 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
     yield from own_arrays_of(points)
     for one in points.fields:
         yield name_of(type(one)), one.array
+
+
+def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
+    """Points of the kind of `points` with such arrays as `arrays_of` has given."""
+    arrays = iter(found)
+    own = {
+        name: None if array is None else next(arrays)
+        for name, array in points._asdict().items()
+        if name != "fields"
+    }
+    return Points(**own, fields=tuple(type(one)(next(arrays)) for one in points.fields))
 
 
 class Tiling(NamedTuple):

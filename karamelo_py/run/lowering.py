@@ -20,8 +20,9 @@ from karamelo_py.kernels.arrays import (
     Nodes,
     Points,
     Setup,
+    arrays_of,
+    made_of,
     new_control,
-    own_arrays_of,
 )
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
@@ -331,19 +332,21 @@ def lower_block(
         array = np.empty(0)
         for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):
             if not array.size:
-                array = np.empty((*value.shape[:-1], count), dtype)
+                array = fields.rows_of_points((*value.shape[:-1], count), dtype)
             array[..., end - s.count : end] = value
         return array
 
     states = (start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True))
     places = joined((method.places(kin, s, real).T for s in solids), real)
     here = places if method.frame.moves else places[: kin.dimension]
+    x = fields.rows_of_points((2, *here.shape), real)
+    x[:] = here
     elastic = elastic_law(laws)
     own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
     points = Points(
-        x=np.stack([here, here]),
+        x=x,
         home=None if method.frame.moves else places,
-        v=np.zeros((kin.dimension, count), real),
+        v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),
         mass=joined((s.mass for s in solids), real),
         state=joined((state[:, None] for state in states), real),
         material=joined((laws_of_solids.index(law) for law in known), np.int32),
@@ -379,8 +382,5 @@ def resumed(block: Block, previous: State) -> Block:
 def chosen(block: Block, rows: np.ndarray) -> Block:
     """The block with the points in these rows, in this order; they are to be sorted anew."""
     points = block.points
-    # Contiguous: another layout would be compiled for.
-    kept = {name: np.take(a, rows, axis=-1) for name, a in own_arrays_of(points)}
-    declared = tuple(type(one)(np.take(one.array, rows, axis=-1)) for one in points.fields)
-    rest = {name: kept.get(name) for name in points._fields if name != "fields"}
-    return block._replace(points=Points(**rest, fields=declared))
+    found = (fields.as_rows_of_points(np.take(a, rows, axis=-1)) for _, a in arrays_of(points))
+    return block._replace(points=made_of(points, found))

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of
+from karamelo_py.compiler.fields import as_rows_of_points, length_of_rows, rows_of_points
+from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, made_of
 from karamelo_py.run.bisection import bisected
 from karamelo_py.run.boxes import Boxes, Reached, between, extents, ragged, rows_of, steps_of
 from karamelo_py.run.buffers import buffers_of, chosen_of, give_up
@@ -155,11 +156,11 @@ class SharedTiles(Tiles):
         for i, (name, old) in enumerate(arrays_of(points)):
             new = [parts[i] for parts in come]
             shape = (*old.shape[:-1], count)
-            kind, size = (shape[:-1], old.dtype), int(np.prod(shape))
+            kind, size = (shape[:-1], old.dtype), length_of_rows(shape, old.dtype)
             room = self._spare.pop(kind, np.empty(0, old.dtype))
             if room.size < size:
                 room = np.empty(size + size // 8, old.dtype)
-            array = room[:size].reshape(shape)
+            array = rows_of_points(shape, old.dtype, room)
             for c in np.ndindex(shape[:-1]):
                 np.take(old[c], stay, out=array[c][: len(stay)], mode="clip")
                 array[c][len(stay) :] = np.concatenate([part[c] for part in new])
@@ -360,24 +361,15 @@ def sized(points: Points, count: int) -> Points:
     """Points of the kind of `points`, so many: these, where they are as many already."""
     if points.mass.size == count:
         return points
-    empty = [np.empty((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
+    shapes = [((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
+    empty = [rows_of_points(*shape) for shape in shapes]
     return made_of(points, empty)
 
 
 def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
     """Points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
-    return made_of(points, [np.concatenate(same, axis=-1) for same in zip(*parts, strict=True)])
-
-
-def made_of(points: Points, found: Sequence[np.ndarray]) -> Points:
-    """Points of the kind of `points` with such arrays as `arrays_of` has given."""
-    arrays = iter(found)
-    own = {
-        name: None if array is None else next(arrays)
-        for name, array in points._asdict().items()
-        if name != "fields"
-    }
-    return Points(**own, fields=tuple(type(one)(next(arrays)) for one in points.fields))
+    found = [np.concatenate(same, axis=-1) for same in zip(*parts, strict=True)]
+    return made_of(points, map(as_rows_of_points, found))
 
 
 def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:

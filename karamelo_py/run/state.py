@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import name_of
+from karamelo_py.compiler.fields import as_rows_of_points, name_of
 from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.run.boxes import numbers, used
@@ -218,12 +218,12 @@ def take_points(points: Points, found: Mapping[str, np.ndarray], stem: str) -> P
     """Points in the order and number of the file, with arrays of their own."""
     check_points(points, found, stem)
     own = {
-        name: None if array is None else np.ascontiguousarray(found[stem + name])
+        name: None if array is None else as_rows_of_points(found[stem + name])
         for name, array in points._asdict().items()
         if name != "fields"
     }
     declared = (
-        type(one)(np.ascontiguousarray(found[stem + name_of(type(one))])) for one in points.fields
+        type(one)(as_rows_of_points(found[stem + name_of(type(one))])) for one in points.fields
     )
     return Points(**own, fields=tuple(declared))
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.fields import rows_of_points
 from karamelo_py.kernels.arrays import Tiling, arrays_of
 from karamelo_py.kernels.totals import carry
 from karamelo_py.output.fields import PIECE
@@ -136,7 +137,7 @@ def own_share(part: Any, state: Mapping, owner: np.ndarray) -> dict[str, np.ndar
 
 def _chosen(array: Any, points: np.ndarray) -> np.ndarray:
     """Some points (ascending) of an array in a file, of which so many are read at a time."""
-    found = np.empty((*array.shape[:-1], len(points)), array.dtype)
+    found = rows_of_points((*array.shape[:-1], len(points)), array.dtype)
     for begin in range(0, array.shape[-1], PIECE):
         own = slice(*np.searchsorted(points, (begin, begin + PIECE)))
         if own.start < own.stop:
