@@ -185,6 +185,6 @@ def told(simulation: Simulation, ranks: int) -> list[str]:
         if isinstance(fix, PairContact):
             lines.append(
                 f"  fix {fix.style} '{fix.id}' has the first process look at all points that may "
-                f"touch: {fix.sent(simulation)} now, {SENT} bytes each"
+                f"touch ({fix.sent(simulation)} now), and needs {SENT} bytes there for each"
             )
     return lines
