@@ -203,19 +203,18 @@ def test_compiled_stages(state):
 
 
 @pytest.mark.xdist_group("single")
-@pytest.mark.parametrize("transfer", ["FLIP", "MLS"])
-def test_single_precision(state, transfer):
+def test_single_precision(state):
     """Numbers are single (everywhere: the next test), and close to those in double.
 
     Each of 40 steps rounds to 6e-8; stress comes from differences of velocities over a cell and is
     rounded to 6e-8 E (= 6e-6), so velocities of order 2 differ by dt f/m of that: below 1e-4. Where
-    a point crosses into a cell without others, one step earlier or later, more may differ.
+    a point crosses into a cell without others, one step earlier or later, more may differ. Those of
+    transfers with moments: test_bench.py.
     """
-    scene = {"laws": ("linear",), "transfer": transfer}
     # Of a given size: one that points choose may end its longer beginning a step earlier.
     lines = ("set_dt(1.5e-3)", "run(40)")
-    double = state(crossing(2, *lines, **scene))
-    single = state(crossing(2, *lines, **scene, precision="single"))
+    double = state(crossing(2, *lines, laws=("linear",)))
+    single = state(crossing(2, *lines, laws=("linear",), precision="single"))
     for name in ("x", "v"):
         assert single[name].dtype == np.float32
         assert double[name].dtype == np.float64

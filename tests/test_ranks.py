@@ -158,6 +158,7 @@ def test_a_step_that_is_halved(state_interpreted, tmp_path, changes):
     for old, new in changes.items():
         assert old in script
         script = script.replace(old, new)
+    script = script.replace("run(60", "run(24")
     assert shared(state_interpreted, tmp_path, with_files(script, "restart(6, r.*.h5)\n"), ranks=3)
     with h5py.File(tmp_path / "parts" / "r.12.h5") as file:
         assert not changes or file["good/touched/rows"][()].any()
