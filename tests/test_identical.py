@@ -116,6 +116,8 @@ AT_NODES = (
     "fix(left, velocity_nodes, left, 0, NULL)",
     "fix(base, velocity_nodes, base, NULL, 0, mu=0.3)",
 )
+# Points that are led, and what leads them told in the log.
+AT_POINTS = ("fix(lead, velocity_particles, far, 2 + 0.1*sin(7*x0)*cos(time), NULL)",)
 
 
 @pytest.fixture
@@ -146,7 +148,8 @@ def test_one_thread_or_two(state, d, transfer, scheme, laws):
     """Sums at the nodes are made in one order; sorting sets in several times."""
     # USL needs small steps where bodies reach nodes with next to no mass (benchmark C6).
     factor = "dt_factor(0.05)" if scheme == "usl" else "dt_factor(0.4)"
-    script = crossing(d, *AT_NODES, factor, "run(60)", transfer=transfer, scheme=scheme, laws=laws)
+    acting = {"FLIP": AT_NODES, "PIC": (*AT_NODES, *AT_POINTS), "APIC": ()}[transfer]
+    script = crossing(d, *acting, factor, "run(60)", transfer=transfer, scheme=scheme, laws=laws)
     assert same_bits(state(script), state(script, threads=2))
 
 
