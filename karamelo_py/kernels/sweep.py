@@ -48,7 +48,7 @@ from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.visit import Work, ask_ahead, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
-from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, of_one
+from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, is_whole, of_one
 from karamelo_py.points.basis.cpdi.corners import CornerStencil
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
 from karamelo_py.points.frames import Total, Updated, follows
@@ -384,12 +384,19 @@ def _(width, stencil, quantities, w, loads):
 def _(width, stencil, quantities, w, loads):
     block = block_of(w.kin, w.grid, stencil)
     if is_one_block(block):
-        one, at = of_one(block), in_block(w)
-        _scatter_parts(width, quantities, at, one, loads, affine_parts(quantities, at, one, loads))
+        _scatter_block(width, quantities, w, of_one(block), loads)
+    elif is_whole(block):
+        _scatter_block(width, quantities, w, block, loads)
     elif all_by_corners(quantities, w):
         scatter_corners(quantities, w, stencil, loads)
     else:
         _scatter(quantities, w, stencil, loads)
+
+
+@shared
+def _scatter_block(width, quantities, w, block, loads):
+    at = in_block(w)
+    _scatter_parts(width, quantities, at, block, loads, affine_parts(quantities, at, block, loads))
 
 
 @shared
