@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from karamelo_py.kernels.pairs import Bodies, Cells, push_apart
+from karamelo_py.kernels.pairs import Bodies, cells_for, push_apart
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.pairs import MinimizePenetration
 
@@ -63,11 +63,7 @@ def test_no_pair_is_missed(d, overlap):
         x=np.concatenate([x1, x2]), v=np.zeros((n + m, d)), mass=np.ones(n + m),
         radius=np.concatenate([r1, r2]), force=np.zeros((n + m, d)), first2=n,
     )  # fmt: skip
-    cells = Cells(
-        start=np.zeros(100, np.int64), cell=np.zeros(n + m, np.int64),
-        order=np.zeros(n + m, np.int64), corner=np.zeros(3), length=np.zeros(3),
-        count=np.ones(3, np.int64),
-    )  # fmt: skip
+    cells = cells_for(n + m)._replace(start=np.zeros(100, np.int64))
     total = np.zeros(3)
     for reach in (spacing, 0.5 * spacing):
         bound.force[:] = 0

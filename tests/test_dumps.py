@@ -188,12 +188,17 @@ def test_gz_is_the_same_text_and_the_same_bytes(tmp_path):
     assert (tmp_path / "a.gz").read_bytes() == (tmp_path / "b.gz").read_bytes()
 
 
-def test_unknown_column_names_the_nearest(plane):
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("s111", "'s11'"), ("sxx", "'s11'"), ("sigma_yx", "'s12'"), ("stress_12", "'s12'"),
+     ("strain_yy", "'e22'"), ("pressure", "s11")],
+)  # fmt: skip
+def test_unknown_column_names_the_nearest(plane, name, meant):
     with pytest.raises(ScriptError) as caught:
-        Particle(plane, 1, "p", "x", "s111")
-    assert "s111" in str(caught.value)
+        Particle(plane, 1, "p", "x", name)
+    assert name in str(caught.value)
     assert caught.value.argument == 3
-    assert "s11" in caught.value.hint
+    assert meant in caught.value.hint
 
 
 @pytest.mark.parametrize("style", [Particle, ParticleGz])

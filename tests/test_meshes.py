@@ -8,12 +8,13 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from conftest import INPUTS
+from conftest import INPUTS, ROOT
 from hubs import DENSITY, SmallHub
 from meshed import CUTS, grid_mesh, write
 from test_scene_script import message
 
 from karamelo_py.app.cli import main
+from karamelo_py.run.sizes import known
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
 from karamelo_py.script.errors import ScriptError
@@ -67,6 +68,19 @@ def test_volumes_do_not_depend_on_the_shape_or_the_order_of_nodes(cell, flipped,
     np.testing.assert_allclose(solid.half_size, np.ptp(solid.corners, axis=1) / 2)
     np.testing.assert_allclose(solid.lo, nodes.min(axis=0)[:dimension])
     np.testing.assert_allclose(solid.hi, nodes.max(axis=0)[:dimension])
+
+
+@pytest.mark.parametrize("cell, size", [("triangle", 96), ("quad", 112), ("tetra", 160),
+                                        ("hexahedron", 256)])  # fmt: skip
+def test_what_each_process_knows_of_a_mesh(cell, size, tmp_path):
+    """The bytes that docs/many-processes.md tells of, and one of each point."""
+    dimension = SHAPES[cell].dimension
+    nodes, cells = grid_mesh(cell, (8, 9, 7)[:dimension])
+    hub, solid = solid_of(write(tmp_path / "m.vtu", nodes, {cell: cells}), dimension, lo=-3, hi=3)
+    hub.solids.add("s", solid)
+    assert solid.count * (size + 1) <= known(hub) < solid.count * (size + 1) + 200
+    page = (ROOT / "docs" / "many-processes.md").read_text(encoding="utf-8")
+    assert re.search(rf"{cell[:5]}\w* (\w+ )?{size}", page)
 
 
 def test_hexahedra_with_faces_that_are_not_plane_have_exact_volumes(tmp_path):

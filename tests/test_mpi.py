@@ -161,8 +161,10 @@ def test_nobody_has_the_whole(tmp_path):
         "fix(s, python, all, shoves.sway_alone, final_integrate)",
         "dump(p, all, pyplot, 10, p.*.png, 3, 3, vx)", "dump(v, all, vtk, 10, v.*.vtu, seq)",
         "dump(g, all, grid, 10, g.*.txt, vx, mass, vol)",
+        "region(two, block, 0.79, 0.89, 0.3, 0.7)", "solid(two, region, two, 2, rubber, 0.1, 0)",
+        "fix(h, contact/hertz, body, two)",
     )  # fmt: skip
-    log = "log_modify(custom, step, E, p_x, m_x, e, at, c_y, f_y, a_x, s_x)"
+    log = "log_modify(custom, step, E, p_x, m_x, e, at, c_y, f_y, a_x, s_x, h_x)"
     path = moving(tmp_path, *lines, *FILES[:3], log, *FILES[-2:], "run(12)", size=0.5)
     folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     status, _, err = by_ranks(tmp_path / "run", path, 2, PYTHONPATH=folders)
@@ -573,6 +575,6 @@ def test_the_page_of_many_processes(tmp_path):
         subprocess.run([bash, "-n"], input=batch, text=True, check=True)
     checked = started(tmp_path, *PROGRAM, "check", str(script(tmp_path, "run(1)")), "--ranks", "2")
     lines = checked.communicate(timeout=100)[0].partition("shared out among 2 processes")[2]
-    names = re.findall(r"^  ([a-z][a-z ]*[a-z]) +[\d.]", lines, re.M)
-    assert len(names) == 6 and all(f"| `{name}` |" in page for name in names)
+    names = re.findall(r"^  ([a-z][a-zMB, ]*[a-zB]) +[\d.]", lines, re.M)
+    assert len(names) == 8 and all(f"| `{name}` |" in page for name in names)
     assert "so few points are not shared out" in lines

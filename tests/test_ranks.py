@@ -13,6 +13,7 @@ from combinations import MESHED, scene, write_mesh
 from going_on import CURVE, SCENES, same_files, with_files
 from scenes import SCHEMES, block
 from states import same_bits
+from test_contact_points import bodies
 from test_heat import HOT, slab
 from test_restart import ways
 
@@ -157,6 +158,7 @@ def test_a_step_that_is_halved(state_interpreted, tmp_path, changes):
     for old, new in changes.items():
         assert old in script
         script = script.replace(old, new)
+    script = script.replace("run(60", "run(24")
     assert shared(state_interpreted, tmp_path, with_files(script, "restart(6, r.*.h5)\n"), ranks=3)
     with h5py.File(tmp_path / "parts" / "r.12.h5") as file:
         assert not changes or file["good/touched/rows"][()].any()
@@ -372,6 +374,11 @@ fix(d, python, all, shoves.sway, post_advance_particles)
 fix(e, python, all, shoves.sway, final_integrate)
 log_modify(custom, step, a_x, b_y, c_x, d_y, e_x)
 """
+# What looks at each point on its own, at moments at which others act on the whole.
+BESIDE = (
+    "fix(f, python, nodes, shoves.sway_alone, post_particles_to_grid)",
+    "fix(g, python, all, shoves.sway_alone, final_integrate)",
+)
 WARMING = """
     fix(a, python, end, shoves.warm, post_heat_to_grid)
     fix(b, python, end, shoves.warm, post_update_grid_heat)
@@ -382,13 +389,23 @@ WARMING = """
 @pytest.mark.parametrize("script", ["sways", "warms", "sways alone"])
 def test_python_at_every_moment(state_interpreted, tmp_path, script):
     scripts = {
-        "sways": block(2, SWAYING, MOVING[0], *MOVING[3:], "set_output(3)", "run(7)",
+        "sways": block(2, SWAYING, *BESIDE, MOVING[0], *MOVING[3:], "set_output(3)", "run(7)",
                        size=(0.3, 0.2)),
         "sways alone": block(2, SWAYING.replace("sway,", "sway_alone,"), MOVING[0], *MOVING[3:],
                              "set_output(3)", "run(7)", size=(0.3, 0.2)),
         "warms": slab(HOT.format(301) + WARMING, ", hot_s", "run(6)"),
     }  # fmt: skip
     assert shared(state_interpreted, tmp_path, with_files(scripts[script]), ranks=3)
+
+
+@pytest.mark.parametrize("beside", [(), ("fix(p, python, all, shoves.push)",)])
+def test_points_that_touch(state_interpreted, tmp_path, beside):
+    """The pairs lie on several processes; also where all points are at one already."""
+    contact = "contact/minimize_penetration, a, b, 0.2"
+    lines = "log_modify(custom, step, c_x, c_y)", "set_output(1)", "set_dt(0.002)", "run(9)"
+    script = bodies(-0.01, contact, *beside, *lines, d=2, n=3)
+    assert shared(state_interpreted, tmp_path, with_files(script), ranks=3)
+    assert np.loadtxt(tmp_path / "parts" / "log.mpm", skiprows=1)[:, 1].min() < 0
 
 
 def test_a_load_by_a_reaction(state_interpreted, tmp_path):

@@ -125,6 +125,8 @@ def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):
         ("plot(e, 2, stp, time)", "did you mean 'step'?"),
         ("plot(e, 2, time, time, rigth)", "axis=right"),
         ("plot(e, 2, time, time, log)", "scale=log"),
+        ("plot(e, 2, time, time, step)", "a line for each curve"),
+        ("fix(g, body_force, all, 0, 0, -9.81)", "the last direction here is y"),
     ],
 )
 def test_slips_in_a_plot(run_interpreted, line, hint):

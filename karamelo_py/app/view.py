@@ -106,7 +106,7 @@ def _number(path: Path) -> int:
 
 def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace) -> Any:
     """The empty picture that suits the first snapshot; place and colours suit all of them."""
-    from karamelo_py.styles.dumps import picture
+    from karamelo_py.styles.dumps import picture, projections
     from karamelo_py.styles.dumps.pyplot import colours_of
 
     if options.column is not None and options.column not in first.columns:
@@ -126,7 +126,7 @@ def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace
     lo, hi, span = _all(files, column)
     domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
     size = tuple(pixels / DPI for pixels in options.size)
-    made = picture.make(domain, size, DPI, look)
+    made = projections.make(domain, size, DPI, look)
     made.begin_with(span)
     made.side = _side(np.column_stack([first.columns[name] for name in "xyz"]))
     return made

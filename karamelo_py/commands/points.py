@@ -80,13 +80,6 @@ def delete_particles(hub: Hub, solids: Solids, by: Literal["region"], region: Re
 
 
 def _delete_later(hub: Hub, found: dict[Solid, np.ndarray]) -> None:
-    for fix in hub.fixes.values():
-        if fix.needs_all_points:
-            raise ScriptError(
-                f"fix {fix.style} '{fix.id}' counts on all points of its solids",
-                argument="solids",
-                hint=f"delete_fix({fix.id}) before",
-            )
     if hub.rehearsing or hub.interpreter.replay is not None:
         return
     simulation = hub.simulation

@@ -130,6 +130,14 @@ def heat_hook(function: Callable, *, publishes: bool = False, holds: bool = Fals
 
 
 @shared
+def with_items_of(values, others):
+    """A NamedTuple with the items of another in the place of those with their names."""
+    new = dict(zip(others._fields, others, strict=True))
+    items = zip(values._fields, values, strict=True)
+    return type(values)(*(new.get(name, item) for name, item in items))
+
+
+@shared
 def directions(hooks):
     """How many there are: a number that is read, so that no loop over them is unrolled."""
     return hooks.x0.shape[1]

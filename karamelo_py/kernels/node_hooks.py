@@ -3,7 +3,7 @@
 import numpy as np
 
 from karamelo_py.compiler.addresses import caller_of
-from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.formula import BLOCK
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import entered, subkernel
@@ -31,6 +31,7 @@ from karamelo_py.kernels.hooks import (
     directions,
     evaluate,
     publish_total,
+    with_items_of,
 )
 from karamelo_py.kernels.totals import (
     WORK,
@@ -274,14 +275,6 @@ def _work_at_nodes(kin, nodes, ranges, hooks, control, dt, k):
 # --- threads ----------------------------------------------------------------------------------
 
 
-@shared
-def _with(values, others):
-    """A NamedTuple with the items of another in the place of those with their names."""
-    new = dict(zip(others._fields, others, strict=True))
-    items = zip(values._fields, values, strict=True)
-    return type(values)(*(new.get(name, item) for name, item in items))
-
-
 @subkernel
 def _go_through_part(
     task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share, k
@@ -293,7 +286,7 @@ def _go_through_part(
         own.values[i] = control.values[i]
     clock = own.clock[0]
     clock.last_dt, clock.set_low, clock.set_high = control.clock[0].last_dt, np.inf, -np.inf
-    here, mine = hold(_with(hooks, own)), hold(_with(control, own))
+    here, mine = hold(with_items_of(hooks, own)), hold(with_items_of(control, own))
     shares, parts = ranges[0, 0], apart.chosen.shape[0]
     first, end = shares * k // parts, shares * (k + 1) // parts
     _go_through(

@@ -1,7 +1,7 @@
 """Pairs of points of two bodies that touch: found with linked cells, and what they do.
 
-Everything here is in the order of the points' ids and runs on one thread: the sums do not depend on
-threads nor on how the points are sorted. It takes double precision throughout.
+Forces are summed in the order of the points' ids by one thread: they do not depend on threads nor
+on how the points are sorted. It takes double precision throughout.
 """
 
 from math import inf, sqrt
@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.fields import field, load
+from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import loop, subkernel
 from karamelo_py.compiler.tuples import record, subtract
-from karamelo_py.kernels.p2g import Force
 from karamelo_py.points.kinematics import dimension, vector_at
 from karamelo_py.points.laws import initial_state, jacobian, specific_volume
 from karamelo_py.points.pairs import force_between, radius
@@ -41,44 +41,73 @@ class Cells(NamedTuple):
     count: np.ndarray  # (3,) int64: cells along each direction
 
 
+def cells_for(points: int) -> Cells:
+    """Scratch for the search among so many points."""
+    return Cells(
+        start=np.zeros(2 * points + 65, np.int64), cell=np.zeros(points, np.int64),
+        order=np.zeros(points, np.int64), corner=np.zeros(3), length=np.zeros(3),
+        count=np.ones(3, np.int64),
+    )  # fmt: skip
+
+
 @subkernel
-def _number(id, begin1, end1, begin2, end2, bodies):
-    """The number in `bodies` of the point with an id, or -1 where it lies in neither range."""
+def _body(id, begin1, end1, begin2, end2):
+    """Which of two bodies the point with an id is of, 0 or 1; -1 where it lies in neither range."""
     if begin1 <= id < end1:
-        return id - begin1
-    return id - begin2 + bodies.first2 if begin2 <= id < end2 else -1
+        return 0
+    return 1 if begin2 <= id < end2 else -1
+
+
+@shared
+def _radius(kin, x, points, laws, p):
+    law = record(laws, points.material[p])
+    mass = points.mass[p]
+    state = load(points.state, p, initial_state(law, kin, mass))
+    volume = mass * specific_volume(law) * jacobian(law, kin, state)
+    return radius(kin, float(volume), load_vector(kin, x, p))
 
 
 @loop
-def collect(kin, x, points, laws, begin1, end1, begin2, end2, bodies):
-    """Take from a block the points whose ids lie in one of the two ranges."""
-    points, laws, bodies = at_hand(points), at_hand(laws), at_hand(bodies)
+def extend(kin, x, points, laws, begin1, end1, begin2, end2, extents):
+    """Let the extents of two bodies take in the points of a block.
+
+    Of each body `extents` (2, 7) holds the largest of -x, -y, -z, x, y, z and of the radii.
+    """
+    points, laws = at_hand(points), at_hand(laws)
     for p in range(points.id.size):
-        i = _number(points.id[p], begin1, end1, begin2, end2, bodies)
-        if i < 0:
-            continue
-        law = record(laws, points.material[p])
-        mass = points.mass[p]
-        state = load(points.state, p, initial_state(law, kin, mass))
-        volume = mass * specific_volume(law) * jacobian(law, kin, state)
-        bodies.mass[i] = mass
-        for k in range(dimension(kin)):
-            bodies.x[i, k] = x[k, p]
-            bodies.v[i, k] = points.v[k, p]
-            bodies.force[i, k] = 0.0
-        bodies.radius[i] = radius(kin, float(volume), vector_at(kin, bodies.x, i))
+        body = _body(points.id[p], begin1, end1, begin2, end2)
+        if body >= 0:
+            for k in range(dimension(kin)):
+                extents[body, k] = max(extents[body, k], -float(x[k, p]))
+                extents[body, 3 + k] = max(extents[body, 3 + k], float(x[k, p]))
+            extents[body, 6] = max(extents[body, 6], _radius(kin, x, points, laws, p))
 
 
 @loop
-def distribute(kin, points, begin1, end1, begin2, end2, bodies):
-    """Add the forces to the points of a block."""
-    points, bodies = at_hand(points), at_hand(bodies)
+def pick(kin, x, points, begin1, end1, begin2, end2, low, high, rows):
+    """How many points of a block are of a body and lie between two corners; their rows."""
+    points, count = at_hand(points), 0
     for p in range(points.id.size):
-        i = _number(points.id[p], begin1, end1, begin2, end2, bodies)
-        if i < 0:
-            continue
+        inside = _body(points.id[p], begin1, end1, begin2, end2) >= 0
         for k in range(dimension(kin)):
-            field(points.fields, Force)[k, p] += bodies.force[i, k]
+            inside = inside and low[k] <= x[k, p] <= high[k]
+        if inside:
+            rows[count] = p
+            count += 1
+    return count
+
+
+@loop
+def collect(kin, x, points, laws, rows, found):
+    """Number, mass, radius, position and velocity of points of a block (n, 3 + 2 d)."""
+    points, laws, d = at_hand(points), at_hand(laws), dimension(kin)
+    for i in range(rows.size):
+        p = rows[i]
+        found[i, 0], found[i, 1] = points.id[p], points.mass[p]
+        found[i, 2] = _radius(kin, x, points, laws, p)
+        for k in range(d):
+            found[i, 3 + k] = x[k, p]
+            found[i, 3 + d + k] = points.v[k, p]
 
 
 @subkernel

@@ -2,7 +2,9 @@
 
 from karamelo_py.compiler.compile import over_blocks, point_function, shared
 from karamelo_py.compiler.fields import load_vector
-from karamelo_py.compiler.loops import entered
+from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels.sums import adds
 from karamelo_py.kernels.sweep import sum_buffers, sweep_points
@@ -90,29 +92,47 @@ def sweep(s, mode, visit, dt, gathers, scatters, moves):
     return clock.wrong == 0
 
 
+@subkernel
+def _check_share(frame, kin, grids, points, tiling, now, k):
+    """How far the points of the tiles of the k-th share have gone, and who went wrong."""
+    grids, points, tiling = at_hand(grids), at_hand(points), at_hand(tiling)
+    for place in range(tiling.share[k], tiling.share[k + 1]):
+        t = tiling.order[place]
+        furthest = 0.0
+        wrong = 0
+        for p in range(tiling.range[t, 0], tiling.range[t, 1]):
+            grid = record(grids, points.grid[p])
+            y = load_vector(kin, points.x[1 - now], p)
+            step = largest_component(kin, subtract(y, load_vector(kin, points.x[now], p)))
+            cells = float(step * grid.inv_h)
+            furthest = max(furthest, cells)
+            if not (cells <= 1 and (inside(grid, kin, y) or not follows(frame))):
+                wrong = p + 1
+        tiling.report[t, 0] = furthest
+        tiling.report[t, 2] = wrong
+
+
+_check_shares = shared_out(_check_share, "frame, kin, grids, points, tiling, now")
+
+
 @entered
-def _look_at_moves(frame, kin, grids, points, tiling, control):
+def _check_points(mode, frame, kin, grids, points, tiling, control):
     clock = control.clock[0]
-    now = clock.now
-    for p in range(points.mass.size):
-        grid = record(grids, points.grid[p])
-        y = load_vector(kin, points.x[1 - now], p)
-        step = largest_component(kin, subtract(y, load_vector(kin, points.x[now], p)))
-        cells = step * grid.inv_h
-        clock.move = max(clock.move, cells)
-        if not (cells <= 1 and (inside(grid, kin, y) or not follows(frame))):
+    _check_shares(mode, tiling.count[1], frame, kin, grids, points, tiling, clock.now)
+    for t in range(tiling.count[0]):
+        clock.move = max(clock.move, tiling.report[t, 0])
+        if tiling.report[t, 2] > 0:
             clock.wrong = 1
-            tiling.report[0, 2] = p + 1
 
 
 @over_blocks
-def _check_moves_of_blocks(block, s):
-    _look_at_moves(s.frame, s.kin, s.grids, block.points, block.tiling, s.control)
+def _check_blocks(block, s, mode):
+    _check_points(mode, s.frame, s.kin, s.grids, block.points, block.tiling, s.control)
 
 
 @shared
-def check_moves(s):
+def check_moves(s, mode):
     """Look at the new positions again, after hooks that may have changed them."""
-    _check_moves_of_blocks(s)
+    _check_blocks(s, mode)
     agree_on_reports(s.control.ranks, s.control)
     return s.control.clock[0].wrong == 0

@@ -8,7 +8,10 @@ from karamelo_py.compiler.addresses import caller_of
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK
+from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.threads import Serial, Threaded, shared_out
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import BEFORE, TIME, VALUE
 from karamelo_py.kernels.hooks import (
     HEAT_FUNCTION,
@@ -18,10 +21,12 @@ from karamelo_py.kernels.hooks import (
     directions,
     evaluate,
     publish_total,
+    with_items_of,
 )
-from karamelo_py.kernels.totals import WORK, add_to
+from karamelo_py.kernels.totals import WORK, add_to, hand_over
 from karamelo_py.points.heat import face
 
+TURN = 4 * BLOCK  # points that a thread takes at a time
 _call_point_function = caller_of(POINT_FUNCTION)
 _call_heat_function = caller_of(HEAT_FUNCTION)
 
@@ -130,15 +135,15 @@ def _(what, kin, hooks, control, dt, h, count):
 
 
 @subkernel
-def _choose_points(what, ids, hooks, h, p):
-    """The next members from point `p` on, up to a block, and where they are before the step.
+def _choose_points(what, ids, hooks, h, p, end):
+    """The next members from `p` to before `end`, up to a block; where they are before the step.
 
     Returns how many, and where to go on.
     """
     begin = hooks.table[h].begin
     where = hooks.scratch
     count = 0
-    while p < ids.size and count < BLOCK:
+    while p < end and count < BLOCK:
         if begin < 0 or hooks.members[begin + (ids[p] >> 6)] >> (ids[p] & 63) & 1 != 0:
             hooks.chosen[count] = p
             if hooks.table[h].uses_place:
@@ -149,6 +154,63 @@ def _choose_points(what, ids, hooks, h, p):
             count += 1
         p += 1
     return count, p
+
+
+@subkernel
+def _act_on_range(what, kin, ids, hooks, control, dt, h, p, end):
+    """Call the function of hook `h` on its members from point `p` to before `end`."""
+    hooks.scratch[:6] = 0.0
+    count = BLOCK
+    while count == BLOCK:
+        count, p = _choose_points(what, ids, hooks, h, p, end)
+        act_on_points(what, kin, hooks, control, dt, h, count)
+
+
+@subkernel
+def _act_on_part(what, kin, ids, hooks, control, dt, h, k):
+    """The part of thread `k`, with a scratch and totals of its own: totals do not round."""
+    own = record(hooks.apart, k)
+    for i in range(control.values.size):
+        own.values[i] = control.values[i]
+    clock, there = control.clock[0], own.clock[0]
+    there.last_dt, there.kick = clock.last_dt, clock.kick
+    there.rise, there.fall = clock.rise, clock.fall
+    there.coldest, there.hottest = clock.coldest, clock.hottest
+    parts = hooks.apart.chosen.shape[0]
+    here, mine = hold(with_items_of(hooks, own)), hold(with_items_of(control, own))
+    # By turns: members may lie beside each other.
+    for first in range(k * TURN, ids.size, parts * TURN):
+        end = min(first + TURN, ids.size)
+        _act_on_range(what, kin, ids, here, mine, dt, h, first, end)
+    hand_over(own.totals, control.totals, WORK)
+    slot = hooks.table[h].slot
+    for row in range(max(slot, 0), min(slot + 3, own.totals.shape[0]) if slot >= 0 else 0):
+        hand_over(own.totals, control.totals, row)
+
+
+_act_on_parts = shared_out(_act_on_part, "what, kin, ids, hooks, control, dt, h")
+
+
+@point_function()
+def act_on_all(mode, what, kin, ids, hooks, control, dt, h):
+    """Call the function of a hook on all its members in a block."""
+
+
+@act_on_all.on(Serial)
+def _(mode, what, kin, ids, hooks, control, dt, h):
+    _act_on_range(what, kin, ids, hooks, control, dt, h, NONE, ids.size)
+
+
+@act_on_all.on(Threaded)
+def _(mode, what, kin, ids, hooks, control, dt, h):
+    parts = hooks.apart.chosen.shape[0]
+    _act_on_parts(mode, parts, what, kin, ids, hooks, control, dt, h)
+    clock = control.clock[0]
+    for k in range(parts):
+        own = hooks.apart.clock[k, 0]
+        clock.rise, clock.fall = max(clock.rise, own.rise), min(clock.fall, own.fall)
+        clock.coldest = min(clock.coldest, own.coldest)
+        clock.hottest = max(clock.hottest, own.hottest)
 
 
 @entered
@@ -171,11 +233,6 @@ def publish_totals(stage, hooks, control):
 def point_hooks(stage, what, kin, ids, hooks, control, dt):
     """Call the point functions of `stage` on the members in a block."""
     dt = float(dt)
-    hooks.scratch[:6] = 0.0
     for h in range(len(hooks.table)):
-        if hooks.table[h].stage != stage:
-            continue
-        count, p = BLOCK, NONE
-        while count == BLOCK:
-            count, p = _choose_points(what, ids, hooks, h, p)
-            act_on_points(what, kin, hooks, control, dt, h, count)
+        if hooks.table[h].stage == stage:
+            act_on_all(hooks.mode, what, kin, ids, hooks, control, dt, h)

@@ -61,7 +61,7 @@ def _take(row, s, mode, hooks, more):
         task = row.task(s) if callable(row.task) else row.task
         sweep_nodes(mode, task, s.kin, s.nodes, s.ranges, kick(s))
     elif isinstance(row, table.Check):
-        return check_moves(s)
+        return check_moves(s, mode)
     else:
         return _visit(row, s, mode, more)
     return True

@@ -23,7 +23,7 @@ from karamelo_py.compiler.compile import (
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.compiler.held import at_hand, hold
-from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
+from karamelo_py.compiler.lanes import Eights, Fours, group, join, lanes_for, spread
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
@@ -42,13 +42,13 @@ from karamelo_py.kernels.corners import (
     scatter_corners,
     shows_corners,
 )
-from karamelo_py.kernels.g2p import empty_all, gathered_all, settled_all
+from karamelo_py.kernels.g2p import SecondStrain, Strain, empty_all, gathered_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all, scattered_all
 from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.visit import Work, ask_ahead, place_at, present_stencil
 from karamelo_py.points.basis import locate, support
-from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, of_one
+from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, is_whole, of_one
 from karamelo_py.points.basis.cpdi.corners import CornerStencil
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
 from karamelo_py.points.frames import Total, Updated, follows
@@ -218,6 +218,52 @@ def _(width, q, end):
     return group(width, q, min(width_of(width), end - q))
 
 
+def settled_width(width, visit):
+    """How many points are settled at once: of doubles twice as many as gather, where laws wait.
+
+    Chains of operations that wait for each other serve eight points in the time of four. To gather
+    and to scatter, four are faster.
+    """
+    return width
+
+
+@by_type(settled_width)
+def _settled_width(width, visit):
+    tasks = {task.instance_class for task in visit[0]}
+    both = width.instance_class is Fours and tasks and tasks <= {Strain, SecondStrain}
+    made = Eights if both else width.instance_class
+    return lambda width, visit: made()
+
+
+@point_function(tags=2)
+def groups_of(width, wide, q, end):
+    """The groups of points that are gathered and scattered one after another."""
+
+
+@groups_of.on(OneByOne, OneByOne)
+@groups_of.on(Fours, Fours)
+@groups_of.on(Eights, Eights)
+def _(width, wide, q, end):
+    return (points_from(width, q, end),)
+
+
+@groups_of.on(Fours, Eights)
+def _(width, wide, q, end):
+    # Where there is no second one it is the first again, and gives nothing.
+    second = q + 4 if q + 4 < end else q
+    return points_from(width, q, end), points_from(width, second, end)
+
+
+@shared
+def joined(p, parts):
+    """What the points of a group have, from that of the groups it is made of."""
+    if len(parts) == 1:
+        return parts[0]
+    if isinstance(parts[0], tuple):
+        return tuple([joined(p, inner) for inner in zip(*parts, strict=True)])
+    return join(p, *parts)
+
+
 @point_function()
 def zero_of(width, like):
     """0 as a number of a visit."""
@@ -338,12 +384,19 @@ def _(width, stencil, quantities, w, loads):
 def _(width, stencil, quantities, w, loads):
     block = block_of(w.kin, w.grid, stencil)
     if is_one_block(block):
-        one, at = of_one(block), in_block(w)
-        _scatter_parts(width, quantities, at, one, loads, affine_parts(quantities, at, one, loads))
+        _scatter_block(width, quantities, w, of_one(block), loads)
+    elif is_whole(block):
+        _scatter_block(width, quantities, w, block, loads)
     elif all_by_corners(quantities, w):
         scatter_corners(quantities, w, stencil, loads)
     else:
         _scatter(quantities, w, stencil, loads)
+
+
+@shared
+def _scatter_block(width, quantities, w, block, loads):
+    at = in_block(w)
+    _scatter_parts(width, quantities, at, block, loads, affine_parts(quantities, at, block, loads))
 
 
 @shared
@@ -355,6 +408,12 @@ def _scatter_parts(width, quantities, w, stencil, loads, parts):
     rest = [k for k, part in enumerate(parts) if not len(part)]
     if len(rest):
         _scatter(tuple([quantities[k] for k in rest]), w, stencil, tuple([loads[k] for k in rest]))
+
+
+@shared
+def gathered_by(width, tasks, w, stencil, x):
+    """What the tasks gather over the nodes of a stencil."""
+    return gather_nodes(width, stencil, tasks, w, empty_all(tasks, w, x))
 
 
 @subkernel
@@ -374,20 +433,32 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     numbered = renumbered(grid, box[t, 2], box[t, 3], box[t, 4])
     out = work_of(s, numbered, s.buffers, block, places)
     width = in_lanes(visit, s, block)
-    furthest = zero_of(width, dt)
+    wide = settled_width(width, visit)
+    furthest = zero_of(wide, dt)
     fastest = furthest
     wrong = 0
     end = tiling.range[t, 1]
-    for q in range(tiling.range[t, 0], end, width_of(width)):
-        p = points_from(width, q, end)
+    for q in range(tiling.range[t, 0], end, width_of(wide)):
+        p = points_from(wide, q, end)
+        groups = groups_of(width, wide, q, end)
         ask_ahead(w, p, dt)
-        stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
-        moved = zero_of(width, dt)
+        stencils = tuple(
+            [
+                locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, g))
+                for g in groups
+            ]
+        )
+        moved = zero_of(wide, dt)
         rate = fastest
         if gathers:
-            totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
-            totals = gather_nodes(width, stencil, visit.tasks, w, totals)
-            moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
+            totals = tuple(
+                [
+                    gathered_by(width, visit.tasks, w, stencil, load_vector(s.kin, places.x, g))
+                    for stencil, g in zip(stencils, groups, strict=True)
+                ]
+            )
+            totals = joined(p, totals)
+            moved, rate = settled_all(visit.tasks, w, stencils[0], p, dt, totals, fastest)
         elif follows(s.frame):
             here = inside(grid, s.kin, load_vector(s.kin, places.x, p))
             moved = choose(here, moved, real(inf, moved))
@@ -398,9 +469,11 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
         furthest = max(furthest, moved)
         fastest = rate
         if scatters and fits(visit.weights, s.room, moved):
-            stencil = restencil(visit.weights, w, stencil, p)
-            loads = load_all(visit.quantities, w, p, dt)
-            scatter_nodes(width, stencil, visit.quantities, out, loads)
+            for k, g in enumerate(groups):
+                if k * width_of(width) < end - q:
+                    stencil = restencil(visit.weights, w, stencils[k], g)
+                    loads = load_all(visit.quantities, w, g, dt)
+                    scatter_nodes(width, stencil, visit.quantities, out, loads)
     tiling.report[t, 0] = largest(furthest)
     tiling.report[t, 1] = largest(fastest)
     tiling.report[t, 2] = wrong

@@ -32,7 +32,6 @@ from karamelo_py.points.laws import (
 
 LOOK = 10  # steps between two looks
 FEW = 3  # looks that are compared where no window is whole: the present and the two before
-SWING = 4.0  # times the work of loads, which is right to some hundredths only in a few large steps
 LOOKS = 10  # looks that are averaged, in a window of 100 steps
 GROWTH = 0.01  # of the largest energy so far, in a window: more is told
 DRIFTING = 1e-3  # of the energy of bodies that drift: what they vibrate by and matters is more
@@ -264,8 +263,7 @@ def judge(control):
         # The least of a few: where bodies meet a look or two shows what is not there. And kept, so
         # that it does not matter which of the looks is the last before one asks.
         least = min(balance, clock.last_balance, clock.last_but_one)
-        room = unit + SWING * clock.supplied
-        clock.grown = max(clock.grown, (least - clock.first_few) / room)
+        clock.grown = max(clock.grown, (least - clock.first_few) / unit)
     clock.sum_of_balance += balance
     if clock.looks % LOOKS == 0:
         mean = clock.sum_of_balance / LOOKS

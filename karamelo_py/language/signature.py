@@ -39,7 +39,7 @@ from karamelo_py.language.kinds import (
 )
 from karamelo_py.language.own_words import longer
 from karamelo_py.script.errors import Place, ScriptError, meant, nearest
-from karamelo_py.script.other_programs import OTHERWISE
+from karamelo_py.script.other_programs import OTHERWISE, SURPLUS
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
@@ -224,7 +224,7 @@ def _bind(
         if surplus is not None:
             values = {word: f"{p.name}={word}" for p in by_name.values() for word in p.kind.words}
             word = surplus.text if surplus.text in values else nearest(surplus.text, values)
-            hint = values.get(word or "", hint)
+            hint = values.get(word or "", hint) or SURPLUS.get(name)
         if gap:
             hint = f"is a comma missing in '{gap.text}'?"
         missing = [p.shown for p in slots[len(given) : needed]] or [f"{m}=..." for m in missing]

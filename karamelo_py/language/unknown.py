@@ -8,9 +8,9 @@ from karamelo_py.language import registry
 from karamelo_py.language.own_words import in_own_words
 from karamelo_py.script.errors import ScriptError, meant, nearest
 from karamelo_py.script.evaluation import usage
+from karamelo_py.script.expression_mistakes import BLOCKS, NO_BLOCKS
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
-from karamelo_py.script.mistakes import BLOCKS, NO_BLOCKS
 from karamelo_py.script.other_programs import ENERGIES, KARAMELO_COMMANDS, instead
 from karamelo_py.script.syntax import Assignment, Call
 

@@ -210,6 +210,14 @@ class ById:
         value, number = max(self.seen(_largest, of))
         return value, -number
 
+    def everyone(self, thing: Any) -> list:
+        """What each process has, for all that have some of the points."""
+        return [thing]
+
+    def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
+        """What the first process makes of what each has: for each its own."""
+        return make([thing])[0]
+
     def counts(self) -> list[int]:
         """How many points each block has."""
         return [len(block.points.id) for block in self.stepped.blocks]

@@ -16,6 +16,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.sizes import memory_of
 from karamelo_py.run.stable import sparse
 from karamelo_py.run.tiles import SHARES
+from karamelo_py.styles.fixes.pairs import SENT, PairContact
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 
@@ -31,8 +32,9 @@ class Share(NamedTuple):
         Processes that it passes something on to.
     given
         Bytes that it passes on in a step.
-    memory
-        Bytes that it touches in steps, and of a copy of its last good state.
+    memory, known
+        Bytes that it touches in steps, and of a copy of its last good state; those of them of what
+        each process knows of the whole scene.
     """
 
     points: int
@@ -41,6 +43,7 @@ class Share(NamedTuple):
     others: int
     given: int
     memory: int
+    known: int
 
 
 class _Sums(NamedTuple):
@@ -130,8 +133,9 @@ def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) 
     rows = sum(map(len, tiles.given.values()))
     count = sum(int(one.count[0]) for one in tilings)
     nodes = len(numbers(s.spans))
-    memory = sum(memory_of(simulation, s, boxes))
-    return Share(points, count, nodes, len(tiles.given), rows * per_node, memory)
+    memory = memory_of(simulation, s, boxes)
+    given = rows * per_node
+    return Share(points, count, nodes, len(tiles.given), given, sum(memory), memory.known)
 
 
 def _part(s: Setup, own: np.ndarray) -> Setup:
@@ -155,10 +159,10 @@ def told(simulation: Simulation, ranks: int) -> list[str]:
     columns = np.array(shares)
     mean = columns[:, 0].mean()
     lines = [f"shared out among {ranks} processes{'':<6}least     largest"]
-    columns[:, -1] >>= 20
+    columns[:, -2:] >>= 20
     words = (
         "points", "tiles", "nodes in use", "others to talk to", "bytes given in a step",
-        "memory, in MiB",
+        "memory, in MiB", "known to each, in MiB",
     )  # fmt: skip
     lines += [
         f"  {word:<30}{low:>8} {high:>11}"
@@ -177,4 +181,10 @@ def told(simulation: Simulation, ranks: int) -> list[str]:
             f"  {acting[0]} acts on the whole scene: in each step the first process takes in and "
             f"gives back {moved >> 20} MiB, and has the memory of a single one"
         )
+    for fix in simulation.hub.fixes.values():
+        if isinstance(fix, PairContact):
+            lines.append(
+                f"  fix {fix.style} '{fix.id}' has the first process look at all points that may "
+                f"touch ({fix.sent(simulation)} now), and needs {SENT} bytes there for each"
+            )
     return lines

@@ -191,6 +191,17 @@ class Ranks(Holding):
         """The largest of each number of all processes, where each looks at its part."""
         return self.crew.largest(numbers) if self._stepping else numbers
 
+    def everyone(self, thing: Any) -> list:
+        """What each process has, for all that have some of the points."""
+        return self.crew.everyone(thing) if self._stepping else [thing]
+
+    def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
+        """What the first process makes of what each has: for each its own."""
+        if not self._stepping:
+            return make([thing])[0]
+        found = self.crew.gathered(thing)
+        return self.crew.handed_out(None if found is None else make(found))
+
     def waits(self) -> np.ndarray:
         """Seconds that each process has waited for others in steps so far."""
         return np.array(self._together("tell_of_waiting"))

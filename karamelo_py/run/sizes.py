@@ -9,19 +9,21 @@ from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.arrays import Setup, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.run.shares import occupied
+from karamelo_py.scene.hub import Hub
 
 LARGE, PAGE = 1 << 22, 1 << 21  # bytes from which on NumPy asks for large pages, and of these
 THERE = 1  # bytes of each point of the whole scene: whether it was deleted
 
 
 class Memory(NamedTuple):
-    """Bytes that are touched by the steps, and of a copy of the last good state.
+    """Bytes touched by the steps, of a copy of the last good state, and known to each process.
 
     Of places, the copy has only those of the present.
     """
 
     touched: int
     copied: int
+    known: int
 
 
 def memory_of(simulation: Any, s: Setup, boxes: int) -> Memory:
@@ -37,8 +39,30 @@ def memory_of(simulation: Any, s: Setup, boxes: int) -> Memory:
     spans = s.spans[1 : 1 + s.spans[0, 0]]
     nodes = sum(bytes_in(spans, array) for _, array in node_fields(simulation.setup))
     hooks = sum(getattr(simulation.hooks, name, np.empty(0)).nbytes for name in ("x0", "members"))
-    whole = THERE * simulation.count + hooks
-    return Memory(points + whole + nodes + boxes, points - moved)
+    whole = known(simulation.hub) + hooks
+    return Memory(points + nodes + boxes, points - moved, whole)
+
+
+def known(hub: Hub) -> int:
+    """What each process knows of the whole scene: solids, regions, groups, and who is there."""
+    seen = {id(hub)}
+    parts = (part for all in (hub.solids, hub.regions, hub.groups) for part in all.values())
+    there = THERE * sum(solid.count for solid in hub.solids.values())
+    return there + sum(_held(part, seen) for part in parts)
+
+
+def _held(thing: Any, seen: set[int]) -> int:
+    """Bytes of the arrays that a thing and its parts hold, each once."""
+    if isinstance(thing, np.ndarray) and isinstance(thing.base, np.ndarray):
+        thing = thing.base
+    if id(thing) in seen:
+        return 0
+    seen.add(id(thing))
+    if isinstance(thing, np.ndarray):
+        return thing.nbytes
+    ours = type(thing).__module__.startswith("karamelo_py.") and hasattr(thing, "__dict__")
+    parts = thing if isinstance(thing, (list, tuple)) else vars(thing).values() if ours else ()
+    return sum(_held(part, seen) for part in parts)
 
 
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:

@@ -24,16 +24,8 @@ def check(hub: Scene) -> None:
             place=update.boundary_place,
             hint="leave boundary out, or method(ulmpm, ...)",
         )
-    if update.boundary == "delete":
-        pairs = [fix for fix in hub.fixes.values() if fix.needs_all_points]
-        if pairs:
-            raise ScriptError(
-                f"fix {pairs[0].style} '{pairs[0].id}' counts on all points of its solids, and "
-                "boundary(delete) may take some away",
-                place=update.boundary_place,
-                hint="boundary(reflect), or method(ulmpm/contacts, ...) in the place of the fix",
-            )
-    elif carried(update.method.basis, update.method.kinematics(hub)) > 0:
+    carries = carried(update.method.basis, update.method.kinematics(hub)) > 0
+    if update.boundary == "reflect" and carries:
         raise ScriptError(
             f"boundary(reflect) cannot mirror {type(update.method.basis).__name__} domains, "
             "whose corners go with the grid",

@@ -71,8 +71,6 @@ class Fix:
     conserves
         Whether its hooks in Python bring no energy: what they do to points and nodes stores it,
         passes it on or takes it away. Otherwise the energy of the scene is not watched.
-    needs_all_points
-        Whether no point may be deleted (boundary delete) while it acts.
     acts_last
         Whether it acts after all others at each moment, wherever the script has it.
     friction
@@ -94,7 +92,6 @@ class Fix:
     wall_friction: Any = None
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
-    needs_all_points = False
     acts_last = False
     conserves = False
     friction: float | None = None

@@ -133,6 +133,9 @@ ENERGIES = {
 # Commands that there are here, too, with other arguments.
 OTHERWISE = {"units": "units(m, kg, s) names the units of all numbers; or leave it out"}
 
+# What is done in another way than by more arguments.
+SURPLUS = {"plot": "a line for each curve: plot(another ID, every, x, y)"}
+
 # Earlier forms of Karamelo's laws, by the number of arguments behind the style (None: any other):
 # what the line does without, and its arguments here, of which {0} is the first of the script.
 _NO_HEAT = "without heat and viscosity: "

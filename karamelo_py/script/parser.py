@@ -7,7 +7,7 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.script import mistakes
+from karamelo_py.script import expression_mistakes, mistakes
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.mistakes import Mistake
 from karamelo_py.script.syntax import (
@@ -104,7 +104,7 @@ def _tree(code: str) -> Node:
     try:
         return _lark("expression").parse(code)
     except _refused():
-        raise mistakes.in_expression(_lark("expression"), code) from None
+        raise expression_mistakes.in_expression(_lark("expression"), code) from None
 
 
 def _number(word: str, start: int) -> float:

@@ -113,6 +113,20 @@ def _masked(builder: Any, p: Any, width: int) -> Any:
 
 
 @intrinsic
+def join(typing_context, p, a, b):
+    """What the points of a group have in lanes, from those of its two halves."""
+    lanes = Lanes(a.scalar, p.width)
+
+    def codegen(context, builder, sig, arguments):
+        both = shuffle(builder, *arguments[1:], list(range(p.width)))
+        # Lanes without a point have what the first one has, as when it is loaded.
+        mask = _masked(builder, arguments[0], p.width)
+        return builder.select(mask, both, _first_everywhere(builder, both))
+
+    return lanes(p, a, b), codegen
+
+
+@intrinsic
 def _present(typing_context, p):
     """Which lanes have a point."""
     mask = Lanes(types.boolean, p.width)

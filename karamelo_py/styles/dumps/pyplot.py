@@ -156,7 +156,7 @@ class PyPlot(Dump):
 
     def _make(self) -> Any:
         # Matplotlib takes a third of a second to import: only scenes with pictures pay it.
-        from karamelo_py.styles.dumps import picture
+        from karamelo_py.styles.dumps import picture, projections
 
         units = self.hub.output.units
         label = self._label()
@@ -169,7 +169,7 @@ class PyPlot(Dump):
             lengths=f" [{units.length}]" if units else "",
             **self.look,
         )
-        made = picture.make(self.hub.domain, self.size, DPI, options)
+        made = projections.make(self.hub.domain, self.size, DPI, options)
         made.begin_with(self._limits)
         return made
 

@@ -44,7 +44,7 @@ class ContactHertz(PairContact):
     of the radii before it is large, and a fast one may pass through.
 
     Publishes the force on solid1 as ID_x, ID_y, ID_z; that on solid2 is the opposite.
-    With many processes all points are gathered for it in each step.
+    With many processes the first looks for pairs, among the points of all that may touch.
 
     See Also
     --------

@@ -36,7 +36,7 @@ class ContactMinimizePenetration(PairContact):
     A surface of balls is rough: sliding is braked by riding from ball to ball, too, with mu = 0 by
     one to two tenths of the pressing force in a block of two points a cell and direction.
 
-    With many processes all points are gathered for it in each step.
+    With many processes the first looks for pairs, among the points of all that may touch.
     Publishes the force on solid1 as ID_x, ID_y, ID_z; that on solid2 is the opposite. Pairs are
     found by cells: the cost grows with the number of points.
 

@@ -208,11 +208,8 @@ class Python(Fix):
 
     def _agree(self, given: Any) -> None:
         """See that all processes return the same."""
-        crew = self.hub.settings.crew
-        if crew is None:
-            return
         own = None if given is None else np.asarray(given, float).tolist()
-        first, *others = map(repr, crew.everyone(own))
+        first, *others = map(repr, self.hub.simulation.everyone(own))
         other = next((one for one in others if one != first), None)
         if other is not None:
             raise ScriptError(

@@ -74,12 +74,18 @@ def block_of(kin, grid, stencil):
 
 
 @shared
+def is_whole(block):
+    """Whether all that the points in all lanes see lies in their blocks."""
+    return len(block) > 0 and in_all(block.holds)
+
+
+@shared
 def is_one_block(block):
-    """Whether the points in all lanes see the same block, and all that they see lies in it."""
+    """Whether, besides, they see the same block."""
     if len(block) == 0:
         return False
     row, line = block.first
-    return in_all(block.holds) & is_one(row) & is_one(line)
+    return is_whole(block) & is_one(row) & is_one(line)
 
 
 @shared
