@@ -252,7 +252,15 @@ def _points_at(context, builder, array, at, arguments):
         context.cast(builder, value, kind, types.intp)
         for kind, value in zip(kinds[:-1], values[:-1], strict=True)
     ]
-    return pointer_to(context, builder, array, arguments[0], [*rest, first]), values[-1]
+    made = context.make_array(array)(context, builder, arguments[0])
+    strides = cgutils.unpack_tuple(builder, made.strides)
+    # Points lie one after another in each row, however far the rows are apart.
+    strides[-1] = ir.Constant(strides[-1].type, array.dtype.bitwidth // 8)
+    pointer = cgutils.get_item_pointer2(
+        context, builder, made.data, cgutils.unpack_tuple(builder, made.shape), strides,
+        array.layout, [*rest, first], wraparound=False, boundscheck=False,
+    )  # fmt: skip
+    return pointer, values[-1]
 
 
 @intrinsic
