@@ -447,7 +447,10 @@ def is_silent(points):
     return None if second else 1
 def differs(points):
     return 0.1 + second
-fails.point_by_point = is_silent.point_by_point = differs.point_by_point = True
+def asks(points):
+    return points.total(points.mass) if second else 1.0
+for function in (asks, fails, is_silent, differs):
+    function.point_by_point = True
 """
 
 
@@ -457,6 +460,7 @@ fails.point_by_point = is_silent.point_by_point = differs.point_by_point = True
     [
         ("fails", "index 99999 is out of bounds"),
         ("is_silent", "is_silent returns 1.0 on one process and None on another"),
+        ("asks", "comes to its end on one process, and to a total on another"),
         ("differs", "differs returns 0.1 on one process and 1.1 on another"),
     ],
 )

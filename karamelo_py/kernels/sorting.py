@@ -14,8 +14,6 @@ from karamelo_py.points.basis import extent, first_node
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
 
-PARTS = 64  # of the columns of an array, which threads share out
-
 
 class Cut(NamedTuple):
     """How g grids are cut into T tiles."""
@@ -147,30 +145,30 @@ def _order_in_tiles(kin, grids, basis, tiles, points, x, found, k):
 
 
 @subkernel
-def _pick_columns(array, first, rows, order, room, k):
+def _pick_columns(array, first, rows, order, room, parts, k):
     """Copy the k-th part of some rows of an array to `room`, in order."""
     for c in range(rows):
-        for p in range(order.size * k // PARTS, order.size * (k + 1) // PARTS):
+        for p in range(order.size * k // parts, order.size * (k + 1) // parts):
             room[c, p] = array[first + c, order[p]]
 
 
 @subkernel
-def _put_columns(array, first, rows, room, k):
+def _put_columns(array, first, rows, room, parts, k):
     """Copy the k-th part of some rows back."""
     for c in range(rows):
-        for p in range(array.shape[1] * k // PARTS, array.shape[1] * (k + 1) // PARTS):
+        for p in range(array.shape[1] * k // parts, array.shape[1] * (k + 1) // parts):
             array[first + c, p] = room[c, p]
 
 
 _find_all_tiles = shared_out(_find_tiles, "kin, grids, tiles, x, of, ends, tile")
 _order_parts = shared_out(_order_part, "found")
 _order_in_all_tiles = shared_out(_order_in_tiles, "kin, grids, basis, tiles, points, x, found")
-_pick_all_columns = shared_out(_pick_columns, "array, first, rows, order, room")
-_put_all_columns = shared_out(_put_columns, "array, first, rows, room")
+_pick_all_columns = shared_out(_pick_columns, "array, first, rows, order, room, parts")
+_put_all_columns = shared_out(_put_columns, "array, first, rows, room, parts")
 
 
 @entered
-def _permute(mode, array, order, room):
+def _permute(mode, array, order, room, parts):
     """Put the columns of an array (c, n) of whole numbers into `order`, a few rows at a time.
 
     A copy of a whole field would be the peak of the set-up.
@@ -178,8 +176,8 @@ def _permute(mode, array, order, room):
     first = 0
     while first < array.shape[0]:
         rows = min(room.shape[0], array.shape[0] - first)
-        _pick_all_columns(mode, PARTS, array, first, rows, order, room)
-        _put_all_columns(mode, PARTS, array, first, rows, room)
+        _pick_all_columns(mode, parts, array, first, rows, order, room, parts)
+        _put_all_columns(mode, parts, array, first, rows, room, parts)
         first += rows
 
 
@@ -190,7 +188,7 @@ def _sort(mode, kin, grids, basis, tiles, points, x, found, arrays):
     _order_parts(mode, parts, found)
     _order_in_all_tiles(mode, parts, kin, grids, basis, tiles, points, x, found)
     for array in arrays:
-        _permute(mode, array, found.order, found.room)
+        _permute(mode, array, found.order, found.room, parts)
     return 0
 
 

@@ -168,7 +168,8 @@ class ById:
         limbs = np.zeros((len(columns), LIMBS), np.int64)
         for k, column in enumerate(columns):
             add_all(limbs, k, np.ascontiguousarray(column))
-        return np.array([rounded(of) for of in self.of_all(limbs)]).reshape(terms.shape[1:])
+        of_all = sum(self.everyone("a total", limbs))
+        return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
     def column(self, name: str, block: Block, rows: np.ndarray) -> np.ndarray:
         """A column of the dumps for points that are at hand."""
@@ -210,8 +211,8 @@ class ById:
         value, number = max(self.seen(_largest, of))
         return value, -number
 
-    def everyone(self, thing: Any) -> list:
-        """What each process has, for all that have some of the points."""
+    def everyone(self, what: str, thing: Any) -> list:
+        """What each process has, where all ask for the same (in words)."""
         return [thing]
 
     def at_first(self, make: Callable[[list], list], thing: Any) -> Any:

@@ -21,6 +21,7 @@ from karamelo_py.run.holding import Held, Holding
 from karamelo_py.run.leading import Abandoned, At, HandedOutAnew, by_all
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.state import of_nodes
+from karamelo_py.script.errors import ScriptError
 
 FIRST, LAST = -(2**63), 2**63 - 1  # before all keys of points, and behind them
 SAMPLES = 256  # keys of all processes, by which a piece of points is cut
@@ -191,9 +192,25 @@ class Ranks(Holding):
         """The largest of each number of all processes, where each looks at its part."""
         return self.crew.largest(numbers) if self._stepping else numbers
 
-    def everyone(self, thing: Any) -> list:
-        """What each process has, for all that have some of the points."""
-        return self.crew.everyone(thing) if self._stepping else [thing]
+    def everyone(self, what: str, thing: Any) -> list:
+        """What each process has, where all ask for the same (in words).
+
+        Raises
+        ------
+        ScriptError
+            If a function in Python asks on one process for what it does not on another.
+        """
+        if not self._stepping:
+            return [thing]
+        asked, found = zip(*self.crew.everyone((what, thing)), strict=True)
+        if other := next((one for one in asked if one != asked[0]), None):
+            raise ScriptError(
+                f"a function in Python comes to {asked[0]} on one process, and to {other} on "
+                "another",
+                hint="points.total(terms) and nodes.total(terms) have to be asked for by all "
+                "processes, those without points too",
+            )
+        return list(found)
 
     def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
         """What the first process makes of what each has: for each its own."""
