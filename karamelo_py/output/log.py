@@ -108,7 +108,7 @@ class Log(Rhythmic):
         there = self.path.stat().st_size if self.path.is_file() else 0
         if there < self._end:
             self.hub.warn(
-                f"{self.path} is not as the run left it that is gone on from: it begins anew",
+                begins_anew(self.path),
                 hint="karamelo-py SCRIPT -restart FILE in the folder of that run",
             )
             self._header, self._end = None, 0
@@ -201,3 +201,10 @@ def _claim(file: TextIO) -> None:
 
 def _row(cells: list[str], widths: list[int]) -> str:
     return " ".join(c.ljust(w) for c, w in zip(cells, widths, strict=True)).rstrip()
+
+
+def begins_anew(path: Path) -> str:
+    """What is said where a run that goes on does not find this file of the one before."""
+    if not path.is_file():
+        return f"there is no {path} of the run that is gone on from: it begins anew"
+    return f"{path} is not as the run left it that is gone on from: it begins anew"

@@ -67,7 +67,7 @@ def stop(
     grown = not grown_little(simulation)
     if grown:
         _go_back(simulation, snapshot, step)
-    elif status in (HEATED, STOPPED):
+    elif status in (GAINED, HEATED, STOPPED):
         simulation.restore(snapshot)
     path = _write_last_good(hub) if grown else None
     if status not in (GAINED, HEATED) and step > simulation.step:

@@ -51,6 +51,7 @@ SHARES = 64  # of the points of a block, nearly equal: threads share them out
 # pages that none touches cost no memory. Larger ones grow.
 AT_ONCE = 8
 DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
+PART = 2000  # points that are worth a part of their own where threads sort
 DRIFT = 1.0  # cells that points may go at most before they are sorted again
 # By dimension, the least they may go: boxes are smaller then, and more points beside each other see
 # the same nodes; in the plane that brings less than it costs to sort.
@@ -206,8 +207,13 @@ class Tiles:
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
         reach = self._reach(s, block, x)
-        # Some parts for each thread: tiles are not of like size, and others may need a core.
-        parts = 1 if self.threads == 1 else 4 * self.threads
+        # Some parts for each thread: tiles are not of like size, and others may need a core. Of few
+        # points, or fewer than tiles, one thread has sorted all before several have met.
+        parts = min(4 * self.threads, x.shape[1] // PART, 4 * x.shape[1] // self.count)
+        if self.threads == 1 or parts < 2:
+            parts, mode = 1, Serial()
+        else:
+            mode = self.mode
         scratch = np.empty((4, x.shape[1]), np.int64)
         found = Order(
             lanes_for(8 * x.itemsize).width,
@@ -219,7 +225,7 @@ class Tiles:
             scratch[2:],
         )
         arrays = tuple(rows for _, array in arrays_of(points) for rows in _as_rows(array))
-        sort_points(self.mode, s.kin, s.grids, s.basis, self._cut, points, x, found, arrays)
+        sort_points(mode, s.kin, s.grids, s.basis, self._cut, points, x, found, arrays)
         ends = found.ends[-1]
         begins = np.append(0, ends[:-1])
         occupied = np.flatnonzero(ends > begins)

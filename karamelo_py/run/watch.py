@@ -180,7 +180,8 @@ def change_of_energy(simulation: Any) -> dict[str, str]:
     if not clock.watch_energy or clock.looks <= FEW:
         return {}
     mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
-    share = 100 * (mean - clock.first_few) / unit_of(clock)
+    # Not from `first_few`, which `forget_growth` changes.
+    share = 100 * (mean - clock.first_balance) / unit_of(clock)
     words = "since the start (kinetic + stored + dissipated - work, at one time)"
     return {"energy": f"{share:+.2f} % {words}"}
 

@@ -37,7 +37,7 @@ def read_script(path: Path) -> str:
         data = path.read_bytes()
     except FileNotFoundError:
         parent = path.parent
-        close = difflib.get_close_matches(path.name, scripts_in(parent), n=1)
+        close = difflib.get_close_matches(path.name, scripts_in(parent), n=1, cutoff=0.7)
         raise ScriptError(
             f"there is no file {path}"
             if parent.is_dir()

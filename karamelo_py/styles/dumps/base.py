@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from karamelo_py.language.signature import OutputFile
+from karamelo_py.output.log import begins_anew
 from karamelo_py.output.rhythm import Every, Rhythmic
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place
@@ -59,10 +60,7 @@ class Dump(Rhythmic):
 
     def warn_of_absence(self) -> None:
         """Tell that a file to go on in is not as the run left it that is gone on from."""
-        self.hub.warn(
-            f"{self.path()} is not as the run left it that is gone on from: it begins anew",
-            place=self.place,
-        )
+        self.hub.warn(begins_anew(self.path()), place=self.place)
 
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
         """Warn of columns that are 0 because no point or node (`what`) keeps them."""
