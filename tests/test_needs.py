@@ -129,7 +129,7 @@ IN_KERNEL = {
     "PlaneStrain", "Grid", "Linear", "FLIP", "Updated", "Serial",
     # that it has no more: heat, contact, fixes at every step, other processes
     "Insulated", "NoContact", "NoHooks", "FixedFrame", "Alone",
-    # what is done at points and nodes in the two visits of musl: four points at once, eight where they strain
+    # what is done at points and nodes in the two visits of musl: four points at once, or eight
     "OldWeights", "PresentWeights", "Strain", "Move", "MassMomentum", "MomentumAgain",
     "InternalForce", "Update", "MomentumToVelocity", "Eights", "Fours",
     "PointByPoint", "Stencil",
