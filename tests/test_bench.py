@@ -50,8 +50,15 @@ def compiled(name):
     return state.places, state.v
 
 
-# Neither they nor their like are compiled by other tests.
-@pytest.mark.parametrize("name", ["disks-320-mls-single", "disks-320-q4", "block-3d-quadratic"])
+# Neither they nor their like are compiled by other tests; all are run interpreted.
+@pytest.mark.parametrize(
+    "name",
+    [
+        "disks-320-mls-single",
+        pytest.param("disks-320-q4", marks=pytest.mark.full),
+        pytest.param("block-3d-quadratic", marks=pytest.mark.full),
+    ],
+)
 def test_scenes_are_compiled(name):
     """Nothing pulls at the bodies: their momentum stays."""
     _, v = compiled(name)

@@ -331,6 +331,7 @@ def test_the_reference_is_written_for_every_style(tmp_path):
     assert inspect.getdoc(reference_pages)
 
 
+@pytest.mark.full  # .ci/run builds it, too
 def test_the_site_builds_without_warnings(tmp_path):
     for module in ("sphinx", "myst_nb", "ipykernel"):
         pytest.importorskip(module)
