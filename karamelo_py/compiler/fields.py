@@ -123,20 +123,23 @@ def rows_of_points(
 
     `room` (k,) is used where it is long enough: `length_of_rows`.
     """
-    *rows, count = shape
-    size = np.dtype(dtype).itemsize
-    stride = (-(-count * size // LINE) | 1) * LINE // size
     if room is None:
         room = np.empty(length_of_rows(shape, dtype), dtype)
-    first = -room.ctypes.data % LINE // size
+    *rows, count = shape
+    stride = _distance_of_rows(count, dtype)
+    first = -room.ctypes.data % LINE // room.itemsize
     return room[first : first + prod(rows) * stride].reshape(*rows, stride)[..., :count]
 
 
 def length_of_rows(shape: tuple[int, ...], dtype: type) -> int:
     """Of the memory that `rows_of_points` of this shape takes, in numbers."""
     *rows, count = shape
+    return prod(rows) * _distance_of_rows(count, dtype) + LINE // np.dtype(dtype).itemsize
+
+
+def _distance_of_rows(count: int, dtype: type) -> int:
     line = LINE // np.dtype(dtype).itemsize
-    return (prod(rows) * (-(-count // line) | 1) + 1) * line
+    return (-(-count // line) | 1) * line
 
 
 def as_rows_of_points(array: np.ndarray) -> np.ndarray:

@@ -51,9 +51,11 @@ def _without_moments(part, w):
 
 for _part in (AverageStress, SeriesTerm, Volumes, SeriesBack):
     by_corners.on(_part)(_always)
-for _part in (Move, Strain, SecondStrain, StrainInMove, TrialStrain, InternalForce, AveragedForce):
+for _part in (
+    Move, Strain, SecondStrain, StrainInMove, TrialStrain, InternalForce, AveragedForce,
+    MomentumAgain,
+):  # fmt: skip
     by_corners.on(_part)(_without_moments)
-by_corners.on(MomentumAgain)(_without_moments)
 
 
 @by_corners.on(MassMomentum)

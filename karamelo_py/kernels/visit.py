@@ -72,7 +72,7 @@ def ask_ahead(w, p, like):
             (w.places.x, w.kin.dimension),
             (w.points.v, w.kin.dimension),
             (field(w.points.fields, Moment), len(moment)),
-            (w.points.state, len(state_of(w, law_of(w, p), p, like))),
+            (w.points.state, len(initial_state(law_of(w, p), w.kin, like))),
         )
         for array, count in rows:
             for k in range(count):

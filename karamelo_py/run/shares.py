@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.fields import as_rows_of_points, length_of_rows, rows_of_points
+from karamelo_py.compiler.fields import length_of_rows, rows_of_points
 from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, made_of
 from karamelo_py.run.bisection import bisected
 from karamelo_py.run.boxes import Boxes, Reached, between, extents, ragged, rows_of, steps_of
@@ -357,9 +357,9 @@ def occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:
     return tiling.number[:count], np.diff(tiling.range[:count], axis=1)[:, 0]
 
 
-def sized(points: Points, count: int) -> Points:
-    """Points of the kind of `points`, so many: these, where they are as many already."""
-    if points.mass.size == count:
+def sized(points: Points, count: int, *, anew: bool = False) -> Points:
+    """Points of the kind of `points`, so many: these, where they are as many, if not `anew`."""
+    if points.mass.size == count and not anew:
         return points
     shapes = [((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
     empty = [rows_of_points(*shape) for shape in shapes]
@@ -368,8 +368,10 @@ def sized(points: Points, count: int) -> Points:
 
 def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
     """Points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
-    found = [np.concatenate(same, axis=-1) for same in zip(*parts, strict=True)]
-    return made_of(points, map(as_rows_of_points, found))
+    made = sized(points, sum(part[0].shape[-1] for part in parts), anew=True)
+    for (_, array), same in zip(arrays_of(made), zip(*parts, strict=True), strict=True):
+        np.concatenate(same, axis=-1, out=array)
+    return made
 
 
 def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:

@@ -144,12 +144,14 @@ def _of_present(p, value):
     return None
 
 
-def pointer_to(context, builder, kind, array, indices):
+def pointer_to(context, builder, kind, array, indices, last=None):
+    """Address of an item of an array; `last`, if it is known, is the stride of the last index."""
     made = context.make_array(kind)(context, builder, array)
+    strides = cgutils.unpack_tuple(builder, made.strides)
+    strides = strides if last is None else [*strides[:-1], last]
     return cgutils.get_item_pointer2(
-        context, builder, made.data, cgutils.unpack_tuple(builder, made.shape),
-        cgutils.unpack_tuple(builder, made.strides), kind.layout, indices,
-        wraparound=False, boundscheck=False,
+        context, builder, made.data, cgutils.unpack_tuple(builder, made.shape), strides,
+        kind.layout, indices, wraparound=False, boundscheck=False,
     )  # fmt: skip
 
 
@@ -252,15 +254,10 @@ def _points_at(context, builder, array, at, arguments):
         context.cast(builder, value, kind, types.intp)
         for kind, value in zip(kinds[:-1], values[:-1], strict=True)
     ]
-    made = context.make_array(array)(context, builder, arguments[0])
-    strides = cgutils.unpack_tuple(builder, made.strides)
     # Points lie one after another in each row, however far the rows are apart.
-    strides[-1] = ir.Constant(strides[-1].type, array.dtype.bitwidth // 8)
-    pointer = cgutils.get_item_pointer2(
-        context, builder, made.data, cgutils.unpack_tuple(builder, made.shape), strides,
-        array.layout, [*rest, first], wraparound=False, boundscheck=False,
-    )  # fmt: skip
-    return pointer, values[-1]
+    size = ir.Constant(I64, array.dtype.bitwidth // 8)
+    found = pointer_to(context, builder, array, arguments[0], [*rest, first], size)
+    return found, values[-1]
 
 
 @intrinsic
