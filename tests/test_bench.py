@@ -2,13 +2,15 @@
 
 import json
 import re
+import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from karamelo_py.app.bench import measure, record, scaling
+from karamelo_py.app.bench import apart, measure, record, scaling
 from karamelo_py.app.bench.measure import Measured
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.cli import main
@@ -146,8 +148,8 @@ def faked(tmp_path, monkeypatch):
     """The command without its measuring."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
-    monkeypatch.setattr(measure, "build", lambda *_: None)
-    monkeypatch.setattr(measure, "measured", lambda *_: fake())
+    for name in ("measured", "measured_apart"):
+        monkeypatch.setattr(apart, name, lambda part: fake())
     return tmp_path
 
 
@@ -207,6 +209,78 @@ def test_the_commit_is_that_of_the_repository():
     except (OSError, subprocess.CalledProcessError):
         pytest.skip("there is no repository here")
     assert record.commit() in (head, head + "-dirty")
+
+
+# --- several workloads ----------------------------------------------------------------------------
+
+TWO = ["bench", "disks-20", "disks-80", "--seconds", "0.01", "-var", "N"]
+
+
+@pytest.mark.xdist_group("disks")
+def test_each_of_several_workloads_has_a_process(tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
+    monkeypatch.setattr(measure, "build", None)  # not in this one
+    assert main([*TWO, "10", "-o", "a.json"]) == 0
+    out, err = capfd.readouterr()
+    assert out.count("; 104 points\n") == 2 and not err
+    found = json.loads((tmp_path / "a.json").read_text("utf-8"))
+    assert found["triad"] == 2e10 and list(found["workloads"]) == ["disks-20", "disks-80"]
+    assert all(
+        len(one["speeds"]) == 5 and one["variables"] == {"N": "10"} and one["sweeps_of_points"]
+        for one in found["workloads"].values()
+    )
+    assert main([*TWO, "0"]) == 1
+    out, err = capfd.readouterr()
+    assert "points" not in out and err.startswith("bench:") and err.count("error: ") == 1
+    assert "h = 1/N" in err and "Traceback" not in err
+
+
+@pytest.mark.xdist_group("disks")
+def test_the_process_of_a_workload_ends_with_bench():
+    """Also where that is killed, and can tell nobody."""
+    part = apart.Part("disks-320", 1, {}, 600.0, 1e9, False)
+    with subprocess.Popen(
+        apart.COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.communicate(json.dumps(part).encode() + b"\n") == (b"", b"")
+    assert process.returncode == 0
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="there are no such signals here")
+def test_a_process_that_somebody_ends(capfd, monkeypatch):
+    monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
+    ended = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
+    monkeypatch.setattr(apart, "COMMAND", (sys.executable, "-c", ended))
+    assert main([*TWO, "10"]) == 1
+    err = capfd.readouterr().err
+    assert err == "error: disks-20 could not be measured: its process was ended by SIGKILL\n"
+
+
+def test_an_interrupt_ends_the_process_of_a_workload(capfd, monkeypatch):
+    """Ctrl-C comes to the one process that waits."""
+    begun = []
+
+    class Interrupted(subprocess.Popen):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options)
+            begun.append(self)
+            self.stdout.close()
+            self.stdout = self
+
+        def read(self):
+            raise KeyboardInterrupt
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
+    monkeypatch.setattr(apart, "COMMAND", (sys.executable, "-c", "import time; time.sleep(600)"))
+    monkeypatch.setattr(apart.subprocess, "Popen", Interrupted)
+    monkeypatch.setattr(record, "commit", lambda: None)  # of which another process tells
+    assert main([*TWO, "10"]) == 130
+    assert capfd.readouterr().err == "error: interrupted\n"
+    assert len(begun) == 1 and begun[0].returncode not in (0, None)
 
 
 # --- several processes ----------------------------------------------------------------------------

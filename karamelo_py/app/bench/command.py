@@ -5,14 +5,16 @@ this command, since machines are shared and their clocks change.
 """
 
 import re
+import sys
 from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.app.bench import measure, record, scaling
+from karamelo_py.app.bench import apart, measure, record, scaling
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.options import above_zero, add_variables, threads_option
 from karamelo_py.app.studies.options import out_file
+from karamelo_py.app.together import Outcome
 from karamelo_py.script.errors import ScriptError, unknown
 
 ELSEWHERE = "published, one core of another machine, a small AMD EPYC"
@@ -26,7 +28,7 @@ def add_parser(subparsers: Any) -> None:
         description=f"""\
 Measure the speed of this machine on known scenes, all or those that are named: particle-steps per
 second of the fastest of five repetitions, bytes per particle, the time of each stage of a step, and
-what limits it: memory, arithmetic, nodes or overhead.
+what limits it: memory, arithmetic, nodes or overhead. Each of several has a process of its own.
 
 workloads:
 {chr(10).join(f"  {name:<{width}}  {w.title}" for name, w in WORKLOADS.items())}""",
@@ -89,8 +91,12 @@ def measure_all(options: Namespace) -> int:
                 print(scaling.line(row, rows[0]), flush=True)
             found["workloads"][name] = record.scaled(rows, workload.title, presets)
         else:
-            simulation = measure.build(workload, threads, presets)
-            one = measure.measured(simulation, options.seconds, triad, workload.lead)
+            act = apart.measured_apart if len(chosen) > 1 else apart.measured
+            one = act(apart.Part(name, threads, presets, options.seconds, triad, options.debug))
+            if isinstance(one, Outcome):
+                sys.stdout.flush()
+                print(one.text, file=sys.stderr, flush=True)
+                return one.status
             _print(name, one, published=not presets)
             found["workloads"][name] = record.entry(one, workload.title, presets)
         if out:
