@@ -67,6 +67,9 @@ def test_points_made_later_are_no_members():
     ids = np.array([47, 31, 0, 32])
     assert kept.has(ids).tolist() == [False, True, True, False] and everyone.has(ids).all()
     assert len(kept) == 32 and len(everyone) == 48
+    for some in (kept, everyone):
+        bits = np.unpackbits(some.bits(70), bitorder="little")
+        assert len(bits) == 128 and np.flatnonzero(bits[:48]).tolist() == some.ids.tolist()
     assert [kept.touches(solid) for solid in hub.solids.values()] == [True, True, False]
 
 

@@ -8,6 +8,7 @@ from math import inf
 import numpy as np
 import pytest
 
+from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.sizes import PAGE, bytes_in, nodes_in_use
@@ -87,6 +88,60 @@ def test_fast_points_give_to_their_boxes(state_interpreted, kind):
     assert np.abs(straight["x"] - by_boxes["x"]).max() < share
     assert np.abs(straight["v"] - by_boxes["v"]).max() < 100 * share
     assert by_boxes["nodal mass"] == pytest.approx(straight["nodal mass"], rel=share)
+
+
+LEAPING = """
+method({method})
+scheme({scheme})
+dimension(2, 0, 4, 0, 3, 0.1)
+region(low, block, 0.2, 0.5, 0.2, 0.4)
+region(high, block, 3.4, 3.7, 2.5, 2.8)
+material(m, neo-hookean, 2, 100, 0.3)
+solid(low, region, low, 2, m, 0.1, 0)
+solid(high, region, high, 2, m, 0.1, 0)
+group(low, particles, region, low, solid, low)
+group(high, particles, region, high, solid, high)
+fix(v1, initial_velocity_particles, low, 70, 20)
+fix(v2, initial_velocity_particles, high, -85, -5)
+fix(leap, python, low, leaps.leap, {moment})
+fix(weight, python, all, leaps.push, initial_integrate)
+set_dt(0.001)
+set_output(1000)
+run(6)
+"""
+LEAPS = """
+def leap(points):
+    points.position[:] += {by}
+
+def push(points):
+    points.force[:] += points.mass[:, None] * points.velocity
+"""
+
+
+@pytest.mark.parametrize("moment", POINT_STAGES)
+@pytest.mark.parametrize("method, scheme", [
+    ("ulmpm, FLIP, linear, 1", "musl"), ("ulmpm, MLS, quadratic-spline", "usl"),
+    ("ulmpm, APIC, cubic-spline", "usavg"), ("ulcpdi, FLIP, linear, 1, Q4", "usf"),
+])  # fmt: skip
+def test_points_that_python_moves_in_a_step_are_sorted(
+    state_interpreted, tmp_path, method, scheme, moment
+):
+    """Beyond their boxes, by three cells a step where it begins and ends, between as far as points
+    may go. Forces that grow as speeds act on all alike: dv/dt = v, and bodies stay rigid.
+    """
+    by = (0.31, 0.17) if moment.endswith("integrate") else (0.025, 0.075)
+    (tmp_path / "leaps.py").write_text(LEAPS.format(by=by))
+    script = LEAPING.format(method=method, scheme=scheme, moment=moment)
+    before, after = (
+        state_interpreted(script.replace("run(6)", end), boxes=True) for end in ("run(0)", "run(6)")
+    )
+    low = (before["x"][:, 0] < 2)[:, None]
+    v = np.where(low, [70, 20], [-85, -5])
+    factors = 1.001 ** np.arange(1, 7)  # of speeds, after each step
+    moved = 0.001 * factors.sum() * v + np.where(low, 6 * np.array(by), 0)
+    assert (after["x"] - before["x"])[:, :2] == pytest.approx(moved, abs=1e-12)
+    assert after["v"] == pytest.approx(factors[-1] * v, rel=1e-11)
+    assert after["nodal mass"] == pytest.approx(2 * 0.15, rel=1e-12)
 
 
 DISK = """

@@ -131,8 +131,11 @@ class ParticleGroup(Group):
 
     def bits(self, count: int) -> np.ndarray:
         """Whether each of `count` points is a member, one bit each, as bytes of whole words."""
-        found = np.zeros(-(-count // 64) * 8, np.uint8)
-        own = self._bits[: len(found)]
+        size = -(-count // 64) * 8
+        if self.all:
+            return np.full(size, 255, np.uint8)
+        found = np.zeros(size, np.uint8)
+        own = self._bits[:size]
         found[: len(own)] = own
         return found
 
