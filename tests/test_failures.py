@@ -86,7 +86,7 @@ def test_the_last_good_state_is_written_once(run_interpreted, tmp_path):
     lines = ("fix(v, initial_velocity_particles, all, 10)", "set_dt(0.001)")
     script = block(1, *lines, *OUTPUT, "restart(40, r.*.h5)", "run(200)")
     result = run_interpreted(script, folder="a", status=1)
-    assert "last_good.62.h5; karamelo-py SCRIPT -restart" in result.err
+    assert "last_good.62.h5; karamelo-py SCRIPT -restart last_good.62.h5 goes on" in result.err
     assert {path.name for path in result.folder.glob("*.h5")} == {"last_good.62.h5", "r.40.h5"}
     (result.folder / "last_good.62.h5").write_text("mine")
     again = run_interpreted(script, folder="a", status=1)
@@ -220,6 +220,14 @@ def test_the_last_good_state_is_nearest_to_where_energy_began_to_grow(run_interp
     assert good.name == "last_good.31.h5"
     with h5py.File(good) as file:
         assert file["state/points/0/v"][:] == pytest.approx(1, rel=1e-12)
+    # What the hint says of the file: the step may be another, nothing else helps.
+    assert "last_good.31.h5 goes on from there with another step" in result.err
+    again = run_interpreted(script, "-restart", good.name, status=1)
+    assert again.err.split("error: ")[1] == result.err.split("error: ")[1]
+    basis = script.replace("linear, 1", "quadratic-spline, 1")
+    assert "another script" in run_interpreted(basis, "-restart", good.name, status=1).err
+    smaller = script.replace("set_dt(0.016)", "set_dt(0.006)").replace("run(1000)", "run(150)")
+    assert "error" not in run_interpreted(smaller, "-restart", good.name).err
 
 
 # The clock is told that energy has grown: a scene in which it does, and fails, takes thousands.

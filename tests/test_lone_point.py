@@ -1,5 +1,6 @@
 """A point that has its nodes for itself and keeps a moment: an oscillator of c sqrt(d / D)."""
 
+import re
 from math import sqrt
 
 import pytest
@@ -42,3 +43,16 @@ def test_above_the_limit_it_does_not(run_interpreted):
     script = SCRIPT.replace("TRANSFER", "MLS").replace("STEP", f"set_dt({0.85 * 0.1 / C})")
     done = run_interpreted(script, status=1)
     assert "come from nowhere" in done.err and done.log["Es"].max() > 1000 * done.log["Es"][1]
+
+
+@pytest.mark.parametrize("scheme, borne", [("musl", 0.9 * 2 / sqrt(8)), ("usl", 0.4)])
+def test_the_step_is_named_as_the_cause(run_interpreted, scheme, borne):
+    """Also where the point swells, and the present limit is above the step: h/c of that is large.
+
+    At 0.85 h/c, above what a lone point bears (0.9 of its limit) and usl with one point a cell.
+    """
+    script = SCRIPT.replace("TRANSFER", "MLS").replace("STEP", f"set_dt({0.85 * 0.1 / C})")
+    done = run_interpreted(f"scheme({scheme})\n{script}", status=1)
+    cause = re.search(r"Known to do that here: the step is ([\d.]+) times the stable one", done.err)
+    assert float(cause[1]) == pytest.approx(0.85 / borne, rel=0.01)
+    assert f"hint: set_dt({0.9 * borne * 0.1 / C:.3g}) or less" in done.err

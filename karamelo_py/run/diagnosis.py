@@ -23,6 +23,10 @@ from karamelo_py.scene.solid import named, solid_with
 from karamelo_py.script.errors import Place, ScriptError
 
 LAST_GOOD = "last_good.*.h5"
+GOES_ON = (
+    "karamelo-py SCRIPT -restart {} goes on from there with another step (set_dt, dt_factor): as "
+    "it is, it would end here again, and whatever else is changed is for the whole run"
+)
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
 
@@ -87,7 +91,7 @@ def stop(
     if path is not None:
         name = os.path.relpath(path)
         which = "The state from before energy grew" if grown else "The last good state"
-        hint += f". {which} is in {name}; karamelo-py SCRIPT -restart {name} goes on"
+        hint += f". {which} is in {name}; {GOES_ON.format(name)}"
     error = ScriptError(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error

@@ -14,7 +14,14 @@ from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run.foreseen import Foreseen
 from karamelo_py.run.lowering import warms_by_friction
 from karamelo_py.run.noise import noises
-from karamelo_py.run.stable import USUAL, keeping_share, sparse
+from karamelo_py.run.stable import (
+    USUAL,
+    elastic_speed,
+    keeping_share,
+    lone_point,
+    own_step_of_waves,
+    sparse,
+)
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.fixes.pairs import PairContact
 from karamelo_py.styles.fixes.velocity_particles import VelocityParticles
@@ -73,6 +80,15 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             f"the step is {share:.3g} times the stable one",
             "leave set_dt and dt_factor out, or make them smaller",
         )
+    courant, _ = own_step_of_waves(hub, still=False)
+    borne = courant * _time_across(hub, simulation)
+    if update.fixed_dt is not None and simulation.dt > borne * (1 + 1e-9):
+        alone = " of a point that has its nodes for itself" * (courant == lone_point(hub))
+        return (
+            f"the step is {simulation.dt / borne:.3g} times the stable one{alone} when nothing has "
+            f"moved yet, {borne:.4g}",
+            f"set_dt({USUAL * borne:.3g}) or less, or leave set_dt out",
+        )
     if moves and jumps and update.transfer.inverts_spread:
         return f"{transfer} with {functions} in the updated frame", f"FLIP, or {smooth}"
     if moves and jumps and transfer == "TPIC":
@@ -108,6 +124,15 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     if share > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
         return "a step that is too large", f"{_step_of(hub, simulation, 0.3)} or less"
     return "no cause that is known to do that", "another basis, transfer or scheme to compare with"
+
+
+def _time_across(hub: Hub, simulation: Any) -> float:
+    """What waves take across a cell in bodies that nothing has deformed: later they may be softer.
+
+    Infinite where all are rigid.
+    """
+    fastest = max(elastic_speed(simulation, solid)[0] for solid in hub.solids.values())
+    return float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
 
 
 def _step_of(hub: Hub, simulation: Any, share: float) -> str:
