@@ -150,6 +150,7 @@ COMMANDS = [
     ("axisymmetric(yes)", 14, "true or false"),
     ("run(1.5)", 5, "whole number"),
     ("run(-1)", 5, "at least 0"),
+    ("nsteps = 3\nrun(timesteps)", 5, "that is one (nsteps)\nhint: did you mean 'nsteps'?"),
     ("set_dt(0)", 8, "above 0"),
     ("group(g, node, region, b, all)", 10, "did you mean 'nodes'?"),
     ("group(g, nodes region, b, all)", 10, "is a comma missing"),

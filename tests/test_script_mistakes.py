@@ -107,6 +107,10 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("units(lj)", "units(m, kg, s)"),
         ("units(kg, m, s)", "swap kg and m: length m, mass kg"),
         ("a = Es", "compute(Es, strain_energy, all)"),
+        ("run(steps)", "set it first: steps = ..."),
+        ("run_time(2*tim)", "set it first: tim = ..."),
+        ("run_time(2*Pi)", "did you mean 'PI'?"),
+        ('run("100")', "numbers stand without quotes: 100"),
     ],
 )
 def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):

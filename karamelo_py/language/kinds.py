@@ -16,7 +16,7 @@ from karamelo_py.language.arguments import NULL, NUMBER, Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import Place, ScriptError, meant
 from karamelo_py.script.expressions import Expression, Value
-from karamelo_py.script.functions import WORDS
+from karamelo_py.script.functions import CONSTANTS, WORDS
 from karamelo_py.script.terms import number_text
 
 # Beyond it a number cannot tell one integer from the next.
@@ -181,17 +181,37 @@ def _shown(value: Value) -> str:
 def _to_number(hub: Any, argument: Argument) -> float:
     if argument.text.lstrip("+-") in WORDS and argument.text not in argument._interpreter.variables:
         raise Unfit(argument.text)
-    value = argument.value(hub)
+    try:
+        value = argument.value(hub)
+    except ScriptError as error:
+        _suggest_numbers(argument, error)
+        raise
     if isinstance(value, Expression):
         raise Unfit(
             f"a formula of {', '.join(sorted(value.names))}",
             hint=f"value({argument.text}) is its present value",
         )
     if isinstance(value, str):
-        raise Unfit(_shown(value))
+        number = value.strip()
+        hint = f"numbers stand without quotes: {number}" if NUMBER.fullmatch(number) else None
+        raise Unfit(_shown(value), hint=hint)
     if math.isnan(value) and not getattr(hub, "rehearsing", False):
         raise Unfit("NaN, which is not a number")
     return value
+
+
+def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
+    """Where a name is unknown: mean no other that changes in a run, which is no number here."""
+    name = re.fullmatch(r"unknown name '(\w+)'", error.message)
+    close = re.fullmatch(r"did you mean '(\w+)'\?", error.hint or "")
+    if not (name and close) or close[1] in CONSTANTS or "value" in argument.text:
+        return
+    variables = argument._interpreter.variables
+    if not isinstance(variables.get(close[1]), float):
+        numbers = [n for n, value in variables.items() if isinstance(value, float)]
+        known = ", ".join(numbers) or "none so far"
+        error.expected = f"a number, or a variable that is one ({known})"
+        error.hint = meant(name[1], numbers) or f"set it first: {name[1]} = ..."
 
 
 def _to_integer(hub: Any, argument: Argument) -> int:
