@@ -284,6 +284,16 @@ def test_what_is_measured_and_shown_nowhere(advice):
     assert "name Ek in log_modify" in said and "Es" not in said
 
 
+def test_groups_that_nothing_uses(advice):
+    """The name stands in no other command, and in no text."""
+    made = [f"group({name}, particles, region, box, all)" for name in ("top", "end", "far")]
+    used = ['part = "end"', "compute(Ek, kinetic_energy, far)", "log_modify(custom, step, Ek)"]
+    assert (
+        advice(plane(more="\n".join([*made, *used])))
+        == "group top is used by nothing / leave it out, or name it in a fix"
+    )
+
+
 METAL = """
 eos(bulk, linear, 1, 100)
 strength(hard, {strength})

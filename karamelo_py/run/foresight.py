@@ -23,6 +23,7 @@ from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.foreseen import Foreseen
+from karamelo_py.run.idle import warn_about_rest
 from karamelo_py.run.large_steps import duration_of_later, warn_about_steps
 from karamelo_py.run.noise import ELASTIC, noises
 from karamelo_py.run.simulation import Simulation
@@ -272,6 +273,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     warn_about_steps(hub, simulation, halves)
     _warn_about_precision(scene)
     warn_about_velocities(hub, simulation)
+    warn_about_rest(hub, simulation, duration)
     for rule in RULES:
         for failure in rule(scene):
             if failure.name not in hub.update.foreseen:

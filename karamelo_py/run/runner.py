@@ -11,6 +11,7 @@ import numpy as np
 from karamelo_py.kernels.step import DONE, STOPPED
 from karamelo_py.run import diagnosis, foresight, large_steps, restart
 from karamelo_py.run.crew import heeding
+from karamelo_py.run.idle import warn_about_length
 from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
@@ -86,6 +87,7 @@ class Runner:
         if hub.checking:
             report(hub, self.end_time)
             foresight.warn(hub, hub.simulation, self.duration, self.halve)
+            warn_about_length(hub, hub.simulation, self.end_time)
             raise Quit
         replay = hub.interpreter.replay
         if replay is not None and not replay.at_end:
@@ -162,6 +164,7 @@ class Runner:
         else:
             simulation.begin(self.end_time)
             foresight.warn(hub, simulation, self.duration, self.halve)
+            warn_about_length(hub, simulation, self.end_time)
         simulation.compile()
         began = simulation.step
         self._banner(simulation, going_on)

@@ -39,7 +39,7 @@ class Saving(NamedTuple):
 
 def savings(hub: Hub, simulation: Any) -> list[Saving]:
     """All that is known to be paid for without need, before anything has run."""
-    rules = (_step, _unread, _idle_parts, _averaging, _flat, _round, _basis, _points)
+    rules = (_step, _unread, _unused, _idle_parts, _averaging, _flat, _round, _basis, _points)
     return [saving for rule in rules for saving in rule(hub, simulation)]
 
 
@@ -83,6 +83,17 @@ def _unread(hub: Hub, simulation: Any) -> Iterator[Saving]:
                     f"{kind} {ID} ({item.style}) is measured at each output and shown nowhere",
                     f"leave it out, or name {_published(ID, item)} in log_modify",
                 )
+
+
+def _unused(hub: Hub, simulation: Any) -> Iterator[Saving]:
+    """Groups whose names stand nowhere but where they are made."""
+    text = _script(hub)
+    if re.search(r"\binclude\s*\(", text):
+        return  # who knows what stands there
+    for ID in hub.groups:
+        made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
+        if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
+            yield Saving(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
 
 
 def _published(ID: str, item: Any) -> str:

@@ -1,0 +1,62 @@
+"""Runs in which nothing happens, or that hardly end: told before them, where that is certain."""
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.output.fields import COMPONENTS, Fields
+from karamelo_py.points.laws import can, constrained_velocity, law_kind
+from karamelo_py.run.stable import elastic_speed
+from karamelo_py.scene.hub import Hub
+
+LOOK = 100  # steps: shorter runs look at a scene
+ENDLESS = 1e8  # steps
+REST = "a scene at rest"
+
+
+def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
+    """Say so, once, where nothing can move in a run of `duration`."""
+    told = hub.update.foreseen
+    if REST in told or duration < LOOK * simulation.dt or not _rests(hub, simulation):
+        return
+    told.append(REST)
+    hub.warn(
+        "nothing moves in this run: no point has a velocity or a stress, and no fix acts",
+        hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another load, "
+        "in front of it",
+    )
+
+
+def _rests(hub: Hub, simulation: Any) -> bool:
+    """Whether nothing can move, as far as the parts of this program go: others may do anything."""
+    laws = [solid.material.law for solid in hub.solids.values()]
+    own = all(kind.__module__.startswith("karamelo_py.") for law in laws for kind in law_kind(law))
+    acting = any(fix.hooks() or fix.for_method for fix in hub.fixes.values())
+    if (
+        acting
+        or not own
+        or hub.update.thermal
+        or any(can(law, constrained_velocity) for law in laws)
+    ):
+        return False
+    return simulation.fastest() == 0 and simulation.largest(_stress)[0] == 0
+
+
+def _stress(points: Fields) -> np.ndarray:
+    return np.max([np.abs(points.particle("s" + c)) for c in COMPONENTS], axis=0)
+
+
+def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
+    """Say so where a run to `end_time` takes more steps than anybody waits for."""
+    span = end_time - simulation.time
+    if not (isfinite(span) and span > ENDLESS * simulation.dt > 0):
+        return
+    c = max(elastic_speed(simulation, solid)[0] for solid in hub.solids.values())
+    hub.warn(
+        f"about {span / simulation.dt:.2g} steps of {simulation.dt:.3g} from here to time "
+        f"{end_time:.6g}: waves move at {c:.3g} through cells of {hub.domain.h:g}. The units of "
+        "densities, moduli, lengths and times may be mixed",
+        hint="in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and "
+        "2e5 (MPa)",
+    )

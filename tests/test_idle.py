@@ -1,0 +1,48 @@
+"""Runs in which nothing happens, or that hardly end, are told before them."""
+
+import re
+
+import pytest
+from scenes import block
+
+RESTS = "nothing moves in this run"
+GAS = "eos(e, ideal-gas, 1, 1.4, p=1)\nstrength(f, fluid, 0)\nmaterial(rubber, eos-strength, e, f)"
+
+
+def test_a_run_at_rest_is_told_once(run_interpreted):
+    """Walls that hold nodes act; what only measures does not, and short runs look at a scene."""
+    quiet = ("compute(Ek, kinetic_energy, all)", "fix(E, kinetic_energy, all)")
+    said = run_interpreted(block(2, *quiet, "run(99)", "run(100)", "run_until(time > 1)")).err
+    assert said.count(RESTS) == 1 and "run(100)" in said
+    assert RESTS in run_interpreted(block(2, "run_time(9)"), command="check").err
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ("fix(g, body_force, all, 0, -1e-9)", "run(100)"),
+        ("fix(v, initial_velocity_particles, all, 1e-9, 0)", "run(100)"),
+        ("fix(s, initial_stress, all, 1e-9, 0, 0, 0, 0, 0)", "run(100)"),
+        ("run(99)", "fix(v, initial_velocity_particles, all, 1e-9, 0)", "run(100)"),
+    ],
+)
+def test_what_may_move_is_not(run_interpreted, lines):
+    assert RESTS not in run_interpreted(block(2, *lines), command="check").err
+    assert RESTS not in run_interpreted(block(2, *lines)).err
+
+
+def test_a_gas_is_not_at_rest(run_interpreted):
+    script = re.sub(r"material\(.*\)", GAS, block(2, "run(100)"))
+    assert RESTS not in run_interpreted(script, command="check").err
+
+
+def test_a_run_that_hardly_ends_says_how_many_steps(run_interpreted):
+    """Water of 1e-9 t/mm^3 in a scene in m and Pa: c = sqrt(K/rho), by 0.9 h/(c + v) at rest."""
+    lines = ("fix(v, initial_velocity_particles, all, 10, 0)", "set_dt(0.001)", "run_time(1.1e5)")
+    said = run_interpreted(block(2, *lines), status=1).err
+    assert "about 1.1e+08 steps of 0.001 from here to time 110000: waves move at" in said
+    assert said.index("may be mixed") < said.index("leaves the domain")
+    short = block(2, *lines).replace("1.1e5", "0.9e5")
+    assert "may be mixed" not in run_interpreted(short, command="check").err
+    mixed = block(2, "run_time(1)").replace("2, 100", "1e-9, 1e9")
+    assert "may be mixed" in run_interpreted(mixed, command="check").err
