@@ -23,6 +23,16 @@ class Cut(NamedTuple):
     first: np.ndarray  # (g + 1,) number of the first
 
 
+class Sight(NamedTuple):
+    """Which nodes points see that may have gone `reach` cells."""
+
+    top: np.ndarray  # (g, d) the last node of each grid
+    per_cell: int
+    beyond: int  # nodes that are seen beyond those of a cell
+    least: int  # the node up to which points at a wall see, and from the other wall on
+    reach: float
+
+
 class Order(NamedTuple):
     """What is found where n points are sorted by threads, each of which has a part of them."""
 
@@ -144,6 +154,41 @@ def _order_in_tiles(kin, grids, basis, tiles, points, x, found, k):
             order[at] = p
 
 
+@shared
+def _seen(grid, sight, top, direction, at):
+    """The first and last nodes that a point may see along a direction."""
+    at = at if at > 0 else real(0, at)  # so written, NaN is 0 too
+    first = cell_of(grid, direction, at - sight.reach)
+    last = cell_of(grid, direction, at + sight.reach)
+    low = max(first * sight.per_cell - sight.beyond, 0)
+    high = min((last + 1) * sight.per_cell + sight.beyond, top[direction])
+    return min(low, top[direction] - sight.least), max(high, sight.least)
+
+
+@subkernel
+def _find_rows(kin, grids, sight, x, tiling, parts, k):
+    """`Tiling.rows` of the k-th part of the tiles, in space."""
+    grids, sight, tiling = at_hand(grids), at_hand(sight), at_hand(tiling)
+    rows, box = tiling.rows, tiling.box
+    count = tiling.count[0]
+    for t in range(count * k // parts, count * (k + 1) // parts):
+        g = tiling.grid[t]
+        grid = record(grids, g)
+        along, across = box[t, 5] - box[t, 2] + 1, box[t, 4] - box[t, 1] + 1
+        for r in range(rows.shape[1]):
+            rows[t, r, 0] = along
+            rows[t, r, 1] = -1
+        for p in range(tiling.range[t, 0], tiling.range[t, 1]):
+            top = sight.top[g, 0], sight.top[g, 1], sight.top[g, 2]
+            ends = [_seen(grid, sight, top, i, in_cells(grid, i, x[i, p])) for i in range(3)]
+            first, last = ends[2][0] - box[t, 2], ends[2][1] - box[t, 2]
+            for i in range(ends[0][0] - box[t, 0], ends[0][1] - box[t, 0] + 1):
+                for j in range(ends[1][0] - box[t, 1], ends[1][1] - box[t, 1] + 1):
+                    r = i * across + j
+                    rows[t, r, 0] = min(rows[t, r, 0], first)
+                    rows[t, r, 1] = max(rows[t, r, 1], last)
+
+
 @subkernel
 def _pick_columns(array, first, rows, order, room, parts, k):
     """Copy the k-th part of some rows of an array to `room`, in order."""
@@ -163,6 +208,7 @@ def _put_columns(array, first, rows, room, parts, k):
 _find_all_tiles = shared_out(_find_tiles, "kin, grids, tiles, x, of, ends, tile")
 _order_parts = shared_out(_order_part, "found")
 _order_in_all_tiles = shared_out(_order_in_tiles, "kin, grids, basis, tiles, points, x, found")
+_find_all_rows = shared_out(_find_rows, "kin, grids, sight, x, tiling, parts")
 _pick_all_columns = shared_out(_pick_columns, "array, first, rows, order, room, parts")
 _put_all_columns = shared_out(_put_columns, "array, first, rows, room, parts")
 
@@ -208,6 +254,12 @@ def sort_points(mode, kin, grids, basis, tiles, points, x, found, arrays):
 def find_tiles(mode, kin, grids, tiles, x, of, ends, tile):
     """The tile of each of some points at `x` (w, n), of the grids `of` (n,); `ends` is scratch."""
     _find_all_tiles(mode, ends.shape[0], kin, grids, tiles, x, of, ends, tile)
+
+
+@loop
+def find_rows(mode, kin, grids, sight, x, tiling, parts):
+    """What of each row of their boxes the sorted points at `x` (w, n) of each tile may reach."""
+    _find_all_rows(mode, parts, kin, grids, sight, x, tiling, parts)
 
 
 @loop

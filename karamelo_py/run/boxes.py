@@ -14,6 +14,7 @@ class Boxes(NamedTuple):
     grid: np.ndarray  # (b,)
     lo: np.ndarray  # (b, d) first nodes
     hi: np.ndarray  # (b, d) last nodes
+    rows: np.ndarray  # (b, r, 2) see `Tiling.rows`
 
 
 class Reached(NamedTuple):

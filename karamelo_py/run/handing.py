@@ -7,7 +7,7 @@ from karamelo_py.run.boxes import between
 from karamelo_py.run.shares import occupied
 from karamelo_py.run.tiles import one_after_another, shares_of
 
-ROWS = ("number", "range", "grid", "box")  # of a tiling
+ROWS = ("number", "range", "grid", "box", "rows")  # of a tiling
 
 
 def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:

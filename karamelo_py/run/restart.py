@@ -23,7 +23,7 @@ from karamelo_py.run.state import Stored
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-FORMAT, VERSION = "karamelo-py restart", 5
+FORMAT, VERSION = "karamelo-py restart", 6
 FLAT = {"track_times": False}
 
 

@@ -275,7 +275,7 @@ class SharedTiles(Tiles):
         )
         pieces = others[which]
         self._from, box = of[pieces], reached.box[pieces]
-        more = Boxes(boxes.order[box], boxes.grid[box], low, high)
+        more = Boxes(boxes.order[box], boxes.grid[box], low, high, boxes.rows[box])
         count = np.count_nonzero(self._of == me)
         found = Reached(*(array[np.append(own, pieces)] for array in reached))
         found.box[len(own) :] = count + np.arange(len(pieces))
@@ -347,7 +347,10 @@ def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:
 
 def nodes_of(tiling: Tiling) -> np.ndarray:
     """How many nodes the points of each occupied tile may reach."""
-    lo, hi = np.split(tiling.box[: tiling.count[0]], 2, axis=1)
+    count = tiling.count[0]
+    if tiling.rows.shape[1]:
+        return np.maximum(np.diff(tiling.rows[:count]) + 1, 0).sum(axis=(1, 2), dtype=np.int64)
+    lo, hi = np.split(tiling.box[:count], 2, axis=1)
     return np.prod(hi - lo + 1, axis=1)
 
 

@@ -21,7 +21,15 @@ from karamelo_py.kernels.arrays import (
     arrays_of,
 )
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.sorting import Cut, Order, find_tiles, sort_points, widest
+from karamelo_py.kernels.sorting import (
+    Cut,
+    Order,
+    Sight,
+    find_rows,
+    find_tiles,
+    sort_points,
+    widest,
+)
 from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.points.basis import shape_size
 from karamelo_py.run.boxes import (
@@ -108,7 +116,9 @@ class Tiles:
         # Points without a domain reach no further than two cells from those of their tile.
         widest = np.minimum((self.size + 4) * self.per_cell + 1 + 2 * self.beyond, self._nodes)
         most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
-        self._most_rows = inf if shape_size(type(basis), d) else most
+        shaped = shape_size(type(basis), d) > 0
+        self._most_rows = inf if shaped else most
+        self._across = int(np.prod(widest[:, :-1], axis=1).max()) if self._by_rows(shaped) else 0
         self.count = int(self.first[-1])
         self._cut = Cut(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
@@ -116,6 +126,13 @@ class Tiles:
         self._first_of_nodes = numbered(tiles)
         # Of all buffers of a scene: count, first and parts.
         self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
+
+    def _by_rows(self, shaped: bool) -> bool:
+        """Whether it is known of each row of a box what of it points may reach.
+
+        A row is a tile of nodes then. A bar that has spread at one end has few nodes there.
+        """
+        return self.long and not shaped and not self.direct
 
     def empty_tiling(self) -> Tiling:
         """Room for the tiles of a block."""
@@ -127,6 +144,7 @@ class Tiles:
             grid=np.zeros(self.count + 1, np.int64),
             number=np.zeros(self.count + 1, np.int64),
             box=np.zeros((self.count + 1, 2 * self.dimension), np.int64),
+            rows=np.zeros((self.count + 1, self._across, 2), np.int16),
             buffer=np.zeros((self.count + 1, 5), np.int64),
             report=np.zeros((self.count + 1, 10)),
         )
@@ -247,6 +265,9 @@ class Tiles:
         hi = (last + 1) * self.per_cell + self.beyond
         tiling.box[:count, : self.dimension] = np.clip(lo, 0, top - least)
         tiling.box[:count, self.dimension :] = np.clip(hi, least, top)
+        if self._across:
+            sight = Sight(self._nodes - 1, self.per_cell, self.beyond, least, reach)
+            find_rows(mode, s.kin, s.grids, sight, x, tiling, parts)
         return occupied
 
     def box_bytes(self, s: Setup) -> int:
@@ -363,7 +384,8 @@ class Tiles:
         d, tilings = self.dimension, [block.tiling for block in s.blocks]
         grid = np.concatenate([one.grid[: one.count[0]] for one in tilings])
         box = np.concatenate([one.box[: one.count[0]] for one in tilings])
-        return Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:])
+        rows = np.concatenate([one.rows[: one.count[0]] for one in tilings])
+        return Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:], rows)
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
         """What the boxes reach."""
@@ -376,6 +398,14 @@ class Tiles:
         tile = self._first_of_nodes[grid] + (places * self._tile_steps[grid]).sum(axis=1)
         begin = np.maximum(places * size, boxes.lo[box])
         end = np.minimum(places * size + size - 1, boxes.hi[box])
+        if self._across:
+            from_corner = places[:, :2] - boxes.lo[box, :2]
+            row = from_corner[:, 0] * (boxes.hi - boxes.lo + 1)[box, 1] + from_corner[:, 1]
+            first, last = (boxes.lo[box, 2:] + boxes.rows[box, row]).T
+            begin[:, 2] = np.maximum(begin[:, 2], first)
+            end[:, 2] = np.minimum(end[:, 2], last)
+            some = begin[:, 2] <= end[:, 2]
+            box, tile, begin, end = box[some], tile[some], begin[some], end[some]
         return boxes, Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
 
     def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
@@ -460,7 +490,7 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
     """Names of the arrays of a tiling that a sort changes, and how many rows are in use."""
     tiles = tiling.count[0]
     whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
-    return [*whole, *((name, tiles) for name in ("range", "grid", "number", "box"))]
+    return [*whole, *((name, tiles) for name in ("range", "grid", "number", "box", "rows"))]
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
