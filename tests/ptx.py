@@ -25,21 +25,19 @@ from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient,
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all
 from karamelo_py.kernels.rows import Insulated
+from karamelo_py.kernels.stencils import gather_nodes, scatter_nodes
 from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.sweep import (
     Context,
     OldWeights,
-    OneByOne,
     Visit,
-    gather_nodes,
     places_of,
     restencil,
-    scatter_nodes,
     work_of,
-    zero_of,
 )
 from karamelo_py.kernels.table import Sweep, fused, staged
 from karamelo_py.kernels.visit import place_at
+from karamelo_py.kernels.width import OneByOne, zero_of
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import locate

@@ -22,7 +22,7 @@ import numpy as np
 
 from karamelo_py.compiler import compile as compiling
 from karamelo_py.compiler.compile import SPELLED
-from karamelo_py.kernels import sums, sweep
+from karamelo_py.kernels import stencils, sums, sweep
 from karamelo_py.kernels.visit import Work
 
 AFTER = 300  # calls from which on it is worth to write a function down
@@ -560,10 +560,8 @@ def of_record(quantities: tuple, kin: tuple, nodes: tuple, n: int) -> tuple:
 
 
 _FOUND = {
-    **{
-        (sweep, name): of_visit
-        for name in ("_gather", "_scatter", "empty_all", "settled_all", "load_all")
-    },
+    **{(stencils, name): of_visit for name in ("_gather", "_scatter", "empty_all")},
+    **{(sweep, name): of_visit for name in ("settled_all", "load_all")},
     (sweep, "locate"): of_place,
     (sweep, "place_at"): of_point,
     (sweep, "restencil"): of_stencil,

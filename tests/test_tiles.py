@@ -3,6 +3,7 @@
 Few points give straight to the nodes, which cannot go wrong: that is what boxes are held against.
 """
 
+from itertools import product
 from math import inf
 
 import numpy as np
@@ -12,7 +13,7 @@ from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.sizes import PAGE, bytes_in, nodes_in_use
-from karamelo_py.run.tiles import SHARES
+from karamelo_py.run.tiles import ROUNDING, SHARES
 from karamelo_py.scene.hub import Hub
 
 # Two bodies that pass each other, at 0.7 of a cell a step and more: sorted at every other one.
@@ -188,6 +189,40 @@ region(bar, block, 0.2, 0.8, 0.2, 0.8, 1, 19)
 material(rubber, linear, 1000, 1e6, 0.3)
 solid(bar, region, bar, 1, rubber, 0.1, 0)
 """
+
+
+# The same bar on a foot of four times its width.
+FOOT = (
+    BAR.replace("0, 1, 0, 1, 0, 20", "0, 3, 0, 3, 0, 20").replace(
+        "block, 0.2, 0.8, 0.2, 0.8", "block, 1.2, 1.8, 1.2, 1.8"
+    )
+    + """
+region(foot, block, 0.3, 2.7, 0.3, 2.7, 0.5, 1)
+solid(foot, region, foot, 1, rubber, 0.1, 0)
+"""
+)
+
+
+def test_long_tiles_reach_no_more_nodes_than_their_points():
+    """Above the foot, beside the bar, its tiles have nodes in their boxes that nothing reaches.
+
+    What points reach until the next sort are the corners of the cells that they may be in then.
+    """
+    hub = Hub(Console(quiet=True))
+    hub.interpreter = Interpreter(hub)
+    hub.interpreter.run_text(FOOT)
+    simulation = hub.simulation
+    simulation.begin(inf)
+    simulation.sort()
+    drift = simulation.control.clock[0].drift_limit + ROUNDING
+    assert 0 < drift < 1
+    ends = list(product((-drift, drift), repeat=3))
+    cells = np.concatenate([np.floor(simulation.x / 0.1 + end) for end in ends]).astype(int)
+    corners = np.concatenate([cells + corner for corner in product((0, 1), repeat=3)])
+    assert nodes_in_use(simulation.setup) == len(np.unique(corners, axis=0))
+    boxes = [block.tiling.box[: block.tiling.count[0]] for block in simulation.setup.blocks]
+    sizes = [np.prod(box[:, 3:] - box[:, :3] + 1, axis=1).sum() for box in boxes]
+    assert nodes_in_use(simulation.setup) < 0.5 * sum(sizes)
 
 
 @pytest.mark.parametrize("threads", [1, 2])

@@ -38,6 +38,30 @@ def multiply_each(a, b):
 
 
 @shared
+def flat(nested):
+    """The numbers of nested tuples, one after another."""
+    numbers = ()
+    for item in nested:
+        numbers += flat(item) if isinstance(item, tuple) else (item,)
+    return numbers
+
+
+@shared
+def nested_as(like, numbers):
+    """Numbers one after another, in tuples nested as those of `like`."""
+    made = ()
+    for item in like:
+        if isinstance(item, tuple):
+            own = len(flat(item))
+            made += (nested_as(item, numbers[:own]),)
+        else:
+            own = 1
+            made += numbers[:1]
+        numbers = numbers[own:]
+    return made
+
+
+@shared
 def put_at(array, i, first, values):
     """array[i, first + k] = values[k]."""
     for k, value in enumerate(values):

@@ -18,8 +18,8 @@ from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import TIMESTEP, first_from
-from karamelo_py.kernels.sweep import lanes_of_law, points_from, width_of
 from karamelo_py.kernels.totals import KINETIC, STORED, WORK, add_to, agree_on_heat, collect
+from karamelo_py.kernels.width import lanes_of_law, points_from, width_of
 from karamelo_py.points.kinematics import dimension, free_from
 from karamelo_py.points.laws import (
     dissipated_energy,

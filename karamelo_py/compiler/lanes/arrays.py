@@ -8,6 +8,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, register_model
+from numba.np.arrayobj import populate_array
 
 from karamelo_py.compiler.compile import (
     beside,
@@ -113,17 +114,31 @@ def _masked(builder: Any, p: Any, width: int) -> Any:
 
 
 @intrinsic
-def join(typing_context, p, a, b):
-    """What the points of a group have in lanes, from those of its two halves."""
-    lanes = Lanes(a.scalar, p.width)
+def room_for(typing_context, points, numbers):
+    """An array (components, points) for a while, for such numbers of so many points.
+
+    It lies where a function keeps its variables, and is gone with it.
+    """
+    if not isinstance(points, types.IntegerLiteral):
+        return None
+    array = types.Array(numbers[0], 2, "C")
+    shape = len(numbers), points.literal_value
 
     def codegen(context, builder, sig, arguments):
-        both = shuffle(builder, *arguments[1:], list(range(p.width)))
-        # Lanes without a point have what the first one has, as when it is loaded.
-        mask = _masked(builder, arguments[0], p.width)
-        return builder.select(mask, both, _first_everywhere(builder, both))
+        number = context.get_data_type(array.dtype)
+        memory = cgutils.alloca_once(builder, ir.ArrayType(number, shape[0] * shape[1]))
+        memory.align = 64  # bytes that caches get at once
+        size = array.dtype.bitwidth // 8
+        made = context.make_array(array)(context, builder)
+        populate_array(
+            made, builder.bitcast(memory, number.as_pointer()),
+            [ir.Constant(I64, n) for n in shape],
+            [ir.Constant(I64, n) for n in (shape[1] * size, size)],
+            ir.Constant(I64, size), None,
+        )  # fmt: skip
+        return made._getvalue()
 
-    return lanes(p, a, b), codegen
+    return array(points, numbers), codegen
 
 
 @intrinsic
