@@ -112,7 +112,8 @@ class Lowering:
         kinds = tuple(map(self.kind_of, arguments))
         if hasattr(function, "py_func"):
             kinds = tuple(map(types.unliteral, kinds))
-        typed, called = _resolved(self.typing, function, kinds)
+        resolved = _resolved(self.typing, function, kinds)
+        called = resolved.called
         if any(isinstance(kind, types.Omitted) for kind in called.args):
             raise Untraceable
         if self.builder is None:
@@ -120,7 +121,7 @@ class Lowering:
         if called.pysig is not None:  # with *arguments in a tuple
             arguments = fold_arguments(called.pysig, arguments, {}, _as_is, _as_is, _as_is)
         values = [self.lowered(a, k) for a, k in zip(arguments, called.args, strict=True)]
-        made = self.context.get_function(typed, called)
+        made = resolved.made(self.context)
         return self.wrapped(called.return_type, made(self.builder, values))
 
     def call_bound(self, method: Value, arguments: tuple) -> Any:
@@ -206,7 +207,22 @@ def _as_is(index: int, parameter: Any, argument: Any) -> Any:
     return argument
 
 
-resolutions: dict[tuple, tuple] = {}
+class _Resolved:
+    """Numba's type of a function, its signature for arguments of some types, and its code."""
+
+    __slots__ = ("_made", "called", "typed")
+
+    def __init__(self, typed: types.Type, called: Any):
+        self.typed, self.called, self._made = typed, called, None
+
+    def made(self, context: Any) -> Callable:
+        """What makes code of it; Numba looks for that in all its registries, often twice."""
+        if self._made is None:
+            self._made = context.get_function(self.typed, self.called)
+        return self._made
+
+
+resolutions: dict[tuple, _Resolved] = {}
 
 
 def numbers_of(kinds: tuple) -> tuple[int, ...]:
@@ -214,13 +230,13 @@ def numbers_of(kinds: tuple) -> tuple[int, ...]:
     return tuple([kind._code for kind in kinds])
 
 
-def _resolved(typing: Any, function: Callable, kinds: tuple) -> tuple:
-    """Numba's type of a function, and its signature for arguments of these types."""
+def _resolved(typing: Any, function: Callable, kinds: tuple) -> _Resolved:
+    """What Numba knows of a function for arguments of these types, for the target of `typing`."""
     key = typing, function, numbers_of(kinds)
     if key not in resolutions:
         typed = typing.resolve_value_type(function)
         called = typing.resolve_function_type(typed, kinds, {})
         if called is None:
             raise Untraceable
-        resolutions[key] = typed, called
+        resolutions[key] = _Resolved(typed, called)
     return resolutions[key]
