@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from numba import prange, types
+from numba import config, prange, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
@@ -131,7 +131,8 @@ _LEFT = (1 << 32) - 1  # of a ticket: how many numbers are left; above them the 
 
 def new_team(threads: int) -> np.ndarray:
     """What a team of so many threads shares; its address is that in `Threaded`."""
-    numba.get_num_threads()  # which starts what loops from the cache need before they are loaded
+    if not config.DISABLE_JIT:
+        numba.get_num_threads()  # which starts what loops from the cache need before being loaded
     words = np.zeros((_TICKETS // 64 + threads, 8), np.int64)
     words[_SIZE // 64, 0] = threads
     return words
