@@ -41,6 +41,15 @@ def test_calculations_need_no_run(run_script):
     assert run_script("a = 3\nprint(a)\n").err == ""
 
 
+def test_who_builds_no_scene_does_not_wait_for_it():
+    """Numba takes half a second to begin: not in what starts processes, or says its version."""
+    text = "import sys, karamelo_py.app.cli as cli; cli.main(sys.argv[1:]); print(*sys.modules)"
+    words = [sys.executable, "-c", text, "--version"]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert "karamelo-py" in said and "karamelo_py.app.launch" in said.split()
+    assert "numba" not in said.split()
+
+
 def test_an_unknown_subcommand(capsys):
     assert main(["chek", "x.in"]) == 1
     assert "did you mean 'karamelo-py check'?" in capsys.readouterr().err

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from karamelo_py import __version__
 from karamelo_py.app.launch import launch
@@ -25,8 +25,10 @@ from karamelo_py.app.options import (
 )
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
 from karamelo_py.run.crew import Crew, launched
-from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
+
+if TYPE_CHECKING:  # which takes most of the time that the program needs to begin
+    from karamelo_py.scene.hub import Hub
 
 ERROR = 1
 
@@ -290,6 +292,8 @@ def _run(options: argparse.Namespace) -> int:
     if options.checking:
         return _carry_out(options, script)
     if launched()[0] > 1:
+        with leaving_at_once():  # before they know of each other
+            import_module("karamelo_py.scene.hub")
         debugging = options.debug
         return together(
             options.ranks,

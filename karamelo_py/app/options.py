@@ -1,11 +1,15 @@
 """Options that subcommands share: variables, numbers, where the files of a run go."""
 
+from __future__ import annotations
+
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
+
+if TYPE_CHECKING:
+    from karamelo_py.scene.hub import Hub
 
 VARIABLE = ("-var", "--var", "-v")
 

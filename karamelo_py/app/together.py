@@ -1,5 +1,7 @@
 """One of several processes that carry out a script: what it may say, and how all end together."""
 
+from __future__ import annotations
+
 import json
 import os
 import signal
@@ -9,13 +11,15 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from math import inf
-from typing import NamedTuple, TextIO
+from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from karamelo_py.app.launch import SOCKET
 from karamelo_py.app.leaving import INTERRUPTED
 from karamelo_py.run.crew import FAILED, WELL, Crew, launched
-from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
+
+if TYPE_CHECKING:
+    from karamelo_py.scene.hub import Hub
 
 # Seconds that one that has failed waits for the others, before it ends them. The first tells what
 # is wrong; others do where it does not know.
