@@ -172,7 +172,8 @@ def test_the_same_bits_in_pieces(state_interpreted, how, scheme):
     assert same_bits(whole, state_interpreted(thrown(2, how, outputs, "run(28)", **options)))
 
 
-@pytest.mark.parametrize("how", ["delete", "reflect"])
+# Compiled, points are reflected in test_lanes.py.
+@pytest.mark.parametrize("how", ["delete", pytest.param("reflect", marks=pytest.mark.full)])
 @pytest.mark.xdist_group("boundary")
 def test_the_same_bits_on_two_threads(tmp_path, monkeypatch, how):
     monkeypatch.chdir(tmp_path)

@@ -198,10 +198,15 @@ def shapes(tmp_path, compiled):
 
 
 EDITS = {
-    "nothing": ([], VALUES, []),
-    "comment": ([("squares.py", "# a comment", "# another\n    # comment")], VALUES, []),
-    "docstring": ([("helpers.py", "Half of x.", "x / 2.")], VALUES, []),
-    "what nobody uses": ([("numbers_used.py", "7", "8")], VALUES, []),
+    "comment, docstring, what nobody uses": (
+        [
+            ("squares.py", "# a comment", "# another\n    # comment"),
+            ("helpers.py", "Half of x.", "x / 2."),
+            ("numbers_used.py", "7", "8"),
+        ],
+        VALUES,
+        [],
+    ),
     "one implementation": (
         [("squares.py", "2.0 * shape.a", "3.0 * shape.a")],
         [212.0, 209.0, 197.0],
