@@ -162,7 +162,8 @@ def _use() -> None:
     codegen.JITCPUCodegen._library_class = Library
     # For times that nobody asks for Numba tells many listeners when each of thousands of calls of
     # LLVM begins and ends: a twentieth of a first compilation.
-    for told in tuple(llvm.ffi.lib._lock._cblist):
+    lock = getattr(llvm.ffi.lib, "_lock", None)
+    for told in tuple(getattr(lock, "_cblist", ())):
         llvm.ffi.unregister_lock_callback(*told)
 
 
