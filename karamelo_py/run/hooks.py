@@ -21,6 +21,7 @@ from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import told
+from karamelo_py.run.distinct import distinct
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS
 
@@ -117,7 +118,7 @@ class _Builder:
             return 0
         if not any(fix.group.all for fix in fixes):
             nodes = np.concatenate([fix.nodes for fix in fixes])
-            if len(np.unique(nodes)) == len(nodes):
+            if len(distinct(nodes)) == len(nodes):
                 return 0
         return fixes[0].group.total()
 
@@ -125,7 +126,7 @@ class _Builder:
         if fix.group.all:
             return -1, -1
         if hook.on_nodes:
-            members = np.unique(fix.nodes)
+            members = distinct(fix.nodes)
         else:
             members = fix.group.bits(self.points).view("<i8").astype(np.int64, copy=False)
         begin = sum(len(m) for m in self.members)
