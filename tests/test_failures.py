@@ -221,7 +221,7 @@ def test_the_last_good_state_is_nearest_to_where_energy_began_to_grow(run_interp
     with h5py.File(good) as file:
         assert file["state/points/0/v"][:] == pytest.approx(1, rel=1e-12)
     # What the hint says of the file: the step may be another, nothing else helps.
-    assert "last_good.31.h5 goes on from there with another step" in result.err
+    assert "last_good.31.h5 goes on from there, with a smaller step" in result.err
     again = run_interpreted(script, "-restart", good.name, status=1)
     assert again.err.split("error: ")[1] == result.err.split("error: ")[1]
     basis = script.replace("linear, 1", "quadratic-spline, 1")

@@ -37,12 +37,16 @@ def test_a_gas_is_not_at_rest(run_interpreted):
 
 
 def test_a_run_that_hardly_ends_says_how_many_steps(run_interpreted):
-    """Water of 1e-9 t/mm^3 in a scene in m and Pa: c = sqrt(K/rho), by 0.9 h/(c + v) at rest."""
+    """By the step that is set; or by that of waves in water of 1e-9 t/mm^3, in m and Pa."""
     lines = ("fix(v, initial_velocity_particles, all, 10, 0)", "set_dt(0.001)", "run_time(1.1e5)")
     said = run_interpreted(block(2, *lines), status=1).err
-    assert "about 1.1e+08 steps of 0.001 from here to time 110000: waves move at" in said
-    assert said.index("may be mixed") < said.index("leaves the domain")
+    assert "about 1.1e+08 steps of 0.001 from here to time 110000" in said
+    assert said.index("a larger step") < said.index("leaves the domain")
     short = block(2, *lines).replace("1.1e5", "0.9e5")
-    assert "may be mixed" not in run_interpreted(short, command="check").err
+    assert "steps of" not in run_interpreted(short, command="check").err
     mixed = block(2, "run_time(1)").replace("2, 100", "1e-9, 1e9")
-    assert "may be mixed" in run_interpreted(mixed, command="check").err
+    said = run_interpreted(mixed, command="check").err
+    assert "waves move at" in said and "may be mixed" in said
+    rigid = re.sub(r"material\(.*\)", "material(rubber, rigid, 1000)", block(2, "set_dt(1)"))
+    said = run_interpreted(rigid + "\nrun_time(1e9)\n", command="check").err
+    assert "about 1e+09 steps" in said and "waves" not in said

@@ -49,15 +49,13 @@ def flat(nested):
 @shared
 def nested_as(like, numbers):
     """Numbers one after another, in tuples nested as those of `like`."""
-    made = ()
+    made, begin = (), 0
     for item in like:
-        if isinstance(item, tuple):
-            own = len(flat(item))
-            made += (nested_as(item, numbers[:own]),)
-        else:
-            own = 1
-            made += numbers[:1]
-        numbers = numbers[own:]
+        inner = isinstance(item, tuple)
+        end = begin + (len(flat(item)) if inner else 1)
+        own = numbers[begin:end]
+        made += (nested_as(item, own),) if inner else own
+        begin = end
     return made
 
 

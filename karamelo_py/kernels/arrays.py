@@ -123,9 +123,10 @@ class Tiling(NamedTuple):
     grid: np.ndarray  # (T + 1,) int64: the grid that the k-th occupied tile belongs to
     number: np.ndarray  # (T + 1,) int64: of the k-th occupied tile among all
     box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes that its points may reach
-    rows: np.ndarray  # (T + 1, r, 2) int16: of each row of the box the first and last of them,
-    #                   counted from its beginning; the last before the first where there is none.
-    #                   No rows (r = 0) where boxes are not looked at so closely
+    rows: np.ndarray  # (T + 1, r, 2) int16: of each row of the box, in space number i ny + j, the
+    #                   first and last of them, counted from its beginning; the last before the
+    #                   first where there is none, and behind the last row. No rows (r = 0) where
+    #                   boxes are not looked at so closely
     buffer: np.ndarray  # (T + 1, 5) int64: its records in the buffers begin and end; Grid.first,
     #                     step_x and step_y of the numbers that its nodes have there
     report: np.ndarray  # (T + 1, 10): largest move, largest rate, offending point + 1 of each tile;

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, loop, subkernel
 from karamelo_py.compiler.threads import by_team, shared_out
@@ -24,12 +24,12 @@ class Cut(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """Which nodes points see that may have gone `reach` cells."""
+    """Which nodes points see that may go `reach` cells."""
 
     top: np.ndarray  # (g, d) the last node of each grid
     per_cell: int
     beyond: int  # nodes that are seen beyond those of a cell
-    least: int  # the node up to which points at a wall see, and from the other wall on
+    least: int  # points at a wall see as many nodes as others: all up to this one
     reach: float
 
 
@@ -39,7 +39,7 @@ class Order(NamedTuple):
     width: int  # of groups of points
     ends: np.ndarray  # (parts, T) the last row takes where the points of each tile end
     share: np.ndarray  # (parts + 1,) takes the first tile of each share of as many points
-    boxes: np.ndarray  # (2, T, d) takes between what places the points of a tile lie, in cells
+    boxes: np.ndarray  # (2, T, d) takes the first and last nodes that points of each tile may see
     bins: np.ndarray  # (parts, 2, cells of a tile) scratch
     order: np.ndarray  # (n,) takes the numbers that the points had
     tile: np.ndarray  # (n,) takes the tile of each
@@ -53,6 +53,17 @@ def cell_of(grid, direction, at):
     Clamped, since a hook may have put a point anywhere: the next sweep finds it.
     """
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
+
+
+@shared
+def _seen(grid, sight, g, direction, at):
+    """The first and last nodes of grid `g` that a point at `at` cells may see along a direction."""
+    first = cell_of(grid, direction, at - sight.reach)
+    last = cell_of(grid, direction, at + sight.reach)
+    top = sight.top[g, direction]
+    low = max(first * sight.per_cell - sight.beyond, 0)
+    high = min((last + 1) * sight.per_cell + sight.beyond, top)
+    return min(low, top - sight.least), max(high, sight.least)
 
 
 @subkernel
@@ -104,13 +115,14 @@ def _order_part(found, k):
 
 
 @subkernel
-def _order_in_tiles(kin, grids, basis, tiles, points, x, found, k):
+def _order_in_tiles(kin, grids, basis, sight, tiles, points, x, found, k):
     """Sort the points of each tile of the k-th share by the first node that they see, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
     first. The order follows from where the points are, not from where they were.
     """
     grids, points, tiles, found = at_hand(grids), at_hand(points), at_hand(tiles), at_hand(found)
+    sight = at_hand(sight)
     boxes, bins, cell, order = found.boxes, found.bins, found.room, found.order
     ends, cells = found.ends[found.ends.shape[0] - 1], bins.shape[2]
     d = dimension(kin)
@@ -129,9 +141,9 @@ def _order_in_tiles(kin, grids, basis, tiles, points, x, found, k):
                 at = in_cells(grid, i, x[i, p])
                 first = max(int(at + first_node(basis, grid.h)), 0)
                 number = number * tiles.size[i] + first % tiles.size[i]
-                at = at if at > 0 else real(0, at)  # so written, NaN is 0 too
-                boxes[0, t, i] = at if q == begin else min(boxes[0, t, i], at)
-                boxes[1, t, i] = at if q == begin else max(boxes[1, t, i], at)
+                low, high = _seen(grid, sight, points.grid[p], i, at)
+                boxes[0, t, i] = low if q == begin else min(boxes[0, t, i], low)
+                boxes[1, t, i] = high if q == begin else max(boxes[1, t, i], high)
             cell[0, q] = number
             cell[1, q] = p
             bins[k, 0, number] += 1
@@ -154,17 +166,6 @@ def _order_in_tiles(kin, grids, basis, tiles, points, x, found, k):
             order[at] = p
 
 
-@shared
-def _seen(grid, sight, top, direction, at):
-    """The first and last nodes that a point may see along a direction."""
-    at = at if at > 0 else real(0, at)  # so written, NaN is 0 too
-    first = cell_of(grid, direction, at - sight.reach)
-    last = cell_of(grid, direction, at + sight.reach)
-    low = max(first * sight.per_cell - sight.beyond, 0)
-    high = min((last + 1) * sight.per_cell + sight.beyond, top[direction])
-    return min(low, top[direction] - sight.least), max(high, sight.least)
-
-
 @subkernel
 def _find_rows(kin, grids, sight, x, tiling, parts, k):
     """`Tiling.rows` of the k-th part of the tiles, in space."""
@@ -179,8 +180,7 @@ def _find_rows(kin, grids, sight, x, tiling, parts, k):
             rows[t, r, 0] = along
             rows[t, r, 1] = -1
         for p in range(tiling.range[t, 0], tiling.range[t, 1]):
-            top = sight.top[g, 0], sight.top[g, 1], sight.top[g, 2]
-            ends = [_seen(grid, sight, top, i, in_cells(grid, i, x[i, p])) for i in range(3)]
+            ends = [_seen(grid, sight, g, i, in_cells(grid, i, x[i, p])) for i in range(3)]
             first, last = ends[2][0] - box[t, 2], ends[2][1] - box[t, 2]
             for i in range(ends[0][0] - box[t, 0], ends[0][1] - box[t, 0] + 1):
                 for j in range(ends[1][0] - box[t, 1], ends[1][1] - box[t, 1] + 1):
@@ -207,7 +207,9 @@ def _put_columns(array, first, rows, room, parts, k):
 
 _find_all_tiles = shared_out(_find_tiles, "kin, grids, tiles, x, of, ends, tile")
 _order_parts = shared_out(_order_part, "found")
-_order_in_all_tiles = shared_out(_order_in_tiles, "kin, grids, basis, tiles, points, x, found")
+_order_in_all_tiles = shared_out(
+    _order_in_tiles, "kin, grids, basis, sight, tiles, points, x, found"
+)
 _find_all_rows = shared_out(_find_rows, "kin, grids, sight, x, tiling, parts")
 _pick_all_columns = shared_out(_pick_columns, "array, first, rows, order, room, parts")
 _put_all_columns = shared_out(_put_columns, "array, first, rows, room, parts")
@@ -227,27 +229,27 @@ def _permute(mode, array, order, room, parts):
         first += rows
 
 
-def _sort(mode, kin, grids, basis, tiles, points, x, found, arrays):
+def _sort(mode, kin, grids, basis, sight, tiles, points, x, found, arrays):
     parts = found.ends.shape[0]
     _find_all_tiles(mode, parts, kin, grids, tiles, x, points.grid, found.ends, found.tile)
     _begin_tiles(found)
     _order_parts(mode, parts, found)
-    _order_in_all_tiles(mode, parts, kin, grids, basis, tiles, points, x, found)
+    _order_in_all_tiles(mode, parts, kin, grids, basis, sight, tiles, points, x, found)
     for array in arrays:
         _permute(mode, array, found.order, found.room, parts)
     return 0
 
 
-_sort_by_team = by_team(_sort, "kin, grids, basis, tiles, points, x, found, arrays")
+_sort_by_team = by_team(_sort, "kin, grids, basis, sight, tiles, points, x, found, arrays")
 
 
 @loop
-def sort_points(mode, kin, grids, basis, tiles, points, x, found, arrays):
+def sort_points(mode, kin, grids, basis, sight, tiles, points, x, found, arrays):
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
     `arrays` are all that they carry, (c, n) whole numbers each.
     """
-    _sort_by_team(mode, kin, grids, basis, tiles, points, x, found, arrays)
+    _sort_by_team(mode, kin, grids, basis, sight, tiles, points, x, found, arrays)
 
 
 @loop

@@ -167,7 +167,8 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
 
     With `gathers` the tasks of the visit are done, with `scatters` its quantities scattered: one
     loop serves a scheme's fused and its single stages. `then` says which of the two arrays of
-    places takes the new ones.
+    places takes the new ones. Points are gathered, settled and scattered group after group, or in
+    stretches (see `in_stretches`).
     """
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
@@ -219,7 +220,8 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
             fastest = rate
             if not apart and scatters and fits(visit.weights, s.room, moved):
                 give(visit, width, w, out, stencil, p, dt)
-        # A stretch gives nothing if one of its points has gone wrong, or does not fit.
+        # From the first point on that has gone wrong, or does not fit, a tile gives nothing more:
+        # the run ends, or points are sorted and give all anew.
         if apart and scatters and wrong == 0 and fits(visit.weights, s.room, furthest):
             for q in range(first, last, width_of(width)):
                 p = points_from(width, q, last)

@@ -96,9 +96,10 @@ def _in_stretches(width, visit):
 
 
 def _only_strains(width, visit):
-    """Whether a visit in lanes does nothing but strain: where points move, less is won than lost.
+    """Whether a visit in lanes does nothing but strain.
 
-    They are gathered in half of the time of laws, and what they see is looked up once more.
+    Where points move stretches cost more than they bring: there is little to settle, and stencils
+    are found twice.
     """
     tasks = {task.instance_class for task in visit[0]}
     return width.instance_class is not OneByOne and bool(tasks) and tasks <= {Strain, SecondStrain}

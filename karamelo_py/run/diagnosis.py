@@ -24,8 +24,8 @@ from karamelo_py.script.errors import Place, ScriptError
 
 LAST_GOOD = "last_good.*.h5"
 GOES_ON = (
-    "karamelo-py SCRIPT -restart {} goes on from there with another step (set_dt, dt_factor): as "
-    "it is, it would end here again, and whatever else is changed is for the whole run"
+    "karamelo-py SCRIPT -restart {} goes on from there, with a smaller step (set_dt, dt_factor): "
+    "as it is, it would end here again"
 )
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"

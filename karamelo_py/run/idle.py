@@ -31,12 +31,15 @@ def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
 def _rests(hub: Hub, simulation: Any) -> bool:
     """Whether nothing can move, as far as the parts of this program go: others may do anything."""
     laws = [solid.material.law for solid in hub.solids.values()]
-    own = all(kind.__module__.startswith("karamelo_py.") for law in laws for kind in law_kind(law))
+    update = hub.update
+    parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
+    parts += [kind for law in laws for kind in law_kind(law)]
+    own = all(kind.__module__.startswith("karamelo_py.") for kind in parts)
     acting = any(fix.hooks() or fix.for_method for fix in hub.fixes.values())
     if (
         acting
         or not own
-        or hub.update.thermal
+        or update.thermal
         or any(can(law, constrained_velocity) for law in laws)
     ):
         return False
@@ -52,11 +55,14 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
     span = end_time - simulation.time
     if not (isfinite(span) and span > ENDLESS * simulation.dt > 0):
         return
+    about = f"about {span / simulation.dt:.2g} steps of {simulation.dt:.3g} from here to time"
+    if hub.update.fixed_dt is not None:
+        hub.warn(f"{about} {end_time:.6g}", hint="a larger step with set_dt, or an earlier end")
+        return
     c = max(elastic_speed(simulation, solid)[0] for solid in hub.solids.values())
     hub.warn(
-        f"about {span / simulation.dt:.2g} steps of {simulation.dt:.3g} from here to time "
-        f"{end_time:.6g}: waves move at {c:.3g} through cells of {hub.domain.h:g}. The units of "
-        "densities, moduli, lengths and times may be mixed",
+        f"{about} {end_time:.6g}: waves move at {c:.3g} through cells of {hub.domain.h:g}. The "
+        "units of densities, moduli, lengths and times may be mixed",
         hint="in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and "
         "2e5 (MPa)",
     )

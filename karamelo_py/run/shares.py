@@ -276,6 +276,7 @@ class SharedTiles(Tiles):
         )
         pieces = others[which]
         self._from, box = of[pieces], reached.box[pieces]
+        # What they are of their rows is known already.
         more = Boxes(boxes.order[box], boxes.grid[box], low, high, boxes.rows[box])
         count = np.count_nonzero(self._of == me)
         found = Reached(*(array[np.append(own, pieces)] for array in reached))

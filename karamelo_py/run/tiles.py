@@ -118,7 +118,8 @@ class Tiles:
         most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
-        self._across = int(np.prod(widest[:, :-1], axis=1).max()) if self._by_rows(shaped) else 0
+        rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
+        self._most_in_box = int(rows) if self._by_rows(shaped) else 0  # rows of a box, at most
         self.count = int(self.first[-1])
         self._cut = Cut(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
@@ -130,7 +131,8 @@ class Tiles:
     def _by_rows(self, shaped: bool) -> bool:
         """Whether it is known of each row of a box what of it points may reach.
 
-        A row is a tile of nodes then. A bar that has spread at one end has few nodes there.
+        Rows of nodes are tiles of nodes then. Of the boxes around a bar that has spread at one end
+        points reach little at the other.
         """
         return self.long and not shaped and not self.direct
 
@@ -144,7 +146,7 @@ class Tiles:
             grid=np.zeros(self.count + 1, np.int64),
             number=np.zeros(self.count + 1, np.int64),
             box=np.zeros((self.count + 1, 2 * self.dimension), np.int64),
-            rows=np.zeros((self.count + 1, self._across, 2), np.int16),
+            rows=np.zeros((self.count + 1, self._most_in_box, 2), np.int16),
             buffer=np.zeros((self.count + 1, 5), np.int64),
             report=np.zeros((self.count + 1, 10)),
         )
@@ -237,13 +239,15 @@ class Tiles:
             lanes_for(8 * x.itemsize).width,
             np.empty((parts, self.count), np.int64),
             np.empty(parts + 1, np.int64),
-            np.empty((2, self.count, self.dimension)),
+            np.empty((2, self.count, self.dimension), np.int64),
             np.empty((parts, 2, self.size.prod()), np.int32),
             *scratch[:2],
             scratch[2:],
         )
         arrays = tuple(rows for _, array in arrays_of(points) for rows in _as_rows(array))
-        sort_points(mode, s.kin, s.grids, s.basis, self._cut, points, x, found, arrays)
+        top, least = self._nodes - 1, self.least_nodes - 1
+        sight = Sight(top, self.per_cell, self.beyond, least, reach)
+        sort_points(mode, s.kin, s.grids, s.basis, sight, self._cut, points, x, found, arrays)
         ends = found.ends[-1]
         begins = np.append(0, ends[:-1])
         occupied = np.flatnonzero(ends > begins)
@@ -255,18 +259,8 @@ class Tiles:
         tiling.share[:] = shares_of(tiling.range[:count], shares, len(tiling.share))
         grid = np.searchsorted(self.first, occupied, side="right") - 1
         tiling.grid[:count] = grid
-        boxes = found.boxes[:, occupied]
-        top, least = self._nodes[grid] - 1, self.least_nodes - 1
-        # Cells at a wall see as many nodes as others: those further inside.
-        boxes[0] -= reach
-        boxes[1] += reach
-        first, last = np.clip(np.floor(boxes), 0, self._cells[grid] - 1).astype(np.int64)
-        lo = first * self.per_cell - self.beyond
-        hi = (last + 1) * self.per_cell + self.beyond
-        tiling.box[:count, : self.dimension] = np.clip(lo, 0, top - least)
-        tiling.box[:count, self.dimension :] = np.clip(hi, least, top)
-        if self._across:
-            sight = Sight(self._nodes - 1, self.per_cell, self.beyond, least, reach)
+        tiling.box[:count] = np.concatenate(found.boxes[:, occupied], axis=1)
+        if self._most_in_box:
             find_rows(mode, s.kin, s.grids, sight, x, tiling, parts)
         return occupied
 
@@ -398,7 +392,7 @@ class Tiles:
         tile = self._first_of_nodes[grid] + (places * self._tile_steps[grid]).sum(axis=1)
         begin = np.maximum(places * size, boxes.lo[box])
         end = np.minimum(places * size + size - 1, boxes.hi[box])
-        if self._across:
+        if self._most_in_box:
             from_corner = places[:, :2] - boxes.lo[box, :2]
             row = from_corner[:, 0] * (boxes.hi - boxes.lo + 1)[box, 1] + from_corner[:, 1]
             first, last = (boxes.lo[box, 2:] + boxes.rows[box, row]).T

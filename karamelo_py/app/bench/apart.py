@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from karamelo_py.app.bench import measure
@@ -20,6 +21,7 @@ from karamelo_py.app.cli import outcome_of
 from karamelo_py.app.together import Outcome
 from karamelo_py.script.errors import ScriptError
 
+_SIGNALS = {one.value: one.name for one in signal.Signals}
 COMMAND = (sys.executable, "-m", "karamelo_py.app.bench.apart")
 
 
@@ -50,22 +52,22 @@ def measured_apart(part: Part) -> Measured | Outcome:
         If somebody ended it.
     """
     # A session of its own: Ctrl-C comes to this process alone.
-    with subprocess.Popen(
-        COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-    ) as process:
-        try:
+    process = subprocess.Popen(
+        COMMAND, bufsize=0, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+    )
+    try:
+        with suppress(BrokenPipeError):  # of one that has ended before it was told what to do
             process.stdin.write(json.dumps(part).encode() + b"\n")
-            process.stdin.flush()
-            answer = process.stdout.read()
-            process.wait()
-        except BrokenPipeError:  # it has ended before it was told what to do
-            answer = b""
-        except BaseException:
-            process.kill()
-            raise
+        answer = process.stdout.read()
+    except BaseException:
+        process.kill()
+        raise
+    finally:
+        process.stdin.close()
+        process.stdout.close()
+        status = process.wait()
     if not answer:
-        status = process.returncode
-        by = f"by {signal.Signals(-status).name}" if status < 0 else f"with the status {status}"
+        by = f"with the status {status}" if status >= 0 else f"by {_SIGNALS.get(-status, -status)}"
         raise ScriptError(f"{part.workload} could not be measured: its process was ended {by}")
     found = json.loads(answer)
     return Measured(**found["measured"]) if "measured" in found else Outcome(**found)
