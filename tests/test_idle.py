@@ -10,11 +10,23 @@ GAS = "eos(e, ideal-gas, 1, 1.4, p=1)\nstrength(f, fluid, 0)\nmaterial(rubber, e
 
 
 def test_a_run_at_rest_is_told_once(run_interpreted):
-    """Walls that hold nodes act; what only measures does not, and short runs look at a scene."""
+    """What only measures does not act, and short runs look at a scene."""
     quiet = ("compute(Ek, kinetic_energy, all)", "fix(E, kinetic_energy, all)")
     said = run_interpreted(block(2, *quiet, "run(99)", "run(100)", "run_until(time > 1)")).err
     assert said.count(RESTS) == 1 and "run(100)" in said
     assert RESTS in run_interpreted(block(2, "run_time(9)"), command="check").err
+
+
+@pytest.mark.parametrize(
+    "fix",
+    [
+        "fix(floor, velocity_nodes, all, NULL, 0)",
+        "fix(g, body_force, all, 0, -0)",
+        "fix(v, initial_velocity_particles, all, 0, 0)",
+    ],
+)
+def test_walls_and_loads_that_are_none_move_nothing(run_interpreted, fix):
+    assert RESTS in run_interpreted(block(2, fix, "run(100)"), command="check").err
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
         return
     told.append(REST)
     hub.warn(
-        "nothing moves in this run: no point has a velocity or a stress, and no fix acts",
+        "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
         hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another load, "
         "in front of it",
     )
@@ -35,15 +35,18 @@ def _rests(hub: Hub, simulation: Any) -> bool:
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
     parts += [kind for law in laws for kind in law_kind(law)]
     own = all(kind.__module__.startswith("karamelo_py.") for kind in parts)
-    acting = any(fix.hooks() or fix.for_method for fix in hub.fixes.values())
-    if (
-        acting
-        or not own
-        or update.thermal
-        or any(can(law, constrained_velocity) for law in laws)
-    ):
+    acting = any((fix.hooks() and not _zero(fix)) or fix.for_method for fix in hub.fixes.values())
+    if acting or not own or update.thermal or any(can(law, constrained_velocity) for law in laws):
         return False
     return simulation.fastest() == 0 and simulation.largest(_stress)[0] == 0
+
+
+def _zero(fix: Any) -> bool:
+    """Whether a fix holds what it acts on at zero: walls, loads that are none."""
+    formulas = getattr(fix, "formulas", ())
+    return bool(formulas) and all(
+        formula is None or (formula.is_constant and formula.constant == 0) for formula in formulas
+    )
 
 
 def _stress(points: Fields) -> np.ndarray:
