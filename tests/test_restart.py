@@ -369,6 +369,19 @@ def test_no_file_to_go_on_from(run_interpreted, content):
     assert (folder / "log.mpm").read_text().count("\n") == 6  # nothing was begun anew
 
 
+def test_a_file_in_a_folder_below_is_shown(run_interpreted):
+    """Who has written it with -out looks for it by the name that stands in the script."""
+    folder = run_interpreted(with_files(FLY)).folder
+    for name in ("r.2.h5", "none.*.h5"):
+        said = run_interpreted(f"{FLY}read_restart({name})", status=1, folder="other").err
+        assert "there is no file" in said and "a file that restart or write_restart" in said
+    below = folder.parent / "other" / "out"
+    below.mkdir()
+    shutil.copy(folder / "r.2.h5", below)
+    said = run_interpreted(f"{FLY}read_restart(r.2.h5)", status=1, folder="other").err
+    assert "hint: there is out/r.2.h5" in said
+
+
 def test_files_that_are_gone_begin_anew(run_interpreted):
     """Where the files of the run before are not, those of this one begin, and it is said."""
     text = FLY.replace("run(4)", OUTPUTS + "run(4)")

@@ -237,7 +237,7 @@ def plot(
     """
     plots = hub.output.plots
     if ID in plots.ids():
-        raise ScriptError(f"plot ID '{ID}' is already used", argument="ID")
+        raise ScriptError(f"plot ID '{ID}' is already used", argument="ID", expected="another ID")
     plots.add(ID, Curve(every, x, y, axis, scale))
 
 

@@ -148,7 +148,7 @@ class Restart:
 
         self.path = path = _latest(path)
         if not path.is_file():
-            raise ScriptError(f"there is no file {path}", argument="file")
+            raise _no_file(path)
         what = f"{path} is no file that this program can go on from"
         expected = "a file that restart or write_restart of karamelo-py has written"
         try:
@@ -291,8 +291,21 @@ def _latest(path: Path) -> Path:
     there = path.parent.iterdir() if path.parent.is_dir() else ()
     found = [(int(match[1]), one) for one in there if (match := pattern.fullmatch(one.name))]
     if not found:
-        raise ScriptError(f"there is no file {path}", argument="file")
+        raise _no_file(path)
     return max(found)[1]
+
+
+def _no_file(path: Path) -> ScriptError:
+    """What is said of a file that is not there: -out has put its like a folder below, perhaps."""
+    below = sorted(path.parent.glob(f"*/{path.name}")) if path.parent.is_dir() else ()
+    return ScriptError(
+        f"there is no file {path}",
+        argument="file",
+        expected=None
+        if below
+        else "a file that restart or write_restart of karamelo-py has written",
+        hint=f"there is {below[-1]}" if below else None,
+    )
 
 
 # ---- whether a scene is the one that wrote a file ----------------------------------------------

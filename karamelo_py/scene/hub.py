@@ -40,7 +40,11 @@ class Catalogue(dict):
         if ID in self:
             before = getattr(self[ID], "place", None)
             where = f" (line {before.line})" if before else ""
-            raise ScriptError(f"{self.kind} ID '{ID}' is already used{where}", argument="ID")
+            raise ScriptError(
+                f"{self.kind} ID '{ID}' is already used{where}",
+                argument="ID",
+                expected="another ID",
+            )
 
     def __missing__(self, ID: str) -> Any:
         always = ["all"] if self.kind == "group" else []

@@ -126,8 +126,12 @@ def _print(name: str, one: measure.Measured, *, published: bool) -> None:
     print(f"  {'bytes moved per particle-step':<34} {one.bytes_per_step:8.0f}")
     print(f"  {'share of the memory roofline':<34} {100 * one.roofline:8.1f} %")
     print(f"  {'share of that of its own size':<34} {100 * one.roofline_in_place:8.1f} %")
-    for stage, per in (one.of_points | one.of_nodes).items():
-        print(f"    {stage:<32} {1e9 * per / one.points:8.2f} ns")
-    print(f"    {'together, in one compiled loop':<32} {1e9 / best:8.2f} ns")
+    stages = one.of_points | one.of_nodes if one.told_apart else {}
+    for stage, per in stages.items():
+        print(f"    {stage:<38} {1e9 * per / one.points:8.2f} ns")
+    print(f"    {'together, in one compiled loop':<38} {1e9 / best:8.2f} ns")
+    if not one.told_apart:
+        print(f"  {'limited by':<34} {one.limit:>8} (sweeps are too short to be timed one by one)")
+        return
     shares = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % beside them"
     print(f"  {'limited by':<34} {one.limit:>8} ({shares})")

@@ -26,6 +26,7 @@ from karamelo_py.script.errors import ScriptError
 ARRAYS = 3 * 256 * 2**20  # bytes
 REPETITIONS = 5
 ALONE = 0.5  # the share of a step from which on something is said to limit it
+APART = 1.5  # times a step in one compiled loop, up to which its sweeps one by one are believed
 
 
 class Timed(NamedTuple):
@@ -84,10 +85,20 @@ class Measured(NamedTuple):
         return statistics.median(self.speeds)
 
     @property
+    def swept(self) -> float:
+        """Sweeps one by one, as a share of a step in one compiled loop."""
+        swept = sum(self.of_points.values()) + sum(self.of_nodes.values())
+        return (swept - self.waits) * self.best / self.points
+
+    @property
+    def told_apart(self) -> bool:
+        """Whether sweeps are long enough to be timed one by one: of few points they are not."""
+        return self.swept <= APART
+
+    @property
     def rest(self) -> float:
         """The share of a step beside the work of sweeps: control, threads that wait."""
-        swept = sum(self.of_points.values()) + sum(self.of_nodes.values())
-        return min(1.0, max(0.0, 1 - (swept - self.waits) * self.best / self.points))
+        return min(1.0, max(0.0, 1 - self.swept))
 
     @property
     def nodes(self) -> float:
@@ -102,8 +113,11 @@ class Measured(NamedTuple):
 
         ``overhead`` (the rest), ``nodes``, ``memory`` (at least half of the bandwidth of arrays as
         large as the scene), else ``arithmetic``: sweeps over points that wait for instructions,
-        or for single numbers, more than for bandwidth.
+        or for single numbers, more than for bandwidth. ``unknown`` where sweeps are not
+        `told_apart`.
         """
+        if not self.told_apart:
+            return "unknown"
         if self.rest >= ALONE:
             return "overhead"
         if self.nodes >= ALONE:
