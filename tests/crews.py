@@ -1,7 +1,6 @@
 """Processes that share a scene, as threads of one: what MPI does, without it."""
 
 import copy
-import sys
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -12,7 +11,6 @@ from karamelo_py.run.crew import Crew
 from karamelo_py.run.work import Work
 
 PATIENCE = 60  # seconds that one waits for the others
-TURN = 10.0  # seconds that one goes on before another may: they wait for each other much earlier
 
 
 class Threads(Crew):
@@ -105,15 +103,10 @@ def together(size: int, act: Callable[[Crew], Any]) -> list:
             barrier.abort()
 
     threads = [threading.Thread(target=run, args=(rank,)) for rank in range(size)]
-    usual = sys.getswitchinterval()
-    sys.setswitchinterval(TURN)  # to take turns each few milliseconds costs a fourth of the work
-    try:
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    finally:
-        sys.setswitchinterval(usual)
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
     for error in errors:
         if not isinstance(error, threading.BrokenBarrierError):
             raise error

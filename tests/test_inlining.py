@@ -6,16 +6,7 @@ import inspect
 import numba
 import pytest
 from numba import config, njit, types
-from numba.core import (
-    base,
-    caching,
-    callconv,
-    ccallback,
-    codegen,
-    compiler,
-    dispatcher,
-    event,
-)
+from numba.core import base, caching, callconv, ccallback, codegen, compiler, dispatcher
 from numba.core.typing import context, templates
 
 from karamelo_py.compiler import inlining
@@ -59,23 +50,6 @@ def test_what_is_inlined(tmp_path, monkeypatch):
     assert names["doubled"]
     assert not names["called"]
     assert not names["plain"]
-
-
-@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
-def test_nobody_is_told_of_each_call_of_llvm(tmp_path, monkeypatch):
-    """Which takes Numba as long as many of the calls; it knows how long the whole takes."""
-    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
-    calls = event.RecordingListener()
-
-    def tripled(x):
-        return 3 * x
-
-    compiled = kernel(tripled)
-    with event.install_listener("numba:llvm_lock", calls):
-        assert compiled(2) == 6
-    assert not calls.buffer
-    (found,) = compiled.overloads.values()
-    assert set(found.metadata["timers"]) == {"compiler_lock"}
 
 
 def test_names_are_of_one_kind():

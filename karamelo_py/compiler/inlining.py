@@ -160,11 +160,6 @@ def _use() -> None:
 
     codegen.JITCPUCodegen.set_env = set_env
     codegen.JITCPUCodegen._library_class = Library
-    # For times that nobody asks for Numba tells many listeners when each of thousands of calls of
-    # LLVM begins and ends: a twentieth of a first compilation.
-    lock = getattr(llvm.ffi.lib, "_lock", None)
-    for told in tuple(getattr(lock, "_cblist", ())):
-        llvm.ffi.unregister_lock_callback(*told)
 
 
 _use()
