@@ -7,7 +7,7 @@ import numpy as np
 
 from karamelo_py.output.fields import COMPONENTS, Fields
 from karamelo_py.points.laws import can, constrained_velocity, law_kind
-from karamelo_py.run.stable import elastic_speed
+from karamelo_py.run.stable import fastest_wave
 from karamelo_py.scene.hub import Hub
 
 LOOK = 100  # steps: shorter runs look at a scene
@@ -62,10 +62,9 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
     if hub.update.fixed_dt is not None:
         hub.warn(f"{about} {end_time:.6g}", hint="a larger step with set_dt, or an earlier end")
         return
-    c = max(elastic_speed(simulation, solid)[0] for solid in hub.solids.values())
     hub.warn(
-        f"{about} {end_time:.6g}: waves move at {c:.3g} through cells of {hub.domain.h:g}. The "
-        "units of densities, moduli, lengths and times may be mixed",
+        f"{about} {end_time:.6g}: waves move at {fastest_wave(simulation):.3g} through cells of "
+        f"{hub.domain.h:g}. The units of densities, moduli, lengths and times may be mixed",
         hint="in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and "
         "2e5 (MPa)",
     )

@@ -24,6 +24,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 FORMAT, VERSION = "karamelo-py restart", 6
+OURS = "a file that restart or write_restart of karamelo-py has written"
 FLAT = {"track_times": False}
 
 
@@ -150,11 +151,10 @@ class Restart:
         if not path.is_file():
             raise _no_file(path)
         what = f"{path} is no file that this program can go on from"
-        expected = "a file that restart or write_restart of karamelo-py has written"
         try:
             with h5py.File(path, "r", locking=False) as root:
                 if root.attrs.get("format") != FORMAT:
-                    raise ScriptError(what, argument="file", expected=expected)
+                    raise ScriptError(what, argument="file", expected=OURS)
                 version = int(root.attrs["version"])
                 if version != VERSION:
                     age = "an older" if version < VERSION else "a newer"
@@ -170,7 +170,7 @@ class Restart:
                 _ = root["state"]
         except (OSError, KeyError) as error:
             why = "" if "signature" in str(error) else f": {error}"
-            raise ScriptError(f"{what}{why}", argument="file", expected=expected) from None
+            raise ScriptError(f"{what}{why}", argument="file", expected=OURS) from None
 
     @property
     def runs(self) -> list[dict[str, float]]:
@@ -301,9 +301,7 @@ def _no_file(path: Path) -> ScriptError:
     return ScriptError(
         f"there is no file {path}",
         argument="file",
-        expected=None
-        if below
-        else "a file that restart or write_restart of karamelo-py has written",
+        expected=None if below else OURS,
         hint=f"there is {below[-1]}" if below else None,
     )
 

@@ -322,6 +322,11 @@ def _speed_without_viscosity(simulation: Any) -> float:
     return max(speed for speed, _ in found) if any(viscous for _, viscous in found) else 0.0
 
 
+def fastest_wave(simulation: Any) -> float:
+    """Fastest wave in the undeformed materials, without viscosity."""
+    return max(elastic_speed(simulation, solid)[0] for solid in simulation.hub.solids.values())
+
+
 def elastic_speed(simulation: Any, solid: Any) -> tuple[float, bool]:
     """Of an undeformed solid: its fastest wave without viscosity, and whether it is viscous."""
     law, viscous = law_on(solid.material.law, solid.h, solid.T0), False

@@ -16,7 +16,7 @@ from karamelo_py.run.lowering import warms_by_friction
 from karamelo_py.run.noise import noises
 from karamelo_py.run.stable import (
     USUAL,
-    elastic_speed,
+    fastest_wave,
     keeping_share,
     lone_point,
     own_step_of_waves,
@@ -81,7 +81,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             "leave set_dt and dt_factor out, or make them smaller",
         )
     courant, _ = own_step_of_waves(hub, still=False)
-    borne = courant * _time_across(hub, simulation)
+    borne = courant * _time_across(simulation)
     if update.fixed_dt is not None and simulation.dt > borne * (1 + 1e-9):
         alone = " of a point that has its nodes for itself" * (courant == lone_point(hub))
         return (
@@ -126,12 +126,12 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     return "no cause that is known to do that", "another basis, transfer or scheme to compare with"
 
 
-def _time_across(hub: Hub, simulation: Any) -> float:
+def _time_across(simulation: Any) -> float:
     """What waves take across a cell in bodies that nothing has deformed: later they may be softer.
 
     Infinite where all are rigid.
     """
-    fastest = max(elastic_speed(simulation, solid)[0] for solid in hub.solids.values())
+    fastest = fastest_wave(simulation)
     return float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
 
 
