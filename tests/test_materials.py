@@ -26,6 +26,7 @@ from karamelo_py.points.laws import (
     jacobian,
     kirchhoff_stress,
     specific_volume,
+    wave_speed_bound,
     wave_speed_squared,
     with_stress,
 )
@@ -198,6 +199,15 @@ def test_neo_hookean_is_no_faster_than_its_bound(f, n):
     if np.linalg.norm(n) < 0.1:
         n = (1.0, 0.0, 0.0)
     assert wave_speed_squared(NEO, SPACE, f) >= fastest_wave(NEO, f, n) * (1 - 1e-6)
+
+
+@given(f=deformations(SPACE), nu=st.floats(-0.9, 0.49), size=st.floats(0.3, 4))
+def test_the_quick_bound_of_neo_hookean_is_not_below_its_speed(f, nu, size):
+    """Points are passed over by it: 1 - ln J <= 1 / J, and ln J - 1 <= J / e^2 where lambda < 0."""
+    law = NeoHookean.given(RHO, E, nu)
+    state = tuple(size * number for number in f)
+    squared = wave_speed_squared(law, SPACE, state)
+    assert wave_speed_bound(law, SPACE, state) >= squared * (1 - 1e-14)
 
 
 @pytest.mark.parametrize("a", [0.5, 1.0, 1.7])

@@ -41,7 +41,13 @@ from karamelo_py.points.kinematics import (
     volume_ratio,
     zero_tensor,
 )
-from karamelo_py.points.laws import advance, constrained_velocity, jacobian, wave_speed_squared
+from karamelo_py.points.laws import (
+    advance,
+    constrained_velocity,
+    jacobian,
+    wave_speed_bound,
+    wave_speed_squared,
+)
 from karamelo_py.points.transfers import (
     Moment,
     add_moment,
@@ -368,16 +374,15 @@ def _strain(w, x, p, dt, gradient, ratio, fastest):
         grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
     if not in_all(j > 0):
         return choose(j > 0, grown, real(inf, j)), fastest
-    # The square root is only taken of the few points that are faster than all before them.
+    # The speed of waves is only asked of the few points that may be faster than all before them.
     now = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    squared = wave_speed_squared(law, w.kin, state) * inverse_stretch_squared(
-        w.frame, w.kin, now, dt
-    )
+    shorter = inverse_stretch_squared(w.frame, w.kin, now, dt)
+    most = wave_speed_bound(law, w.kin, state) * shorter
     speed = largest_component(w.kin, subtract(load_vector(w.kin, w.points.v, p), w.common))
     slack = fastest - speed
-    if in_all((slack >= 0) & (squared <= slack * slack)):  # so written, NaN is noticed too
+    if in_all((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
         return grown, fastest
-    rate = sqrt(squared) + speed
+    rate = sqrt(wave_speed_squared(law, w.kin, state) * shorter) + speed
     return grown, choose(fastest > rate, fastest, rate)
 
 

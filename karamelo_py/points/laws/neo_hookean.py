@@ -3,9 +3,10 @@
 The state of a point is the deformation gradient F.
 """
 
+from math import exp
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.powers import logarithm
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import NonNegative, Positive
@@ -28,6 +29,7 @@ from karamelo_py.points.laws import (
     initial_state,
     jacobian,
     kirchhoff_stress,
+    wave_speed_bound,
     wave_speed_squared,
 )
 from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
@@ -129,9 +131,22 @@ def _(law, kin, state):
     # Along a principal direction of stretch a, the tangent of P gives
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
     one = real(1, law.G)
+    return _speed_squared(law, kin, state, law.lam * (one - logarithm(determinant(kin, state))))
+
+
+@wave_speed_bound.on(NeoHookean)
+def _(law, kin, state):
+    # Without a series: 1 / J is above 1 - ln J (by 2 % at J = 0.8), and J / e^2 above its negative.
+    j = determinant(kin, state)
+    bulk = max(law.lam / j, -law.lam * j * real(exp(-2), j))
+    return _speed_squared(law, kin, state, bulk)
+
+
+@shared
+def _speed_squared(law, kin, state, bulk):
+    zero, one = real(0, law.G), real(1, law.G)
     stretch = largest_row_sum(kin, left_cauchy_green(kin, state))
-    bulk = law.lam * (one - logarithm(determinant(kin, state)))
-    return (law.G * (one + stretch) + max(bulk, real(0, law.G))) * law.specific_volume
+    return (law.G * (one + stretch) + max(bulk, zero)) * law.specific_volume
 
 
 @energy_density.on(NeoHookean)

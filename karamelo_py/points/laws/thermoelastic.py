@@ -19,6 +19,7 @@ from karamelo_py.points.laws import (
     kirchhoff_stress,
     specific_volume,
     temperature,
+    wave_speed_bound,
     wave_speed_squared,
     with_stress,
     with_temperature,
@@ -133,6 +134,11 @@ def _(law, kin, state):
 @wave_speed_squared.on(Thermoelastic)
 def _(law, kin, state):
     return wave_speed_squared(law.elastic, kin, mechanical(law, kin, state))
+
+
+@wave_speed_bound.on(Thermoelastic)
+def _(law, kin, state):
+    return wave_speed_bound(law.elastic, kin, mechanical(law, kin, state))
 
 
 @energy_density.on(Thermoelastic)
