@@ -119,7 +119,8 @@ def rows_of_points(
 
     Nothing that is loaded at once lies in two lines then, and a visit, which goes along dozens of
     rows side by side, has them in different sets of a cache for any number of points; with rows one
-    after another all would be in one set for 512 points, say, or 512 000.
+    after another all would be in one set for 512 points, say, or 512 000. No row ends where the
+    next one begins: rows without gaps are of another type, for which loops are compiled anew.
 
     `room` (k,) is used where it is long enough: `length_of_rows`.
     """
@@ -139,7 +140,7 @@ def length_of_rows(shape: tuple[int, ...], dtype: type) -> int:
 
 def _distance_of_rows(count: int, dtype: type) -> int:
     line = LINE // np.dtype(dtype).itemsize
-    return (-(-count // line) | 1) * line
+    return (count // line + 1 | 1) * line
 
 
 def as_rows_of_points(array: np.ndarray) -> np.ndarray:

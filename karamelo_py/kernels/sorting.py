@@ -6,11 +6,12 @@ import numpy as np
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import entered, loop, subkernel
+from karamelo_py.compiler.loops import loop, subkernel
+from karamelo_py.compiler.memory import pick_items, put_items
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.visit import place_at
-from karamelo_py.points.basis import extent, first_node
+from karamelo_py.points.basis import extent
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
 
@@ -31,6 +32,7 @@ class Sight(NamedTuple):
     beyond: int  # nodes that are seen beyond those of a cell
     least: int  # points at a wall see as many nodes as others: all up to this one
     reach: float
+    offset: float  # of the first node that a point sees now, see points.basis.first_node
 
 
 class Order(NamedTuple):
@@ -115,14 +117,13 @@ def _order_part(found, k):
 
 
 @subkernel
-def _order_in_tiles(kin, grids, basis, sight, tiles, points, x, found, k):
+def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
     """Sort the points of each tile of the k-th share by the first node that they see, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
     first. The order follows from where the points are, not from where they were.
     """
-    grids, points, tiles, found = at_hand(grids), at_hand(points), at_hand(tiles), at_hand(found)
-    sight = at_hand(sight)
+    grids, tiles, found, sight = at_hand(grids), at_hand(tiles), at_hand(found), at_hand(sight)
     boxes, bins, cell, order = found.boxes, found.bins, found.room, found.order
     ends, cells = found.ends[found.ends.shape[0] - 1], bins.shape[2]
     d = dimension(kin)
@@ -135,13 +136,13 @@ def _order_in_tiles(kin, grids, basis, sight, tiles, points, x, found, k):
             bins[k, 1, c] = -1
         for q in range(begin, end):
             p = order[q]
-            grid = record(grids, points.grid[p])
+            grid = record(grids, of[p])
             number = 0
             for i in range(d):
                 at = in_cells(grid, i, x[i, p])
-                first = max(int(at + first_node(basis, grid.h)), 0)
+                first = max(int(at + sight.offset), 0)
                 number = number * tiles.size[i] + first % tiles.size[i]
-                low, high = _seen(grid, sight, points.grid[p], i, at)
+                low, high = _seen(grid, sight, of[p], i, at)
                 boxes[0, t, i] = low if q == begin else min(boxes[0, t, i], low)
                 boxes[1, t, i] = high if q == begin else max(boxes[1, t, i], high)
             cell[0, q] = number
@@ -160,7 +161,7 @@ def _order_in_tiles(kin, grids, basis, sight, tiles, points, x, found, k):
             at = bins[k, 1, c]
             bins[k, 1, c] += 1
             # Nearly all were in this order before.
-            while at > bins[k, 0, c] and points.id[order[at - 1]] > points.id[p]:
+            while at > bins[k, 0, c] and ids[order[at - 1]] > ids[p]:
                 order[at] = order[at - 1]
                 at -= 1
             order[at] = p
@@ -190,66 +191,71 @@ def _find_rows(kin, grids, sight, x, tiling, parts, k):
 
 
 @subkernel
-def _pick_columns(array, first, rows, order, room, parts, k):
-    """Copy the k-th part of some rows of an array to `room`, in order."""
-    for c in range(rows):
-        for p in range(order.size * k // parts, order.size * (k + 1) // parts):
-            room[c, p] = array[first + c, order[p]]
+def _pick_rows(rows, first, last, order, room, parts, k):
+    """Copy the k-th part of the rows from `first` to `last` to `room`, in order."""
+    begin, end = order.size * k // parts, order.size * (k + 1) // parts
+    for r in range(first, last + 1):
+        if rows[r, 1] == 4:
+            pick_items(rows[r, 0], np.int32(0), order, room, r - first, begin, end)
+        else:
+            pick_items(rows[r, 0], np.int64(0), order, room, r - first, begin, end)
 
 
 @subkernel
-def _put_columns(array, first, rows, room, parts, k):
-    """Copy the k-th part of some rows back."""
-    for c in range(rows):
-        for p in range(array.shape[1] * k // parts, array.shape[1] * (k + 1) // parts):
-            array[first + c, p] = room[c, p]
+def _put_rows(rows, first, last, room, parts, k):
+    """Copy the k-th part of these rows back."""
+    begin, end = room.shape[1] * k // parts, room.shape[1] * (k + 1) // parts
+    for r in range(first, last + 1):
+        if rows[r, 1] == 4:
+            put_items(rows[r, 0], np.int32(0), room, r - first, begin, end)
+        else:
+            put_items(rows[r, 0], np.int64(0), room, r - first, begin, end)
 
 
 _find_all_tiles = shared_out(_find_tiles, "kin, grids, tiles, x, of, ends, tile")
 _order_parts = shared_out(_order_part, "found")
-_order_in_all_tiles = shared_out(
-    _order_in_tiles, "kin, grids, basis, sight, tiles, points, x, found"
-)
+_order_in_all_tiles = shared_out(_order_in_tiles, "kin, grids, sight, tiles, x, of, ids, found")
 _find_all_rows = shared_out(_find_rows, "kin, grids, sight, x, tiling, parts")
-_pick_all_columns = shared_out(_pick_columns, "array, first, rows, order, room, parts")
-_put_all_columns = shared_out(_put_columns, "array, first, rows, room, parts")
+_pick_all_rows = shared_out(_pick_rows, "rows, first, last, order, room, parts")
+_put_all_rows = shared_out(_put_rows, "rows, first, last, room, parts")
 
 
-@entered
-def _permute(mode, array, order, room, parts):
-    """Put the columns of an array (c, n) of whole numbers into `order`, a few rows at a time.
+@subkernel
+def _permute(mode, rows, order, room, parts):
+    """Put the items of rows into `order`, a few rows at a time.
 
     A copy of a whole field would be the peak of the set-up.
     """
     first = 0
-    while first < array.shape[0]:
-        rows = min(room.shape[0], array.shape[0] - first)
-        _pick_all_columns(mode, parts, array, first, rows, order, room, parts)
-        _put_all_columns(mode, parts, array, first, rows, room, parts)
-        first += rows
+    while first < rows.shape[0]:
+        last = min(first + room.shape[0], rows.shape[0]) - 1
+        _pick_all_rows(mode, parts, rows, first, last, order, room, parts)
+        _put_all_rows(mode, parts, rows, first, last, room, parts)
+        first = last + 1
 
 
-def _sort(mode, kin, grids, basis, sight, tiles, points, x, found, arrays):
+def _sort(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
     parts = found.ends.shape[0]
-    _find_all_tiles(mode, parts, kin, grids, tiles, x, points.grid, found.ends, found.tile)
+    _find_all_tiles(mode, parts, kin, grids, tiles, x, of, found.ends, found.tile)
     _begin_tiles(found)
     _order_parts(mode, parts, found)
-    _order_in_all_tiles(mode, parts, kin, grids, basis, sight, tiles, points, x, found)
-    for array in arrays:
-        _permute(mode, array, found.order, found.room, parts)
+    _order_in_all_tiles(mode, parts, kin, grids, sight, tiles, x, of, ids, found)
+    _permute(mode, rows, found.order, found.room, parts)
     return 0
 
 
-_sort_by_team = by_team(_sort, "kin, grids, basis, sight, tiles, points, x, found, arrays")
+_sort_by_team = by_team(_sort, "kin, grids, sight, tiles, x, of, ids, found, rows")
 
 
 @loop
-def sort_points(mode, kin, grids, basis, sight, tiles, points, x, found, arrays):
+def sort_points(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
-    `arrays` are all that they carry, (c, n) whole numbers each.
+    They are on the grids `of` (n,) and have the numbers `ids` (n,). Of all that they carry, these
+    and the places among it, the addresses of its `rows` are given (:mod:`~.compiler.memory`): one
+    kernel serves all bases and laws in as many dimensions.
     """
-    _sort_by_team(mode, kin, grids, basis, sight, tiles, points, x, found, arrays)
+    _sort_by_team(mode, kin, grids, sight, tiles, x, of, ids, found, rows)
 
 
 @loop

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.lanes import lanes_for
+from karamelo_py.compiler.memory import addresses_of_rows
 from karamelo_py.compiler.threads import Serial, Threaded
 from karamelo_py.kernels.arrays import (
     ADD,
@@ -31,7 +32,8 @@ from karamelo_py.kernels.sorting import (
     widest,
 )
 from karamelo_py.kernels.sweep import ROUNDING
-from karamelo_py.points.basis import shape_size
+from karamelo_py.points.basis import first_node, shape_size
+from karamelo_py.points.kinematics import planar
 from karamelo_py.run.boxes import (
     Boxes,
     Reached,
@@ -219,7 +221,7 @@ class Tiles:
         """(n,) the tile of each point."""
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
-        find_tiles(self.mode, s.kin, s.grids, self._cut, x, points.grid, ends, tile)
+        find_tiles(self.mode, planar(s.kin), s.grids, self._cut, x, points.grid, ends, tile)
         return tile
 
     def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
@@ -244,10 +246,12 @@ class Tiles:
             *scratch[:2],
             scratch[2:],
         )
-        arrays = tuple(rows for _, array in arrays_of(points) for rows in _as_rows(array))
         top, least = self._nodes - 1, self.least_nodes - 1
-        sight = Sight(top, self.per_cell, self.beyond, least, reach)
-        sort_points(mode, s.kin, s.grids, s.basis, sight, self._cut, points, x, found, arrays)
+        offset = first_node(s.basis, s.grids.h[0])
+        sight = Sight(top, self.per_cell, self.beyond, least, reach, offset)
+        kin, of, ids = planar(s.kin), points.grid, points.id
+        rows = addresses_of_rows(array for _, array in arrays_of(points))
+        sort_points(mode, kin, s.grids, sight, self._cut, x, of, ids, found, rows)
         ends = found.ends[-1]
         begins = np.append(0, ends[:-1])
         occupied = np.flatnonzero(ends > begins)
@@ -460,12 +464,6 @@ def _empty(s: Setup, spans: np.ndarray) -> None:
     for begin, end in spans.tolist():
         for array in arrays:
             array[begin:end] = 0
-
-
-def _as_rows(array: np.ndarray) -> tuple[np.ndarray, ...]:
-    """(c, n) views of the bits of an array of points, as whole numbers."""
-    bits = array.view(f"i{array.itemsize}")
-    return tuple(bits) if bits.ndim > 2 else (np.atleast_2d(bits),)
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:

@@ -1,0 +1,85 @@
+"""Rows of arrays by where they lie: what goes through them knows no number and types of arrays."""
+
+import ctypes
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from karamelo_py.compiler.compile import by_type
+
+
+def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
+    """(m, 2) int64: the address of each row of some arrays (..., n), and the bytes of an item.
+
+    Addresses are good as long as the arrays live and are not resized.
+    """
+    found: list[tuple[int, int]] = []
+    for array in arrays:
+        if array.strides[-1] != array.itemsize:
+            raise ValueError("items of a row do not lie one after another")
+        places = [array.ctypes.data]
+        for count, stride in zip(array.shape[:-1], array.strides[:-1], strict=True):
+            places = [place + k * stride for place in places for k in range(count)]
+        found += [(place, array.itemsize) for place in places]
+    return np.array(found, np.int64).reshape(-1, 2)
+
+
+def pick_items(
+    address: int, like: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
+) -> None:
+    """``room[c, p]`` becomes item ``order[p]`` of a row, from `begin` to `end`.
+
+    The row has whole numbers of the type of `like`.
+    """
+    room[c, begin:end] = _row(address, like, order.size)[order[begin:end]]
+
+
+def put_items(address: int, like: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
+    """Item p of such a row becomes ``room[c, p]``, from `begin` to `end`."""
+    _row(address, like, end)[begin:end] = room[c, begin:end]
+
+
+def _row(address: int, like: Any, count: int) -> np.ndarray:
+    memory = (ctypes.c_char * int(count * like.itemsize)).from_address(int(address))
+    return np.frombuffer(memory, like.dtype)
+
+
+def _pointer(builder: Any, address: Any, k: Any, kind: types.Integer) -> Any:
+    row = builder.inttoptr(address, ir.IntType(kind.bitwidth).as_pointer())
+    return builder.gep(row, [k])
+
+
+@intrinsic
+def _item_at(typing_context, address, k, like):
+    def codegen(context, builder, signature, values):
+        return builder.load(_pointer(builder, *values[:2], like))
+
+    return like(types.int64, types.int64, like), codegen
+
+
+@intrinsic
+def _put_item_at(typing_context, address, k, value, like):
+    def codegen(context, builder, signature, values):
+        item = context.cast(builder, values[2], types.int64, like)
+        builder.store(item, _pointer(builder, *values[:2], like))
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64, types.int64, like), codegen
+
+
+def _pick(address, like, order, room, c, begin, end):
+    for p in range(begin, end):
+        room[c, p] = _item_at(address, order[p], like)
+
+
+def _put(address, like, room, c, begin, end):
+    for p in range(begin, end):
+        _put_item_at(address, p, room[c, p], like)
+
+
+by_type(pick_items)(lambda *_: _pick)
+by_type(put_items)(lambda *_: _put)
