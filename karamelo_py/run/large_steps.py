@@ -4,10 +4,13 @@ from math import fsum, inf, isfinite
 from typing import Any, NamedTuple
 
 from karamelo_py.kernels.watch import BORNE
+from karamelo_py.run.idle import UNITS, mixed_units
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead, what_follows
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
+
+MIXED = 300  # times the stable step, from where on units are likelier wrong than a guess
 
 
 class Step(NamedTuple):
@@ -101,6 +104,9 @@ def _warn_about_step(
             if limit == of_heat
             else what_follows(hub, simulation, asked)
         )
+        if step.fixed_dt and asked > MIXED * limit and limit != of_heat:
+            words += f"; {mixed_units(hub, simulation)}"
+            hint = f"{UNITS}. If they are as they should be, {hint}"
     told = hub.update.foreseen
     if again or step.name not in told:
         told += [step.name] * (step.name not in told)
