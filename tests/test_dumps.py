@@ -338,6 +338,26 @@ def test_limits_that_are_given_stay(plane):
     assert half._picture.limits[0] == -9 and half._picture.limits[1] > 1
 
 
+def test_arrows_say_that_values_lie_beyond_the_colours(plane):
+    """At the ends beyond which there are some, in this picture; none where the limits grow."""
+    limited = PyPlot(plane, 1, "p.png", 4, 3, "vx", vmin=-1.0, vmax=2.0)
+    free = PyPlot(plane, 1, "q.png", 4, 3, "vx")
+    for low, high in ((-1, 2), (-3, 2), (-1, 3), (-2, 3), (0, 1), (-1, np.nan)):
+        plane.fields.points["vx"] = np.linspace(low, np.nan_to_num(high), plane.fields.count)
+        plane.fields.points["vx"][-1] = high
+        limited.write()
+        free.write()
+        shown = [arrow.get_visible() for arrow in limited._picture.arrows]
+        assert shown == [low < -1, high > 2], (low, high)
+        assert not any(arrow.get_visible() for arrow in free._picture.arrows)
+        bar = limited._picture.scale.axes.get_window_extent()
+        with pytest.importorskip("PIL.Image").open(plane.folder / "p.png") as image:
+            pixels = np.asarray(image)
+        above = pixels[: 300 - int(bar.y1) - 2, int(bar.x0) : int(bar.x1)]
+        below = pixels[300 - int(bar.y0) + 2 :, int(bar.x0) : int(bar.x1)]
+        assert [bool((part < 250).any()) for part in (below, above)] == shown
+
+
 def test_pyplot_refuses_limits_and_maps(plane):
     with pytest.raises(ScriptError, match="from 2 to 1") as caught:
         PyPlot(plane, 1, "p.png", 4, 3, "vx", vmin=2.0, vmax=1.0)

@@ -116,7 +116,10 @@ def test_a_step_above_the_limit(run_interpreted):
     assert "warning: " in result.err
     assert result.err.index("warning: ") < result.err.index("error: ")
     assert "above the stable limit 0.0" in result.err
-    stopped(result, "set_dt")
+    stopped(result, "too large, as the warning says; set_dt(")
+    # Once: the limit and what follows stand in the warning alone.
+    assert result.err.count("above the stable limit") == 1
+    assert result.err.count("warning: ") == 1 and "unstable" not in result.out
     [good] = result.folder.glob("last_good.*")
     again = run_interpreted(script, "-restart", good.name, status=1)
     assert "above the stable limit 0.0" in again.err.split("error: ")[0]

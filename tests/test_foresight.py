@@ -408,6 +408,20 @@ def test_held_nodes_around_driven_points_are_told(run_interpreted, method, regio
     assert ("hint: nodes that these points do not see" in said) == told
 
 
+@pytest.mark.parametrize(("rho", "told"), [("2", False), ("2e-9", True)])
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_units_are_named_where_the_step_is_far_above_the_stable_one(
+    run_interpreted, command, rho, told
+):
+    """tonne/mm^3 with moduli in Pa: waves are 3e4 times too fast, and so is the stable step."""
+    text = block(2, "set_dt(0.02)", "run(0)")
+    text = text.replace("rubber, linear, 2,", f"rubber, linear, {rho},")
+    result = run_interpreted(text, command=command)
+    assert result.err.count("warning: ") == 1 and "| set_dt(0.02)" in result.err
+    assert ("units of densities, moduli, lengths and times may be mixed" in result.err) == told
+    assert ("in mm, t, s 1e-9" in result.err) == told
+
+
 TOO_LARGE = "the step 0.1 of set_dt is above the stable limit"
 
 

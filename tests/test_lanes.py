@@ -414,6 +414,10 @@ def _give_affine(array, at, weights, field, p):
     )
     accumulate_affine(array, nodes, 1, given, value, (by_row, by_node))
     accumulate_affine(array, nodes, 4, given, value[:2], ())
+    # More than the widest register takes: eleven, and nine that do not grow.
+    wide, along, across = (3 * part + part[:2] for part in (value, by_row, by_node))
+    accumulate_affine(array, nodes, 8, given, wide, (along, across))
+    accumulate_affine(array, nodes, 20, given, 3 * value, ())
 
 
 @kernel
@@ -440,7 +444,7 @@ def test_affine_fields_at_the_nodes(real_type, give):
     at = rng.integers(0, 20, n)
     at[:width] = at[0]
     weights, field = rng.uniform(size=(9, n)), rng.normal(size=(9, n))
-    array, expected = np.zeros((40, 8), real_type), np.zeros((40, 8))
+    array, expected = np.zeros((40, 32), real_type), np.zeros((40, 32))
     give(tag, width, at, weights.astype(real_type), field.astype(real_type), array, n)
     for p in range(n):
         first = at[p] if give is _give_affine_in_lanes else at[0]
@@ -448,6 +452,9 @@ def test_affine_fields_at_the_nodes(real_type, give):
         value, *slopes = field[:3, p], field[3:6, p], field[6:, p]
         accumulate_affine(expected, nodes, 1, weights[:, p], value, slopes)
         accumulate_affine(expected, nodes, 4, weights[:, p], value[:2], ())
+        wide, *growths = (np.append(np.tile(part, 3), part[:2]) for part in (value, *slopes))
+        accumulate_affine(expected, nodes, 8, weights[:, p], wide, growths)
+        accumulate_affine(expected, nodes, 20, weights[:, p], np.tile(value, 3), ())
     np.testing.assert_allclose(array, expected, rtol=0, atol=200 * np.finfo(real_type).eps)
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from conftest import INPUTS, ROOT
 from going_on import same_files
+from plugged import install
 from scenes import block
 from test_ranks import HALVED
 
@@ -477,6 +478,37 @@ def test_a_function_fails_on_one_process(tmp_path, function, says):
     if function == "fails":
         assert by_ranks(tmp_path / "one", path, 1, PYTHONPATH=folders)[0] == 1
         same_files(tmp_path / "one", tmp_path / "two")
+
+
+PART_OF_ALL = """
+    def initial_integrate(self, points):
+        second = os.environ.get("OMPI_COMM_WORLD_RANK", "1") == "1"
+        {line}
+"""
+
+
+@needs_mpi
+@pytest.mark.parametrize(
+    "line, says",
+    [
+        ("second and points.total(points.mass)", "to its end on one process, and to a total on"),
+        ("self.publish('x', points.position[:, 0].sum())", "fix drag: air_x is "),
+        ("self.publish('x', points.total(points.mass))", ""),
+    ],
+)
+def test_a_plug_in_looks_at_its_part_alone(tmp_path, line, says):
+    """A fix that looks at each point on its own, and asks for more than that."""
+    site = install(tmp_path / "site")
+    (site / "sitecustomize.py").write_text(SMALL_TILES, encoding="utf-8")
+    drag = site / "mpm_examples" / "drag.py"
+    text, _, _ = drag.read_text(encoding="utf-8").partition("    def initial_integrate")
+    text = text.replace("published =", "point_by_point = True\n    published =")
+    drag.write_text(f"import os\n{text}{PART_OF_ALL.format(line=line)}", encoding="utf-8")
+    folders = os.pathsep.join([str(site), os.environ["PYTHONPATH"]])
+    path = moving(tmp_path, "fix(air, drag, all, 0.5)", "set_output(1)", "run(9)")
+    status, _, err = by_ranks(tmp_path / "two", path, 2, PYTHONPATH=folders)
+    assert status == bool(says) and err.count("error: ") == bool(says)
+    assert says in err and ("| fix(air, drag, all, 0.5)" in err) == bool(says)
 
 
 # --- before anything is started -----------------------------------------------------------------

@@ -229,6 +229,19 @@ def test_the_message_of_the_page(tmp_path):
     assert done.stderr.splitlines()[0] == message
 
 
+@pytest.mark.parametrize("whole", [True, False])
+def test_no_total_of_points_that_come_in_pieces(tmp_path, whole):
+    """Before the first step, where a fix says that it looks at each point on its own."""
+    file = install(tmp_path / "site") / "mpm_examples" / "drag.py"
+    text = file.read_text("utf-8").replace("points.mass @ lost", "points.total(points.velocity)")
+    said = f"first_step_only = True\n    point_by_point = {not whole}\n    published ="
+    file.write_text(text.replace("published =", said), "utf-8")
+    shutil.copy(PLUGIN / "in.drag", tmp_path)
+    done = karamelo_py(tmp_path / "site", tmp_path, "in.drag")
+    assert done.returncode == (not whole), done.stderr
+    assert ("points.total(terms) is known in steps alone" in done.stderr) == (not whole)
+
+
 def test_the_page_tells_what_each_costs():
     page = (PLUGIN.parents[1] / "docs" / "plugins.md").read_text("utf-8")
     told = dict(re.findall(r"^\| .* \| `(\w+\.py)` \| (\d+) \|$", page, re.M))

@@ -321,6 +321,27 @@ def test_the_state_alone(run_interpreted):
             assert array.tobytes() == other[name].tobytes(), name
 
 
+def test_colours_go_into_another_script(run_interpreted):
+    """Pictures of the same field have the range of those before; of another one, their own."""
+    picture = "dump(p, all, pyplot, 2, p.*.png, 1, 1, vx)\n"
+    stop = "fix(s, velocity_particles, all, 0, 0)\n"
+    set_up = FLY.partition("run(4)")[0] + picture
+    # What was fast at first has left the range to what is slow, before the file is written.
+    first = f"run(2)\n{stop}run(2)\nwrite_restart(w.h5)\nrun(2)\n"
+    whole = run_interpreted(set_up + first)
+
+    def last(script: str) -> bytes:
+        found = run_interpreted(f"{script}{stop}read_restart(w.h5)\nrun(2)\n")
+        return (found.folder / "p.6.png").read_bytes()
+
+    expected = (whole.folder / "p.6.png").read_bytes()
+    assert last(set_up) == expected
+    assert last(set_up.replace("dump(p,", "dump(q,")) != expected
+    for other in (picture.replace("vx", "vy"), picture.replace("vx", "vx, vmax=3")):
+        there = set_up.replace(picture, other)
+        assert last(there) == last(there.replace("dump(p,", "dump(q,"))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

@@ -123,7 +123,8 @@ def read_restart(hub: Hub, file: str) -> None:
     the fixes and computes that shall go on. Those that have the ID and style that they had there
     keep what they have seen, and initial velocities do not act once more. Everything else may be
     another: materials' constants, fixes, the time step, what is written. Time and step go on from
-    those of the file.
+    those of the file. Files are begun anew, but for one thing: a picture or movie with the ID and
+    style that it had there, of the same field, goes on with the colours of the pictures before.
 
     Example
     -------

@@ -14,6 +14,7 @@ from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
 from karamelo_py.output.fields import Fields
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
+from karamelo_py.run.large_steps import step_was_told
 from karamelo_py.run.no_number import culprit
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead
@@ -314,6 +315,8 @@ def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
 def _smaller_step(hub: Hub, simulation: Simulation) -> str:
     """How to take a smaller step, and whether the present one is too large for sure."""
     if simulation.above_limit():
+        if step_was_told(hub):
+            return f"the step is too large, as the warning says; {own_step_instead(hub)}"
         return (
             f"the step {simulation.dt:.4g} is above the stable limit {simulation.limit:.4g}: "
             "set_dt to less, or leave set_dt and dt_factor out"

@@ -98,8 +98,6 @@ def _strained_before(s: Foreseen) -> Iterator[Failure]:
 
 
 def _noise(s: Foreseen) -> Iterator[Failure]:
-    if s.waves > 0 and blows_up(s.hub, s.simulation):
-        return  # it never comes so far
     for noise in noises(s):
         if noise.share > 1:
             yield Failure(*noise.words)
@@ -270,6 +268,8 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     _warn_about_groups(hub)
     scene = Foreseen(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + duration_of_later(hub, simulation)
+    if scene.waves > 0 and blows_up(hub, simulation):
+        scene.duration = 0.0  # it never comes so far
     warn_about_steps(hub, simulation, halves)
     _warn_about_precision(scene)
     warn_about_velocities(hub, simulation)

@@ -13,6 +13,9 @@ from karamelo_py.scene.hub import Hub
 LOOK = 100  # steps: shorter runs look at a scene
 ENDLESS = 1e8  # steps
 REST = "a scene at rest"
+UNITS = (
+    "in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and 2e5 (MPa)"
+)
 
 
 def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
@@ -62,9 +65,12 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
     if hub.update.fixed_dt is not None:
         hub.warn(f"{about} {end_time:.6g}", hint="a larger step with set_dt, or an earlier end")
         return
-    hub.warn(
-        f"{about} {end_time:.6g}: waves move at {fastest_wave(simulation):.3g} through cells of "
-        f"{hub.domain.h:g}. The units of densities, moduli, lengths and times may be mixed",
-        hint="in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and "
-        "2e5 (MPa)",
+    hub.warn(f"{about} {end_time:.6g}: {mixed_units(hub, simulation)}", hint=UNITS)
+
+
+def mixed_units(hub: Hub, simulation: Any) -> str:
+    """What is said where a step does not fit the numbers of a scene by any means."""
+    return (
+        f"waves move at {fastest_wave(simulation):.3g} through cells of {hub.domain.h:g}. The "
+        "units of densities, moduli, lengths and times may be mixed"
     )

@@ -4,10 +4,13 @@ from math import fsum, inf, isfinite
 from typing import Any, NamedTuple
 
 from karamelo_py.kernels.watch import BORNE
+from karamelo_py.run.idle import UNITS, mixed_units
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead, what_follows
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
+
+MIXED = 300  # times the stable step, from where on units are likelier wrong than a guess
 
 
 class Step(NamedTuple):
@@ -28,6 +31,11 @@ class Step(NamedTuple):
         """What the script asks for it by."""
         return "set_dt" if self.fixed_dt else "dt_factor"
 
+    @property
+    def name(self) -> str:
+        """By what is known that it has been told."""
+        return f"{self.command} {self.fixed_dt or self.dt_factor}"
+
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
     """The step that a run asks for here, which goes back and halves it in trouble or not."""
@@ -38,6 +46,11 @@ def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> S
         *(type(scheme), scheme, type(transfer), transfer),
     )
     return Step(update.dt_place, update.fixed_dt, update.dt_factor, halves, scene, span)
+
+
+def step_was_told(hub: Hub) -> bool:
+    """Whether a warning has said that the step is above the stable limit, and what to write."""
+    return step_of(hub, False).name in hub.update.foreseen
 
 
 def warn_about_steps(
@@ -91,8 +104,10 @@ def _warn_about_step(
             if limit == of_heat
             else what_follows(hub, simulation, asked)
         )
-    name = f"{step.command} {step.fixed_dt or step.dt_factor}"
+        if step.fixed_dt and asked > MIXED * limit and limit != of_heat:
+            words += f"; {mixed_units(hub, simulation)}"
+            hint = f"{UNITS}. If they are as they should be, {hint}"
     told = hub.update.foreseen
-    if again or name not in told:
-        told += [name] * (name not in told)
+    if again or step.name not in told:
+        told += [step.name] * (step.name not in told)
         hub.warn(words, place=step.place, hint=hint)

@@ -8,7 +8,8 @@ A part names the attributes in which it keeps what it has seen or added up::
 Numbers, texts, bytes, arrays, generators of random numbers of NumPy, lists, tuples, sets and
 dictionaries of these can be kept, and objects whose class says in the same way what they remember.
 Classes add to what their bases name. After a part has got back what it remembers, its method
-``resumed()`` is called where it has one.
+``resumed()`` is called where it has one. What writes files, such as a dump, begins them anew in
+another script (read_restart), and gets back there only what it names in ``carries``, too.
 """
 
 from typing import Any
@@ -20,7 +21,16 @@ from karamelo_py.language.faults import fault
 
 def remembered(part: Any) -> tuple[str, ...]:
     """Names of the attributes that a part and its bases name in ``remembers``."""
-    names = (name for c in reversed(type(part).__mro__) for name in vars(c).get("remembers", ()))
+    return _named(part, "remembers")
+
+
+def carried(part: Any) -> tuple[str, ...]:
+    """Names of those attributes that another script goes on with, which begins files anew."""
+    return _named(part, "carries")
+
+
+def _named(part: Any, where: str) -> tuple[str, ...]:
+    names = (name for c in reversed(type(part).__mro__) for name in vars(c).get(where, ()))
     return tuple(dict.fromkeys(names))
 
 

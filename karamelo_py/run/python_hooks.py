@@ -1,7 +1,7 @@
 """Fixes that act from Python in a step: their hooks, beside the compiled ones."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.moments import at_nodes, at_points
 from karamelo_py.run.hooks import lower_hooks
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
+from karamelo_py.script.errors import ScriptError
 
 
 def sets_initial_state(fix: Any) -> bool:
@@ -41,10 +42,53 @@ class PythonHooks:
             self.simulation.act(lambda whole: function(self, whole, stage, *arguments), s)
 
 
+def _call(simulation: Any, fix: Any, hook: Callable, view: Any) -> None:
+    """Call a hook; of one that each process calls for its own, see that all agree."""
+    try:
+        hook(view)
+        if fix.point_by_point and not type(fix).__module__.startswith("karamelo_py."):
+            _agree(simulation, fix)
+    except ScriptError as error:
+        error.place = error.place or fix.place
+        raise
+
+
+def _agree(simulation: Any, fix: Any) -> None:
+    """See that all processes have asked for the same, and have published the same.
+
+    Otherwise one would wait for the others for ever, or the values would be those of a part.
+    """
+    values = simulation.hub.values
+    names = (f"{fix.id}_{name}" if name else fix.id for name in fix.published)
+    own = {name: values.get(name) for name in names if name in values}
+    first, *others = simulation.everyone("its end", own)
+    for other in others:
+        name = next((name for name in first if repr(first[name]) != repr(other[name])), None)
+        if name is not None:
+            raise ScriptError(
+                f"fix {fix.style}: {name} is {first[name]:.6g} on one process and "
+                f"{other[name]:.6g} on another",
+                hint=f"tell the author of {fix.style}: point_by_point, each has a part of the "
+                "points; points.total(terms) and nodes.total(terms) are sums over all",
+            )
+
+
+class Piece(PieceView):
+    """Some of the points before a step: the others come after them."""
+
+    def total(self, terms: Any) -> NoReturn:
+        """There is none."""
+        raise ValueError(
+            "points.total(terms) is known in steps alone; before the first, points come in pieces "
+            "where point_by_point is True"
+        )
+
+
 def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
     for fix, hook in hooks.by_stage[stage]:
         before = target == ON_VELOCITY
-        hook(NodesView(hooks.simulation, s, fix.group, stage, before_update=before))
+        view = NodesView(hooks.simulation, s, fix.group, stage, before_update=before)
+        _call(hooks.simulation, fix, hook, view)
 
 
 def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
@@ -55,7 +99,7 @@ def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> Non
 def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:
     for fix, hook in hooks.by_stage[stage]:
         view = view_of(hooks.simulation, fix, then=bool(then))
-        hook(view)
+        _call(hooks.simulation, fix, hook, view)
         if view.moved and stage == INITIAL_INTEGRATE:
             hooks.simulation.sort()
         elif view.moved:
@@ -108,4 +152,4 @@ def views_of(simulation: Any, fix: Any) -> Iterator[PointsView]:
         yield view_of(simulation, fix, then=False)
         return
     for part in simulation.rows_of(fix.group):
-        yield PieceView(simulation, [part])
+        yield Piece(simulation, [part])

@@ -18,7 +18,7 @@ from karamelo_py import __version__
 from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
-from karamelo_py.run.memory import memory_of, remember, remembered
+from karamelo_py.run.memory import carried, memory_of, remember, remembered
 from karamelo_py.run.state import Stored
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -228,10 +228,15 @@ class Restart:
         simulation.begun = self.content["begun"]
         kept = {tuple(key): memory for *key, memory in self.content["parts"]}
         for key, part in _parts(hub):
-            if key in kept and (outputs or key[0] not in OUTPUTS):
+            if key not in kept:
+                continue
+            if outputs or key[0] not in OUTPUTS:
                 remember(part, kept[key], arrays)
                 if hasattr(part, "resumed"):
                     part.resumed()
+            else:
+                memory = kept[key]
+                remember(part, {k: memory[k] for k in carried(part) if k in memory}, arrays)
         if good and hub.running is not None and hub.running.halve:
             hub.running.snapshot = simulation.take_snapshot(self.path)
 

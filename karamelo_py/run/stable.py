@@ -278,9 +278,8 @@ def words_of_share(hub: Hub) -> str:
     else:
         share = asked
         words = f"{share:g} of the stable step, by dt_factor"
-    if share > 1:
-        return words + ": unstable"
-    if share > max(keeping, 1e-9) * (1 + 1e-9) and keeping < USUAL:
+    # Of a share above 1 `large_steps` warns.
+    if max(keeping, 1e-9) * (1 + 1e-9) < share <= 1 and keeping < USUAL:
         return words + f": above {keeping:g} a body that drifts gains energy"
     return words
 

@@ -22,6 +22,8 @@ from karamelo_py.compiler.lanes.registers import (
 )
 from karamelo_py.compiler.tuples import row
 
+WIDEST = 8  # components of records that a field is given to at once
+
 
 def _transposed(builder: Any, rows: list) -> list:
     """Four vectors of four numbers, or of two, transposed: lanes from records."""
@@ -270,48 +272,54 @@ def _accumulate_affine(typing_context, array, nodes, first, weights, value, slop
     So the records are made once a point, not at each node.
     """
     lanes = weights[0]
-    count = 8 if len(value) > 4 else _chunks(len(value))[0][1]
-    vector = ir.VectorType(element(array.dtype), count)
 
     def codegen(context, builder, sig, arguments):
         size = array.dtype.bitwidth // 8
         spread = _kept_in_memory(builder, cgutils.unpack_tuple(builder, arguments[3]))
-        field = _records_of(builder, cgutils.unpack_tuple(builder, arguments[4]), lanes, count)
-        grow = [
-            _records_of(builder, cgutils.unpack_tuple(builder, slope), lanes, count)
+        values = cgutils.unpack_tuple(builder, arguments[4])
+        growths = [
+            cgutils.unpack_tuple(builder, slope)
             for slope in cgutils.unpack_tuple(builder, arguments[5])
         ]
-        width = round(len(nodes) ** (1 / max(1, len(grow))))
-        one = Lanes(array.dtype, count)
-        at = {(): field}  # by the place of the node in the first directions
+        width = round(len(nodes) ** (1 / max(1, len(growths))))
+        for begin in range(0, len(values), WIDEST):
+            some = slice(begin, begin + WIDEST)
+            left = len(values[some])
+            count = WIDEST if left > 4 else _chunks(left)[0][1]
+            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
+            vector = ir.VectorType(element(array.dtype), count)
+            one = Lanes(array.dtype, count)
+            # By the place of the node in the first directions.
+            at = {(): _records_of(builder, values[some], lanes, count)}
+            grow = [_records_of(builder, slope[some], lanes, count) for slope in growths]
 
-        def field_at(*place):
-            if place not in at:
-                *outer, last = place
-                at[place] = field_at(*outer, last - 1) if last else field_at(*outer)
-                if last:
-                    pairs = zip(at[place], grow[len(outer)], strict=True)
-                    at[place] = [builder.fadd(*pair) for pair in pairs]
-            return at[place]
+            def field_at(*place, at=at, grow=grow):
+                if place not in at:
+                    *outer, last = place
+                    at[place] = field_at(*outer, last - 1) if last else field_at(*outer)
+                    if last:
+                        pairs = zip(at[place], grow[len(outer)], strict=True)
+                        at[place] = [builder.fadd(*pair) for pair in pairs]
+                return at[place]
 
-        for k, node in enumerate(cgutils.unpack_tuple(builder, arguments[1])):
-            place = tuple(k // width**d % width for d in reversed(range(len(grow))))
-            total = pointer = None
-            for j, record in enumerate(field_at(*place)):
-                if total is None or lanes_of(nodes[k]):
-                    given = context, builder, array, arguments[0]
+            for k, node in enumerate(cgutils.unpack_tuple(builder, arguments[1])):
+                place = tuple(k // width**d % width for d in reversed(range(len(grow))))
+                total = pointer = None
+                for j, record in enumerate(field_at(*place)):
+                    if total is None or lanes_of(nodes[k]):
+                        given = context, builder, array, arguments[0]
+                        if lanes_of(nodes[k]):
+                            pointer = at_lane(*given, nodes[k], node, j, column)
+                        else:
+                            pointer = pointer_to(*given, [node, column])
+                        pointer = builder.bitcast(pointer, vector.as_pointer())
+                        total = builder.load(pointer, align=size)
+                    weight = splat(builder, builder.load(spread(k, j), align=size), one)
+                    total = _fma(builder, weight, record, total)
                     if lanes_of(nodes[k]):
-                        pointer = at_lane(*given, nodes[k], node, j, arguments[2])
-                    else:
-                        pointer = pointer_to(*given, [node, arguments[2]])
-                    pointer = builder.bitcast(pointer, vector.as_pointer())
-                    total = builder.load(pointer, align=size)
-                weight = splat(builder, builder.load(spread(k, j), align=size), one)
-                total = _fma(builder, weight, record, total)
-                if lanes_of(nodes[k]):
+                        builder.store(total, pointer, align=size)
+                if not lanes_of(nodes[k]):
                     builder.store(total, pointer, align=size)
-            if not lanes_of(nodes[k]):
-                builder.store(total, pointer, align=size)
         return context.get_dummy_value()
 
     made = types.void(array, nodes, types.int64, weights, value, slopes)

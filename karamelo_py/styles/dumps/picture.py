@@ -89,6 +89,7 @@ class Picture:
         self.canvas = FigureCanvasAgg(self.figure)
         self.axes = self.figure.add_subplot()
         self.limits: tuple[float, float] | None = None
+        self.beyond = (False, False)
         # The axis whose labels change with the limits of the field.
         self.scale: Any = None
         self._laid_out = False
@@ -120,6 +121,9 @@ class Picture:
         """Take new limits of the field."""
         raise NotImplementedError
 
+    def _apply_beyond(self, below: bool, above: bool) -> None:
+        """Mark the ends of the colours beyond which there are values."""
+
     def _add_legend(self) -> None:
         """Names of the solids, beside the picture."""
         names = self.options.solids[:MOST_IN_LEGEND]
@@ -142,6 +146,10 @@ class Picture:
                 self.limits = limits
                 self._apply_limits(*limits)
                 self._background = None
+            if (found := beyond(limits, extent.ends)) != self.beyond:
+                self.beyond = found
+                self._apply_beyond(*found)
+                self._background = None
         self._entitle(title)
         self.look = self._see(points, extent)
         self.marks.points = points
@@ -161,10 +169,12 @@ class Picture:
 
     def begin_with(self, limits: tuple[float, float] | None) -> None:
         """Let limits that grow begin with those that a picture had before."""
+        self.limits = limits
         if limits is not None:
-            self._lay_out()
-            self.limits = limits
+            if not self._laid_out:
+                self._lay_out()
             self._apply_limits(*limits)
+            self._background = None
 
     def _limits(self, values: np.ndarray) -> tuple[float, float]:
         grown_to = grown(self.limits, values)
@@ -216,6 +226,11 @@ class Picture:
         box = self.axes.get_position()
         lo, hi = self.axes.get_xlim()
         return box.width * self.figure.get_figwidth() * 72 / (hi - lo)
+
+
+def beyond(limits: tuple[float, float], ends: np.ndarray) -> tuple[bool, bool]:
+    """Whether values lie below the limits, and above."""
+    return bool((ends < limits[0]).any()), bool((ends > limits[1]).any())
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:

@@ -9,7 +9,9 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize, to_rgba_array
+from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.transforms import Transform
 
 from karamelo_py.styles.dumps.look import ROUND, Extent, Look, Seen
 from karamelo_py.styles.dumps.picture import (
@@ -33,6 +35,20 @@ def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> 
 
 def _number(value: float, _: Any = None) -> str:
     return f"{value:.8g}"
+
+
+def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
+    """Arrows at the lower and the upper end of a bar of colours, not to be seen yet."""
+    looks = {"transform": of_bar, "clip_on": False, "edgecolor": "black", "linewidth": 0.8}
+    return [
+        Polygon(
+            [(0, end), (0.5, end + 0.06 * way), (1, end)],
+            facecolor=shown.get_cmap()(float(end)),
+            visible=False,
+            **looks,
+        )
+        for end, way in ((0, -1), (1, 1))
+    ]
 
 
 class Plane(Picture):
@@ -62,10 +78,15 @@ class Plane(Picture):
             )
             bar.ax.tick_params(labelsize=8)
             self.scale = bar.ax.yaxis
+            self.arrows = [bar.ax.add_patch(arrow) for arrow in _arrows(shown, bar.ax.transAxes)]
         return self.axes.scatter([], [], lw=0)
 
     def _apply_limits(self, lo: float, hi: float) -> None:
         self.norm.vmin, self.norm.vmax = lo, hi
+
+    def _apply_beyond(self, below: bool, above: bool) -> None:
+        for arrow, shows in zip(self.arrows, (below, above), strict=True):
+            arrow.set_visible(shows)
 
     def _see(self, points: Seen, extent: Extent) -> Look:
         # As large as the material it stands for, and never invisible: least where they are few.

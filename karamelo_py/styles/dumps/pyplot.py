@@ -54,7 +54,7 @@ class PyPlot(Dump):
         What colours the points: any column of dump particle. Without it the solid does (in 1D: vx
         is drawn).
     vmin, vmax
-        Ends of the colours.
+        Ends of the colours. Where a picture has values beyond, the bar beside it ends in an arrow.
     cmap
         A colour map of Matplotlib; viridis, or coolwarm for components, which have either sign.
     azimuth, elevation
@@ -112,16 +112,21 @@ class PyPlot(Dump):
         self._picture: Any = None
         self._limits: tuple[float, float] | None = None
 
-    remembers = ("seen",)
+    remembers = carries = ("seen",)
 
     @property
-    def seen(self) -> tuple[float, float] | None:
-        """The limits of the field so far."""
-        return self._picture.limits if self._picture is not None else self._limits
+    def seen(self) -> tuple[Any, ...]:
+        """The limits of the field so far, and of what they are those."""
+        limits = self._picture.limits if self._picture is not None else self._limits
+        return limits, self._label(), *self.limits
 
     @seen.setter
-    def seen(self, limits: tuple[float, float] | None) -> None:
-        self._limits = limits
+    def seen(self, seen: tuple[Any, ...] | None) -> None:
+        limits, *of = seen or (None,)
+        if of == [self._label(), *self.limits]:  # a script that goes on may show something else
+            self._limits = limits
+            if self._picture is not None:
+                self._picture.begin_with(limits)
 
     def check_format(self) -> str:
         """The format that the file name asks for."""
