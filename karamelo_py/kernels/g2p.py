@@ -31,11 +31,11 @@ from karamelo_py.points.frames import (
     follows,
     inverse_stretch_squared,
     spatial_increment,
+    strained,
 )
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import (
     add_outer,
-    deform,
     dimension,
     largest_component,
     volume_ratio,
@@ -364,7 +364,8 @@ def _strain(w, x, p, dt, gradient, ratio, fastest):
     increment = spatial_increment(w.frame, w.kin, dl, f)
     state = advance(law, w.kin, old, increment, dt)
     store(w.points.state, p, state)
-    store_deformation(field(w.points.fields, DeformationGradient), w.kin, p, increment, f)
+    now = strained(w.frame, w.kin, f, dl)
+    store_optional(field(w.points.fields, DeformationGradient), p, now)
     j = jacobian(law, w.kin, state)
     grown = real(0, j)
     if follows(w.frame) and carried(w.basis, w.kin) == 0:
@@ -375,7 +376,6 @@ def _strain(w, x, p, dt, gradient, ratio, fastest):
     if not in_all(j > 0):
         return choose(j > 0, grown, real(inf, j)), fastest
     # The speed of waves is only asked of the few points that may be faster than all before them.
-    now = deformation_of(w.frame, w.kin, law, state, w.points, p)
     shorter = inverse_stretch_squared(w.frame, w.kin, now, dt)
     most = wave_speed_bound(law, w.kin, state) * shorter
     speed = largest_component(w.kin, subtract(load_vector(w.kin, w.points.v, p), w.common))
@@ -387,10 +387,10 @@ def _strain(w, x, p, dt, gradient, ratio, fastest):
 
 
 @shared
-def store_deformation(array, kin, p, increment, f):
-    """Store F after the increment, where there is an array for it."""
+def store_optional(array, p, value):
+    """Store a value where there is an array for it."""
     if array is not None:
-        store(array, p, deform(kin, increment, f))
+        store(array, p, value)
 
 
 empty_all = for_tags(empty, "w, x")

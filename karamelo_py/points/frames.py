@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.compile import point_function, real
 from karamelo_py.compiler.fields import Field, tensor
 from karamelo_py.compiler.powers import power
-from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
+from karamelo_py.compiler.tuples import add, add_scaled, leading, scale, subtract
 from karamelo_py.points.kinematics import (
     add_symmetric_dot,
     add_tensor_dot,
@@ -79,6 +79,17 @@ def spatial_increment(frame, kin, dl, f):
 def _(frame, kin, dl, f):
     # F + dt Fdot = (I + dt Fdot F^-1) F exactly
     return increment_of(kin, dl, f)
+
+
+@point_function(otherwise=True)
+def strained(frame, kin, f, dl):
+    """F where the frame needs it, after what `spatial_increment` takes from F before it."""
+    return f
+
+
+@strained.on(Total)
+def _(frame, kin, f, dl):
+    return add(f, dl)
 
 
 @point_function(otherwise=True)
