@@ -31,7 +31,13 @@ from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all
 from karamelo_py.kernels.stencils import gathered_by, scatter_nodes
 from karamelo_py.kernels.sums import sum_share
-from karamelo_py.kernels.visit import Work, ask_ahead, place_at, present_stencil
+from karamelo_py.kernels.visit import (
+    Work,
+    ask_ahead,
+    ask_ahead_of_stretch,
+    place_at,
+    present_stencil,
+)
 from karamelo_py.kernels.width import (
     in_lanes,
     in_stretches,
@@ -194,6 +200,8 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
         if apart and gathers:
             for q in range(first, last, width_of(width)):
                 p = points_from(width, q, last)
+                if (q - first) % width_of(wide) == 0:
+                    ask_ahead_of_stretch(w, p, dt)
                 totals = gathered_by(width, visit.tasks, w, stencil_of(w, p), place_of(w, p))
                 store(room, points_from(width, q - first, last - first), flat(totals))
         for q in range(first, last, width_of(wide)):

@@ -74,9 +74,25 @@ def ask_ahead(w, p, like):
             (field(w.points.fields, Moment), len(moment)),
             (w.points.state, len(initial_state(law_of(w, p), w.kin, like))),
         )
-        for array, count in rows:
-            for k in range(count):
-                prefetch(array, (k, p))
+        _ask(rows, p)
+
+
+@shared
+def _ask(rows, p):
+    for array, count in rows:
+        for k in range(count):
+            prefetch(array, (k, p))
+
+
+@shared
+def ask_ahead_of_stretch(w, p, like):
+    """The same of what points are settled with, while they gather."""
+    if w.kin.dimension == 3:
+        f = field(w.points.fields, DeformationGradient)
+        count = len(initial_state(law_of(w, p), w.kin, like))
+        _ask(((w.points.state, count),), p)
+        if f is not None:
+            _ask(((f, len(zero_tensor(w.kin, like))),), p)
 
 
 @point_function(otherwise=True)

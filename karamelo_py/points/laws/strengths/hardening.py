@@ -27,6 +27,16 @@ def foreseen(strength, memory, heat):
 
 
 @point_function(otherwise=True)
+def first_guess(strength, memory, q, slope):
+    """Plastic strain to begin with, 0 for q below the flow stress; and how Newton's changes fall.
+
+    `slope` is 3 G, `memory` with what is `foreseen`. A change c is followed by about k c^2, or less
+    the further the flow stress has hardened: k is the second number.
+    """
+    return real(0, q), real(0, q)
+
+
+@point_function(otherwise=True)
 def hardened(strength, memory, increment, dt):
     """The memory after a step, which may be without plastic strain."""
     return (memory[0] + increment,)
@@ -63,7 +73,7 @@ def hardening(strength: type, **own: float | str) -> None:
         return returned(trial, q, flow, x), hardened(strength, memory, x, dt), flow * x
 
 
-# Newton's method takes two or three; bisection, where it has to step in, one for each bit.
+# Newton's method takes one to three; bisection, where it has to step in, one for each bit.
 _MOST_ITERATIONS = 80
 
 
@@ -72,17 +82,17 @@ def plastic_increment(strength, q, memory, heat, dt):
     """The plastic strain x of a step that solves q - 3 G x = flow stress, or 0 for q below that.
 
     The left side falls with x and the flow stress does not: there is one solution, whatever the
-    size of the step. Newton's method from the flow stress at 0 and its slope, kept within bounds by
-    bisection.
+    size of the step. Newton's method from a first guess, kept within bounds by bisection.
     """
     zero, half = real(0, q), real(0.5, q)
     slope = real(3, q) * strength.G
     enough = real(4, q) * round_off(q) * q  # what the three terms are rounded to
     small = sqrt(round_off(q)) * q
     low, high = zero, q / slope
-    x = last = zero
     active = q > zero
     memory += foreseen(strength, memory, heat)
+    x, curved = first_guess(strength, memory, q, slope)
+    last = x
     for _ in range(_MOST_ITERATIONS):
         flow, hardening = flow_stress(strength, memory, x, heat, dt)
         excess = q - slope * x - flow
@@ -93,7 +103,8 @@ def plastic_increment(strength, q, memory, heat, dt):
         new = x + change
         # Changes go like their squares, c_(n+1) = (c_n / c_(n-1))^2 c_n: is the next one round-off?
         # Beside a kink of the curve they do not: there the excess has to be small, too.
-        next_is_small = abs(change * change * change) <= round_off(q) * new * last * last
+        square, least = change * change, round_off(q) * new
+        next_is_small = (abs(change) * square <= least * last * last) & (curved * square <= least)
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))
         within = (low < new) & (new < high)
         middle = half * (low + high)

@@ -7,7 +7,12 @@ from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
-from karamelo_py.points.laws.strengths.hardening import flow_stress, foreseen, hardening
+from karamelo_py.points.laws.strengths.hardening import (
+    first_guess,
+    flow_stress,
+    foreseen,
+    hardening,
+)
 from karamelo_py.points.laws.temperatures import Warm, homologous
 
 
@@ -121,7 +126,7 @@ def power_law(factor, exponent, strain, value, increment):
     """
     one = real(1, strain)
     near = max(exponent, one) * increment <= real(_NEAR, strain) * strain
-    x = increment / choose(strain > 0, strain, one)
+    x = increment * (one / choose(strain > 0, strain, one))
     series = one
     for k in range(_TERMS, 0, -1):
         series = fma(x * ((exponent - real(k - 1, x)) * real(1 / k, x)), series, one)
@@ -130,6 +135,21 @@ def power_law(factor, exponent, strain, value, increment):
     if not in_all(near):
         value = choose(near, value, power_of_strain(factor, exponent, after))
     return value, value * (exponent / choose(after > 0, after, one))
+
+
+@shared
+def power_law_guess(exponent, strain, hard, excess, slope):
+    """A `first_guess` from the first two derivatives of the power law `hard` (Chebyshev's method).
+
+    `excess` is how far the stress lies above the flow stress; it falls by `slope` with the strain.
+    """
+    zero, one = real(0, strain), real(1, strain)
+    inverse = choose(strain > 0, one / choose(strain > 0, strain, one), zero)
+    steeper = hard * exponent * inverse
+    slope = slope + steeper
+    curved = abs(real(0.5, strain) * (one - exponent) * steeper * inverse / slope)
+    x = max(excess, zero) / slope
+    return x + x * min(curved * x, one), curved
 
 
 @point_function(tags=2, otherwise=True)
@@ -163,6 +183,15 @@ def _(rate, flow, slope, increment, dt):
 def _(strength, memory, heat):
     hard = power_of_strain(strength.B, strength.n, memory[0])
     return hard, softened(strength.softening, heat, hard)
+
+
+@first_guess.on(JohnsonCook)
+def _(strength, memory, q, slope):
+    ep, hard, soft = memory
+    if not isinstance(strength.rate, Absent):
+        return real(0, q), real(0, q)  # the rate rises with the strain: what is known is for none
+    excess = q - (strength.A + hard) * soft
+    return power_law_guess(strength.n, ep, hard * soft, excess, slope)
 
 
 @flow_stress.on(JohnsonCook)

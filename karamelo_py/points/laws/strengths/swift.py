@@ -3,8 +3,17 @@
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.laws.strengths.hardening import flow_stress, foreseen, hardening
-from karamelo_py.points.laws.strengths.johnson_cook import power_law, power_of_strain
+from karamelo_py.points.laws.strengths.hardening import (
+    first_guess,
+    flow_stress,
+    foreseen,
+    hardening,
+)
+from karamelo_py.points.laws.strengths.johnson_cook import (
+    power_law,
+    power_law_guess,
+    power_of_strain,
+)
 
 
 class Swift(NamedTuple):
@@ -51,6 +60,12 @@ hardening(Swift)
 @foreseen.on(Swift)
 def _(strength, memory, heat):
     return (power_of_strain(strength.B, strength.n, memory[0] - strength.C),)
+
+
+@first_guess.on(Swift)
+def _(strength, memory, q, slope):
+    ep, hard = memory
+    return power_law_guess(strength.n, ep - strength.C, hard, q - strength.A - hard, slope)
 
 
 @flow_stress.on(Swift)
