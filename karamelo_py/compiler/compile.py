@@ -286,6 +286,13 @@ def prefetch(array: Any, at: tuple) -> None:
 of_numbers(prefetch)(lambda array, at: lambda array, at: None)
 
 
+def prefetch_records(array: Any, i: Any) -> None:
+    """Have the memory bring the records some nodes behind those of number `i`, in lanes."""
+
+
+of_numbers(prefetch_records)(lambda array, i: lambda array, i: None)
+
+
 @shared(unless=lambda *kinds: lanes_of(kinds))
 def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None:
     """array[i, first + k] += values[k], lane after lane."""

@@ -169,6 +169,22 @@ def _(task, w, x):
     return subtract(x, x)
 
 
+@point_function(otherwise=True)
+def records_read(task, nodes):
+    """The records that a task gathers from, for `prefetch_records`; None of few tasks."""
+    return None
+
+
+@records_read.on(Move)
+def _(task, nodes):
+    return nodes.update
+
+
+@records_read.on(Strain)
+def _(task, nodes):
+    return nodes.velocity
+
+
 @point_function()
 def gathered(task, w, stencil, k, total):
     """`total` with the part of the k-th node of the stencil."""
@@ -393,6 +409,7 @@ def store_optional(array, p, value):
         store(array, p, value)
 
 
+all_records_read = for_tags(records_read, "nodes")
 empty_all = for_tags(empty, "w, x")
 gathered_all = for_tags(gathered, "w, stencil, k, totals", each="totals")
 settled_all = in_turn(settled)

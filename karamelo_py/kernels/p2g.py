@@ -152,6 +152,22 @@ def load_of(quantity, w, p, like):
     """What a point brings to the nodes."""
 
 
+@point_function(otherwise=True)
+def records_given(quantity, nodes):
+    """The records that a quantity is given to, for `prefetch_records`; None of few quantities."""
+    return None
+
+
+@records_given.on(MassMomentum)
+def _(quantity, nodes):
+    return nodes.sums
+
+
+@records_given.on(MomentumAgain)
+def _(quantity, nodes):
+    return nodes.velocity
+
+
 @point_function()
 def scattered(quantity, w, stencil, k, load):
     """Give the k-th node of the stencil its part."""
@@ -344,5 +360,6 @@ def accumulate_optional(array, i, values):
         accumulate(array, i, 0, values)
 
 
+all_records_given = for_tags(records_given, "nodes")
 load_all = for_tags(load_of, "w, p, like")
 scattered_all = for_tags(scattered, "w, stencil, k, loads", each="loads")

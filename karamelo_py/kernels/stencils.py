@@ -3,7 +3,7 @@
 All at once go sums along the arms of a stencil, what is affine, and the corners of domains.
 """
 
-from karamelo_py.compiler.compile import in_all, looping, point_function, shared
+from karamelo_py.compiler.compile import in_all, looping, point_function, prefetch_records, shared
 from karamelo_py.compiler.lanes import Eights, Fours
 from karamelo_py.kernels.affine import (
     affine_parts,
@@ -18,10 +18,10 @@ from karamelo_py.kernels.corners import (
     scatter_corners,
     shows_corners,
 )
-from karamelo_py.kernels.g2p import empty_all, gathered_all
-from karamelo_py.kernels.p2g import scattered_all
+from karamelo_py.kernels.g2p import all_records_read, empty_all, gathered_all
+from karamelo_py.kernels.p2g import all_records_given, scattered_all
 from karamelo_py.kernels.width import OneByOne
-from karamelo_py.points.basis import support
+from karamelo_py.points.basis import entry, support
 from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, is_whole, of_one
 from karamelo_py.points.basis.cpdi.corners import CornerStencil
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
@@ -67,6 +67,7 @@ def _(width, stencil, tasks, w, totals):
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
     if sees_same_nodes(stencil):
         return _gather_parts(tasks, w, with_one_node(stencil), totals)
+    _ask_ahead(all_records_read(tasks, w.nodes), w, stencil)
     return _gather_parts(tasks, w, stencil, totals)
 
 
@@ -89,6 +90,15 @@ def _(width, stencil, tasks, w, totals):
     if by_corners:
         return gather_corners(tasks, w, stencil, totals)
     return _gather(tasks, w, stencil, totals)
+
+
+@shared
+def _ask_ahead(arrays, w, stencil):
+    """Ask the memory for records of nodes behind the last of a stencil: the others were seen."""
+    last = entry(w.basis, w.kin, w.grid, stencil, support(w.basis, w.kin) - 1)[0]
+    for array in arrays:
+        if array is not None:
+            prefetch_records(array, last)
 
 
 @shared
@@ -115,6 +125,7 @@ def _(width, stencil, quantities, w, loads):
     elif sees_same_nodes(stencil):
         _scatter_parts(width, quantities, w, with_one_node(stencil), loads, parts)
     else:
+        _ask_ahead(all_records_given(quantities, w.nodes), w, stencil)
         _scatter_parts(width, quantities, w, stencil, loads, parts)
 
 

@@ -286,16 +286,21 @@ def _load_points(typing_context, array, at):
     return lanes(array, at), codegen
 
 
+def ask(builder, pointer, ahead):
+    """Have the memory bring what lies so many bytes behind an address."""
+    byte = ir.IntType(8).as_pointer()
+    at = builder.gep(builder.bitcast(pointer, byte), [ahead])
+    kind = ir.FunctionType(ir.VoidType(), [byte, I32, I32, I32])
+    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+    read, near, data = 0, 3, 1
+    builder.call(function, [at, *(ir.Constant(I32, k) for k in (read, near, data))])
+
+
 @intrinsic
 def _prefetch(typing_context, array, at):
     def codegen(context, builder, sig, arguments):
         pointer, _ = _points_at(context, builder, array, at, arguments)
-        byte = ir.IntType(8).as_pointer()
-        ahead = builder.gep(builder.bitcast(pointer, byte), [ir.Constant(I32, AHEAD)])
-        kind = ir.FunctionType(ir.VoidType(), [byte, I32, I32, I32])
-        function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
-        read, near, data = 0, 3, 1
-        builder.call(function, [ahead, *(ir.Constant(I32, k) for k in (read, near, data))])
+        ask(builder, pointer, ir.Constant(I32, AHEAD))
         return context.get_dummy_value()
 
     return types.void(array, at), codegen

@@ -8,10 +8,18 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from karamelo_py.compiler.compile import Weighted, accumulate, by_type, lanes_of, tag_class
-from karamelo_py.compiler.lanes.arrays import Beside, at_lane, pointer_to
+from karamelo_py.compiler.compile import (
+    Weighted,
+    accumulate,
+    by_type,
+    lanes_of,
+    prefetch_records,
+    tag_class,
+)
+from karamelo_py.compiler.lanes.arrays import Beside, ask, at_lane, pointer_to
 from karamelo_py.compiler.lanes.registers import (
     I32,
+    I64,
     Lanes,
     element,
     lane,
@@ -23,6 +31,8 @@ from karamelo_py.compiler.lanes.registers import (
 from karamelo_py.compiler.tuples import row
 
 WIDEST = 8  # components of records that a field is given to at once
+
+AHEAD = 16  # nodes by which records are asked of the memory ahead of their use
 
 
 def _transposed(builder: Any, rows: list) -> list:
@@ -118,6 +128,26 @@ def _gather_weighted(typing_context, array, nodes, first, weights, like):
         return context.make_tuple(builder, made, found[: len(like)])
 
     return made(array, nodes, types.int64, weights, like), codegen
+
+
+@intrinsic
+def _prefetch_records(typing_context, array, nodes):
+    def codegen(context, builder, sig, arguments):
+        strides = context.make_array(array)(context, builder, arguments[0]).strides
+        stride = cgutils.unpack_tuple(builder, strides)[0]
+        ahead = builder.mul(stride, ir.Constant(stride.type, AHEAD))
+        column = ir.Constant(I64, 0)
+        for k in range(nodes.width):
+            pointer = at_lane(context, builder, array, arguments[0], nodes, arguments[1], k, column)
+            ask(builder, pointer, ahead)
+        return context.get_dummy_value()
+
+    return types.void(array, nodes), codegen
+
+
+@by_type(prefetch_records)
+def _prefetch_records_by_type(array, i):
+    return (lambda array, i: _prefetch_records(array, i)) if lanes_of(i) else None
 
 
 def _fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
