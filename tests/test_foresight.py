@@ -422,6 +422,15 @@ def test_units_are_named_where_the_step_is_far_above_the_stable_one(
     assert ("in mm, t, s 1e-9" in result.err) == told
 
 
+@pytest.mark.parametrize(("v", "told"), [(-100, False), (-1000, True)])
+def test_speeds_that_no_solid_bears_are_told(run_interpreted, v, told):
+    """Waves of 8.2 there."""
+    start = f"fix(v, initial_velocity_particles, all, {v}, 0)"
+    said = run_interpreted(block(2, start, "run(1)"), command="check").err
+    assert (f"points move at 1e+03, {1000 / 8.2:.3g}"[:28] in said) == told
+    assert ("The units of velocities, densities and moduli may be mixed" in said) == told
+
+
 TOO_LARGE = "the step 0.1 of set_dt is above the stable limit"
 
 

@@ -16,6 +16,7 @@ from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpgimp import CPGIMPDiagonal
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws import law_kind, specific_volume
+from karamelo_py.points.laws.eos.fluid import Tait
 from karamelo_py.points.laws.eos.ideal_gas import IdealGas
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.transfers.asflip import ASFLIP
@@ -23,7 +24,7 @@ from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.foreseen import Foreseen
-from karamelo_py.run.idle import warn_about_rest
+from karamelo_py.run.idle import UNITS, warn_about_rest
 from karamelo_py.run.large_steps import duration_of_later, warn_about_steps
 from karamelo_py.run.noise import ELASTIC, noises
 from karamelo_py.run.simulation import Simulation
@@ -41,6 +42,7 @@ SEPARATE = 0.1  # of ASFLIP's strength of separation, which elastic bodies bear
 SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
 DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
 GAS = 1e-3  # kg/m^3, from where on
+IMPOSSIBLE = 30.0  # times the speed of waves: mm/s in the place of m/s make 1000 of 1
 SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
 
 
@@ -216,6 +218,19 @@ def _fast_shocks(s: Foreseen) -> Iterator[Failure]:
         )
 
 
+def _impossible_speeds(s: Foreseen) -> Iterator[Failure]:
+    flowing = {IdealGas, Tait}
+    solid = any(not flowing & set(law_kind(one.material.law)) for one in s.hub.solids.values())
+    if solid and s.speed > IMPOSSIBLE:
+        yield Failure(
+            "units of velocities",
+            f"points move at {s.simulation.fastest():.3g}, {s.speed:.3g} times the speed of waves "
+            f"({s.waves:.3g}), which no solid bears when it meets another or a wall. The units of "
+            "velocities, densities and moduli may be mixed",
+            UNITS,
+        )
+
+
 def _other_units(s: Foreseen) -> Iterator[Failure]:
     """Of materials whose numbers are in others than those that `units` names."""
     units = s.hub.output.units
@@ -253,6 +268,7 @@ RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _lost_spin,
     _loose_points,
     _fast_shocks,
+    _impossible_speeds,
     _other_units,
 )
 
