@@ -6,6 +6,7 @@ once.
 """
 
 from collections.abc import Callable, Iterator
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
+from karamelo_py.run.diagnosis import no_number
 from karamelo_py.run.foreseen import Foreseen
 from karamelo_py.run.idle import UNITS, warn_about_rest
 from karamelo_py.run.large_steps import duration_of_later, warn_about_steps
@@ -33,6 +35,7 @@ from karamelo_py.run.velocities import warn_about_velocities
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.usl import USL
+from karamelo_py.script.errors import ScriptError
 
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
 FAST = 0.2  # of the speed of waves, from where on usf and usavg feed moments
@@ -279,9 +282,11 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     Raises
     ------
     ScriptError
-        If temperatures would swing, in a run that does not halve its step then.
+        If temperatures would swing, in a run that does not halve its step then, or if points have
+        velocities that are no numbers.
     """
     _warn_about_groups(hub)
+    refuse_endless_speeds(hub, simulation)
     scene = Foreseen(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + duration_of_later(hub, simulation)
     if scene.waves > 0 and blows_up(hub, simulation):
@@ -299,6 +304,24 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
                     place=failure.place or hub.update.method.place,
                     hint=failure.cure,
                 )
+
+
+def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
+    """Refuse velocities of points that are no numbers, with the formula that they come from.
+
+    Raises
+    ------
+    ScriptError
+        If there are some.
+    """
+    if not isfinite(simulation.fastest()):
+        found = no_number(
+            hub,
+            simulation,
+            f"points have a velocity that is not a number at time {simulation.time:.6g}",
+            "look for a formula that gives NaN or infinity, such as a division by zero",
+        )
+        raise ScriptError(found.message, place=found.place, hint=found.hint)
 
 
 def _gone(hub: Hub, simulation: Simulation) -> float:
