@@ -316,7 +316,7 @@ def test_usl_is_stable_at_the_default_step(run_interpreted, method, ppc):
 
 
 REASONS = {
-    "step": ("cells in one step", "above the stable limit"),
+    "step": ("cells in one step", "the step is too large"),
     "fold": ("inside out (det F <= 0)", "finer grid"),
     "lost": ("leaves the domain", "boundary(delete)"),
     "nan": ("not a number", "formula"),
