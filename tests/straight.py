@@ -25,7 +25,8 @@ from karamelo_py.compiler.compile import SPELLED
 from karamelo_py.kernels import stencils, sums, sweep
 from karamelo_py.kernels.visit import Work
 
-AFTER = 300  # calls from which on it is worth to write a function down
+# Calls from which on it is worth to write a function down: what is done at one node, and a visit.
+AFTER, AFTER_VISITS = 300, 80
 
 
 class Branches(Exception):
@@ -107,7 +108,8 @@ _operators()
 class Writer:
     """The text of a function that is being written."""
 
-    def __init__(self) -> None:
+    def __init__(self, given: str) -> None:
+        self.given = given  # the names of the arguments
         self.lines: list[str] = []
         self.names: dict[str, Any] = {}  # of constants and functions
         self.once: dict[str, Known] = {}  # what has been computed
@@ -171,7 +173,7 @@ class Writer:
             if self.stored:
                 raise Branches
             self.asked.add(otherwise)
-            self.lines.append(f"if {otherwise}: return other(*arguments)")
+            self.lines.append(f"if {otherwise}: return other({self.given})")
 
     def needed(self) -> list[str]:
         """The lines, without those whose result nothing uses."""
@@ -449,16 +451,14 @@ def _copy(thing: Any, copies: dict) -> Any:
 
 def write(function: Callable, arguments: tuple, other: Callable) -> Callable:
     """The straight function of arguments like these; `other` serves those that answer otherwise."""
-    writer = _now.writer = Writer()
+    names = ", ".join(f"a{k}" for k in range(len(arguments)))
+    writer = _now.writer = Writer(names)
     copies: dict = {}
     given = [writer.wrap(_copy(a, copies), f"a{k}") for k, a in enumerate(arguments)]
     result = ref(_called(function)(*given))
     writer.flush()
     writer.lines.append(f"return {result}")
-    names = "".join(f"a{k}, " for k in range(len(arguments)))
-    return compiling.define(
-        "*arguments", f"{names} = arguments", *writer.needed(), other=other, **writer.names
-    )
+    return compiling.define(names, *writer.needed(), other=other, **writer.names)
 
 
 # --- in the place of what visits call -------------------------------------------------------------
@@ -495,8 +495,14 @@ def _kind_of(thing: Any, arrays: dict) -> Any:
 kinds = Kinds()
 
 
-def lazily(function: Callable, answers: int = 4) -> Callable:
-    """The function; after some calls a straight one, of so many different `answers`."""
+def lazily(
+    function: Callable, after: int, answers: int = 4,
+    tell: Callable[[Callable], None] = lambda made: None,
+) -> Callable:  # fmt: skip
+    """The function; `after` some calls a straight one, of so many different `answers`.
+
+    ``tell(made)`` is called with what is run from then on.
+    """
     calls, made = 0, None
 
     def call(*arguments: Any) -> Any:
@@ -504,12 +510,13 @@ def lazily(function: Callable, answers: int = 4) -> Callable:
         if made is not None:
             return made(*arguments)
         calls += 1
-        if calls < AFTER or not answers:
+        if calls < after or not answers:
             return function(*arguments)
         try:
-            made = write(function, arguments, lazily(function, answers - 1))
+            made = write(function, arguments, lazily(function, after, answers - 1))
         except Exception:
             made = function
+        tell(made)
         return made(*arguments)
 
     return call
@@ -518,15 +525,38 @@ def lazily(function: Callable, answers: int = 4) -> Callable:
 def straight(function: Callable, kind: Callable) -> Callable:
     """In the place of `function`: what is written for arguments of one ``kind(*arguments)``."""
     known: dict[Any, Callable] = {}
+    made: set[Callable] = set()
+    after = AFTER_VISITS if kind is of_visit else AFTER
+
+    def find(arguments: tuple) -> Callable:
+        key = kind(*arguments)
+
+        def tell(what: Callable) -> None:
+            known[key] = what
+            made.add(what)
+
+        if key not in known:
+            known[key] = lazily(function, after, tell=tell)
+        return known[key]
 
     def call(*arguments: Any) -> Any:
-        key = kind(*arguments)
-        found = known.get(key)
-        if found is None:
-            found = known[key] = lazily(function)
-        return found(*arguments)
+        return find(arguments)(*arguments)
 
-    return call
+    # A loop over nodes asks with the same three tuples again and again; looking up their kind
+    # would take longer than what is done at a node. Held here, none is another one's memory.
+    last: tuple = (None, None, None, None)
+
+    def at_node(one: tuple, kin: tuple, nodes: tuple, *rest: Any) -> Any:
+        nonlocal last
+        a, b, c, found = last
+        if one is not a or kin is not b or nodes is not c:
+            arguments = one, kin, nodes, *rest
+            found = find(arguments)
+            if found in made:
+                last = one, kin, nodes, found
+        return found(one, kin, nodes, *rest)
+
+    return at_node if kind in (of_node, of_record) else call
 
 
 def of_visit(tags: tuple, w: tuple, *others: Any) -> tuple:

@@ -3,12 +3,14 @@
 import os
 import subprocess
 import sys
+import warnings
 
 import pytest
 from scenes import block
 
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.cli import main
+from karamelo_py.app.simulation import Simulation
 
 
 @pytest.mark.parametrize("script", ["", "# nothing\n", "dimension(1, 0, 1, 0.1)\n"])
@@ -35,6 +37,45 @@ def test_bodies_without_a_run_are_a_mistake(run_interpreted):
     for line in ("print(dt)", "quit", "run(1)"):
         run_interpreted(BODY + line + "\n")
     run_interpreted(BODY, command="check")
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_what_stands_behind_the_last_run_is_told(run_interpreted, command):
+    """Before the first one; what some run sees is none of that."""
+    lines = ("dump(d, all, particle, 1, d.txt, x)", "fix(g, body_force, all, -1e-6)",
+             "compute(E, kinetic_energy, all)", "plot(p, 1, time, E)")  # fmt: skip
+    seen = "\n".join(["run(1)", *lines, "run(1)", "save_plot(p.png)", "print(E)"])
+    assert run_interpreted(BODY + seen, command=command).err == ""
+    late = run_interpreted(BODY + "\n".join(["run(1)", "run(1)", *lines]), command=command).err
+    said = [line for line in late.splitlines() if "warning: " in line]
+    assert [f"{kind} stands behind the last run" in line for kind, line in zip(
+        ("fix 'g'", "dump 'd'", "plot 'p'"), said, strict=True)] == [True] * 3  # fmt: skip
+    assert all(f"| {line}" in late for line in lines if "compute" not in line)
+
+
+def test_a_program_may_go_on_behind_its_script():
+    with Simulation(BODY) as sim, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sim.run(1)
+        sim.command("fix(g, body_force, all, -1e-6)")
+        sim.run(1)
+
+
+def test_what_is_defined_further_down_is_told(run_interpreted):
+    material = "material(rubber, neo-hookean, 1, 1, 0)\n"
+    said = run_interpreted(BODY.replace(material, "") + material + "run(1)\n", status=1).err
+    assert "unknown material 'rubber'" in said
+    assert "hint: material 'rubber' stands further down: move line 6 up" in said
+    assert said.count("error: ") == 1
+
+
+def test_an_id_that_is_given_twice_is_one_mistake(run_interpreted):
+    """The one that the other was meant to have is not told to be unknown."""
+    twice = BODY.replace("material(", "region(line, block, 0.5, 1)\nmaterial(")
+    twice += "solid(other, region, right, 2, rubber, 0.1)\nrun(-1)\n"
+    said = run_interpreted(twice, status=1).err
+    assert "region ID 'line' is already used (line 4)" in said and "'right'" not in said
+    assert said.count("error: ") == 1
 
 
 def test_calculations_need_no_run(run_script):

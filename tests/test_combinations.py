@@ -1,10 +1,10 @@
 """Every combination of method, basis, transfer, scheme and kinematics runs or is refused.
 
-Interpreted: each combination with one of the kinematics in turn, with the others if ``-m full``.
-Compiled: two, and a pairwise selection if ``-m full``.
+Interpreted: a selection with every pair of choices, and each refusal once; all if ``-m full``.
+Compiled: two, and the selection if ``-m full``.
 """
 
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -36,14 +36,21 @@ PAIRWISE = [
         if not refused(*base, *way)
     )[0]
 ]
+SELECTED = set(PAIRWISE)
 
 
-def its_turn(case: tuple[str, ...]) -> list[tuple[str, str]]:
-    """The ways that run with the kinematics of a case: each goes with one of those of its base."""
-    kinematics, *base = case
-    those = [k for k in KINEMATICS if fits(k, case[3])]
-    place = those.index(kinematics) + BASES.index(tuple(base))
-    return [way for k, way in enumerate(WAYS) if (k + k // len(SCHEMES) - place) % len(those) == 0]
+def those_of(case: tuple[str, ...]) -> list[str]:
+    """The kinematics that its base fits."""
+    return [kinematics for kinematics in KINEMATICS if fits(kinematics, case[3])]
+
+
+def always(case: tuple[str, ...]) -> list[tuple[str, str]]:
+    """The ways that run always: those of the selection and, with its first kinematics, refusals."""
+    first = case[0] == those_of(case)[0]
+    return [
+        way for way in WAYS
+        if (*case, *way) in SELECTED or (first and refused(*case[1:], *way))
+    ]  # fmt: skip
 
 
 def named(case: tuple[str, ...]) -> str:
@@ -77,25 +84,31 @@ def run_ways(case, ways, state_interpreted, run_interpreted, tmp_path):
 
 @pytest.mark.parametrize("case", CASES, ids=named)
 def test_interpreted(case, state_interpreted, run_interpreted, tmp_path):
-    """Two steps of every method, basis, transfer and scheme."""
-    run_ways(case, its_turn(case), state_interpreted, run_interpreted, tmp_path)
+    """Two steps of every method, basis and kinematics, each with every transfer and scheme."""
+    run_ways(case, always(case), state_interpreted, run_interpreted, tmp_path)
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("case", CASES, ids=named)
-def test_interpreted_with_all_kinematics(case, state_interpreted, run_interpreted, tmp_path):
+def test_interpreted_in_all_ways(case, state_interpreted, run_interpreted, tmp_path):
     """All the others."""
-    ways = [way for way in WAYS if way not in its_turn(case)]
+    ways = [way for way in WAYS if way not in always(case)]
     run_ways(case, ways, state_interpreted, run_interpreted, tmp_path)
 
 
-def test_every_way_has_its_turn():
-    """With each base, every transfer and scheme runs once; each pair with a kinematics occurs."""
-    turns = [(case, way) for case in CASES for way in its_turn(case)]
-    assert sorted((case[1:], way) for case, way in turns) == sorted(product(BASES, WAYS))
-    for part in (0, 1):
-        met = {(case[0], way[part]) for case, way in turns}
-        assert met == set(product(KINEMATICS, (TRANSFERS, SCHEMES)[part]))
+def test_every_pair_is_met():
+    """Every pair of choices that is not refused runs, and all that is refused is tried once."""
+    pairs: dict[bool, set] = {True: set(), False: set()}
+    tried = []
+    for case, way in product(CASES, WAYS):
+        if refused(*case[1:], *way):
+            tried += [(*case[1:], *way)] * (way in always(case))
+            continue
+        choices = case[0], case[1:], *way
+        pairs[way in always(case)].update(combinations(enumerate(choices), 2))
+    assert pairs[False] <= pairs[True]
+    refusals = [(*base, *way) for base, way in product(BASES, WAYS) if refused(*base, *way)]
+    assert sorted(tried) == sorted(refusals)
 
 
 COMPILED = [pytest.param(case, id=named(case)) for case in PAIRWISE]

@@ -8,7 +8,7 @@ from conftest import INPUTS
 from scenes import SCHEMES, TRANSFERS, block
 from selection import parameters
 
-# Each transfer with one scheme in turn; test_combinations.py has them all, for two steps.
+# Each transfer with one scheme in turn; test_combinations.py has every pair, for two steps.
 WAYS = list(product(TRANSFERS, SCHEMES))
 TURN = [way for k, way in enumerate(WAYS) if (k + k // len(SCHEMES)) % len(SCHEMES) == 0]
 

@@ -422,6 +422,25 @@ def test_units_are_named_where_the_step_is_far_above_the_stable_one(
     assert ("in mm, t, s 1e-9" in result.err) == told
 
 
+@pytest.mark.parametrize(("v", "told"), [(-100, False), (-1000, True)])
+def test_speeds_that_no_solid_bears_are_told(run_interpreted, v, told):
+    """Waves of 8.2 there."""
+    start = f"fix(v, initial_velocity_particles, all, {v}, 0)"
+    said = run_interpreted(block(2, start, "run(1)"), command="check").err
+    assert (f"points move at 1e+03, {1000 / 8.2:.3g}"[:28] in said) == told
+    assert ("The units of velocities, densities and moduli may be mixed" in said) == told
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+@pytest.mark.parametrize("formula", ["1/time", "log(y0 - y0)"])
+def test_velocities_that_are_no_numbers_at_the_start_are_refused(run_interpreted, command, formula):
+    start = f"fix(v, initial_velocity_particles, all, {formula}, 0)"
+    text = block(2, start, "set_dt(0.001)", "run(2)")
+    said = run_interpreted(text, command=command, status=1).err
+    assert said.count("error: ") == 1 and f"| {start}" in said and "warning: " not in said
+    assert f"from {formula}" in said
+
+
 TOO_LARGE = "the step 0.1 of set_dt is above the stable limit"
 
 

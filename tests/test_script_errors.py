@@ -89,6 +89,8 @@ NAMES = [
     ("b = a + 1\na = 3", 5, "'a' is used before it is set"),
     ("c = Ek_s\nfix(Ek, kinetic_energy, all)", 5, "used before its fix is defined"),
     ("a = a + 1", 5, "used before it is set"),
+    ("b = a\na = 3*c\nc = 2*b", 5, "'b' and 'a' need each other"),
+    ("b = a\na = 3*c\nc = 2", 5, "move line 3 up"),
     ("a = sn(1)", 5, "did you mean 'sin'?"),
     ("a = sin", 5, "sin(a)"),
     ("a = run", 5, "needs parentheses"),

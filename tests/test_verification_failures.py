@@ -125,21 +125,27 @@ def test_flip_rings_behind_a_wave(run):
 
 @pytest.mark.xdist_group("bar")
 def test_flip_noise_does_not_grow(run_script):
-    """The energy of the vibrating bar over 100 periods."""
-    check_energy(run_script, 100)
+    """The energy of the vibrating bar over 40 periods."""
+    check_energy(run_script, 40)
 
 
 @pytest.mark.full
-def test_flip_noise_does_not_grow_in_1000_periods(run_script):
-    check_energy(run_script, 1000)
+@pytest.mark.parametrize("periods", [100, 1000])
+def test_flip_noise_does_not_grow_in_many_periods(run_script, periods):
+    check_energy(run_script, periods)
 
 
 def check_energy(run_script, periods):
+    """What is gained is told from nothing by 40 periods as by 100: limits are a share of those.
+
+    Found: 5e-5 of the largest energy in 40 periods, 1e-4 in 100; nothing and 7e-5 of the mean.
+    """
+    share = min(periods / 100, 1)
     log = run_scene(run_script, "vibrating_bar", LINEAR, periods=periods).log
     total = log.Ek + log.Es
     last = total[log.Time > log.Time[-1] - 10].mean()
-    assert total.max() < 1.005 * total[log.Time < 10].max()
-    assert last < 1.002 * total[log.Time < 10].mean()
+    assert total.max() < (1 + 0.005 * share) * total[log.Time < 10].max()
+    assert last < (1 + 0.002 * share) * total[log.Time < 10].mean()
     assert frequency(log.Time, log.v_x) == pytest.approx(2 * np.pi / 10, rel=2e-3)
 
 
@@ -310,7 +316,7 @@ def test_usl_is_stable_at_the_default_step(run_interpreted, method, ppc):
 
 
 REASONS = {
-    "step": ("cells in one step", "above the stable limit"),
+    "step": ("cells in one step", "the step is too large"),
     "fold": ("inside out (det F <= 0)", "finer grid"),
     "lost": ("leaves the domain", "boundary(delete)"),
     "nan": ("not a number", "formula"),

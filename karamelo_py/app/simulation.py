@@ -93,7 +93,7 @@ class Simulation:
             refuse_copies()
         self.hub = hub = Hub(Console() if verbose else Quiet())
         hub.settings.trusts = trust_geometries
-        hub.pausing = True
+        hub.pausing = hub.open_ended = True
         hub.output.log.rows = []
         hub.output.writes = out is not None
         self._numbers = itertools.count(1)

@@ -238,7 +238,9 @@ def plot(
     plots = hub.output.plots
     if ID in plots.ids():
         raise ScriptError(f"plot ID '{ID}' is already used", argument="ID", expected="another ID")
-    plots.add(ID, Curve(every, x, y, axis, scale))
+    curve = Curve(every, x, y, axis, scale)
+    curve.place = hub.place
+    plots.add(ID, curve)
 
 
 def save_plot(hub: Hub, file: OutputFile) -> None:

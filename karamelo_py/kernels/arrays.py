@@ -12,21 +12,8 @@ import numpy as np
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import name_of
-from karamelo_py.compiler.loops import subkernel
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.kinematics import dimension
-
-
-@subkernel
-def first_from(ascending, begin, end, x):
-    """The first place of these whose number is not below `x`; NumPy's search compiles for 0.4 s."""
-    while begin < end:
-        middle = (begin + end) // 2
-        if ascending[middle] < x:
-            begin = middle + 1
-        else:
-            end = middle
-    return begin
 
 
 class Nodes(NamedTuple):
@@ -85,6 +72,18 @@ class Points(NamedTuple):
     grid: np.ndarray  # (n,) int32, the grid of each point
     id: np.ndarray  # (n,) int64, 0-based number of each point in the scene
     fields: tuple  # declared fields, (components, n)
+
+
+@shared
+def known_to_laws(points):
+    """The points with what every scene has of them, and no more.
+
+    What asks laws alone is compiled once for each then, not for all methods that go with it.
+    """
+    return Points(
+        points.x, None, points.v, points.mass, points.state, points.material, points.grid,
+        points.id, (),
+    )  # fmt: skip
 
 
 def own_arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:

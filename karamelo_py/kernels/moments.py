@@ -7,6 +7,7 @@ from karamelo_py.kernels.node_hooks import DONE, node_hooks
 from karamelo_py.kernels.point_hooks import Motion, clear_totals, point_hooks, publish_totals
 from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows
+from karamelo_py.points.kinematics import planar
 
 
 @point_function(otherwise=True)
@@ -44,7 +45,7 @@ def corners_that_move(s):
 def hook_points(block, s, hooks, stage, now, then):
     points = block.points
     motion = Motion(points.v, points.mass, points.x[now], points.x[then], corners_that_move(s))
-    point_hooks(stage, motion, s.kin, points.id, hooks, s.control, step_size(s))
+    point_hooks(stage, motion, planar(s.kin), points.id, hooks, s.control, step_size(s))
 
 
 @point_function(otherwise=True)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from karamelo_py.compiler.addresses import caller_of
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.formula import BLOCK
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import entered, subkernel
@@ -19,7 +19,7 @@ from karamelo_py.kernels.arrays import (
     POST_VELOCITIES_TO_GRID,
     TIME,
     VALUE,
-    first_from,
+    Nodes,
     of_change,
     of_force,
     of_momentum,
@@ -33,6 +33,8 @@ from karamelo_py.kernels.hooks import (
     publish_total,
     with_items_of,
 )
+from karamelo_py.kernels.loss import Rubbed
+from karamelo_py.kernels.searching import first_from
 from karamelo_py.kernels.totals import (
     WORK,
     add_many,
@@ -44,7 +46,7 @@ from karamelo_py.kernels.totals import (
 )
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import dimension
+from karamelo_py.points.kinematics import dimension, planar
 
 _call_node_function = caller_of(NODE_FUNCTION)
 
@@ -346,7 +348,14 @@ def _work_of_loads(kin, grids, nodes, ranges, hooks, control, dt):
     carry(control.totals[WORK])
 
 
-@entered
+@shared
+def _rubbed_alone(nodes):
+    """The nodes with that of their declared fields which walls know."""
+    fields = tuple([one for one in nodes.fields if type(one) is Rubbed])
+    return Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
+
+
+@shared
 def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
 
@@ -354,7 +363,14 @@ def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kep
     When all is `DONE` the work of the loads is added up: here, so that the way through the nodes is
     compiled once.
     """
-    dt = float(dt)
+    nodes = _rubbed_alone(nodes)
+    _node_hooks(
+        stage, target, planar(kin), grids, nodes, ranges, hooks, control, float(dt), kept
+    )  # fmt: skip
+
+
+@entered
+def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     if stage == DONE:
         _work_of_loads(kin, grids, nodes, ranges, hooks, control, dt)
         return

@@ -17,7 +17,8 @@ from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import TIMESTEP, first_from
+from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws
+from karamelo_py.kernels.searching import first_from
 from karamelo_py.kernels.totals import KINETIC, STORED, WORK, add_to, agree_on_heat, collect
 from karamelo_py.kernels.width import lanes_of_law, points_from, width_of
 from karamelo_py.points.kinematics import dimension, free_from
@@ -121,7 +122,8 @@ def _sum_energies(mode, kin, points, laws, tiling, control):
 
 @over_blocks
 def _sum_blocks(block, s, mode):
-    _sum_energies(mode, s.kin, block.points, block.laws, block.tiling, s.control)
+    points = known_to_laws(block.points)
+    _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
 
 
 @entered
@@ -148,9 +150,9 @@ def sum_energies(s, mode):
 
 
 @entered
-def _add_momenta(kin, points, tiling, control):
-    """Mass and momentum of each solid, to the totals behind those of the published values."""
-    firsts, sums, d = control.firsts, control.answer, dimension(kin)
+def _add_momenta(d, ids, masses, v, tiling, control):
+    """Mass and momentum of each solid, 1 + d, to the totals behind those of published values."""
+    firsts, sums = control.firsts, control.answer
     for t in range(tiling.count[0]):
         solid = int(tiling.report[t, OF_SOLID])
         if solid >= 0:
@@ -159,14 +161,14 @@ def _add_momenta(kin, points, tiling, control):
         else:
             sums[: 1 + d] = begin = end = 0
             for p in range(tiling.range[t, 0], tiling.range[t, 1]):
-                if not begin <= points.id[p] < end:
+                if not begin <= ids[p] < end:
                     _add_momentum(control, solid, d)
-                    solid = _solid_of(firsts, points.id[p])
+                    solid = _solid_of(firsts, ids[p])
                     begin, end = firsts[solid], _behind(firsts, solid)
-                mass = float(points.mass[p])
+                mass = float(masses[p])
                 sums[0] += mass
                 for k in range(d):
-                    sums[1 + k] += mass * float(points.v[k, p])
+                    sums[1 + k] += mass * float(v[k, p])
         _add_momentum(control, solid, d)
 
 
@@ -186,7 +188,8 @@ def _add_momentum(control, solid, d):
 
 @over_blocks
 def _add_blocks(block, s):
-    _add_momenta(s.kin, block.points, block.tiling, s.control)
+    points = block.points
+    _add_momenta(dimension(s.kin), points.id, points.mass, points.v, block.tiling, s.control)
 
 
 @entered
@@ -298,7 +301,7 @@ def _range_of_heat(kin, points, laws, control):
 
 @over_blocks
 def _range_blocks(block, s):
-    _range_of_heat(s.kin, block.points, block.laws, s.control)
+    _range_of_heat(s.kin, known_to_laws(block.points), block.laws, s.control)
 
 
 @shared

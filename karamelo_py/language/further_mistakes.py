@@ -79,9 +79,12 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     dependents = Dependents()
 
     def tell(error: ScriptError) -> None:
-        # One name that is not known may stand in many lines.
+        # One name that is not known may stand in many lines. It follows where an ID was given
+        # twice: the second of the two was meant to have another, which nobody knows.
         for one in (error, *error.others):
-            if one.message not in seen:
+            given_twice = (kind for kind, again in map(_given_twice, seen) if again)
+            follows = any(one.message.startswith(f"unknown {kind} '") for kind in given_twice)
+            if one.message not in seen and not follows:
                 found.append(one)
             seen.add(one.message)
         error.others = []
@@ -110,6 +113,12 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     for error in misnamed(interpreter, passed_over):
         tell(error)
     return sorted(found, key=_order)[:MOST]
+
+
+def _given_twice(message: str) -> tuple[str, bool]:
+    """The kind of what a message is about, and whether it says that an ID was given twice."""
+    kind, found, _ = message.rpartition(" ID '")
+    return kind.rpartition(": ")[2], bool(found) and "' is already used" in message
 
 
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:

@@ -185,9 +185,33 @@ def _further_down(script: Names) -> dict[str, int]:
     return found
 
 
+def line_below(script: Any, kind: str, ID: str) -> int | None:
+    """The line further down that defines a part of this kind and ID, if there is one."""
+    for frame in reversed(getattr(script, "frames", ())):
+        for statement in frame.statements[frame.next :]:
+            made = isinstance(statement, Call) and statement.name == kind
+            if made and statement.arguments and statement.arguments[0].code.strip() == ID:
+                return statement.place.line
+    return None
+
+
+def _needs(script: Names, name: str, other: str) -> bool:
+    """Whether the variable `name`, as it is set further down, comes to need `other`."""
+    behind = [s for frame in script.frames for s in frame.statements[frame.next :]]
+    set_there = [s for s in reversed(behind) if isinstance(s, Assignment)]
+    below = {s.name: set(re.findall(r"\w+", s.right.code)) for s in set_there}
+    reached: set[str] = set()
+    ahead = {name}
+    while ahead:
+        reached |= ahead
+        ahead = set().union(*(below.get(one, set()) for one in ahead)) - reached
+    return other in reached
+
+
 def defined_later(script: Names, name: str) -> Any:
     """How to say that `name` is defined further down, if it is."""
     ID = re.sub(r"_[^_]+$", "", name)
+    own = script.statement.name if isinstance(script.statement, Assignment) else ""
     for frame in reversed(script.frames):
         for statement in frame.statements[max(frame.next - 1, 0) :]:
             line = statement.place.line
@@ -206,6 +230,8 @@ def defined_later(script: Names, name: str) -> Any:
             hint = f"move line {line} up"
             if frame is script.frames[-1] and statement.place == script.hub.place:
                 where, hint = f"it is set in this very line {line}", "give it a value first"
+            elif own and _needs(script, name, own):
+                hint = f"'{own}' and '{name}' need each other: set one of them without the other"
             return lambda place, what=what, where=where, hint=hint: ScriptError(
                 what, place=place, expected=f"a name that is known here; {where}", hint=hint
             )

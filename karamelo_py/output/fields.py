@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.kernels.arrays import MASS
+from karamelo_py.kernels.arrays import MASS, known_to_laws
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.export import (
     ENERGY,
@@ -309,10 +309,12 @@ def _of_points(simulation: Any, filler: Callable, *columns: int) -> np.ndarray:
     s = simulation.setup
     out = np.zeros((simulation.count, *columns))
     for block in s.blocks:
-        if fill := filler(block.laws):
-            rows = np.zeros((len(block.points.id), *columns))
-            fill(s.kin, s.nodes.sums[0, MASS], block.points, block.laws, rows)
-            out[block.points.id - simulation.first] = rows
+        points = known_to_laws(block.points)
+        # Arrays without points are of another type, for which all would be compiled once more.
+        if len(points.id) and (fill := filler(block.laws)):
+            rows = np.zeros((len(points.id), *columns))
+            fill(s.kin, s.nodes.sums[0, MASS], points, block.laws, rows)
+            out[points.id - simulation.first] = rows
     return out
 
 
@@ -332,9 +334,10 @@ def _of_law(density: Callable) -> Callable:
     def energies(s: Any, block: Any) -> np.ndarray | None:
         if not can(block.laws, density):
             return None
-        rows = np.zeros(len(block.points.id))
-        like = s.nodes.sums[0, MASS]
-        export(density.tag, True, s.kin, like, block.points, block.laws, rows)
+        points, like = known_to_laws(block.points), s.nodes.sums[0, MASS]
+        rows = np.zeros(len(points.id))
+        if len(rows):
+            export(density.tag, True, s.kin, like, points, block.laws, rows)
         return rows
 
     return energies

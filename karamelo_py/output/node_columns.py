@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.kernels.arrays import MASS, TIME, of_force, of_momentum
+from karamelo_py.kernels.arrays import MASS, TIME, known_to_laws, of_force, of_momentum
 from karamelo_py.kernels.export import EXPORTED, JACOBIAN, export_state, export_to_nodes
 from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.kernels.p2g import Force
@@ -172,9 +172,10 @@ LOADS = "post_particles_to_grid"
 
 def _volume(simulation: Any, block: Any) -> np.ndarray:
     s = simulation.stepped
-    rows = np.zeros((len(block.points.id), EXPORTED))
-    export_state(s.kin, s.nodes.sums[0, MASS], block.points, block.laws, rows)
-    return simulation.volume0_of(block.points.id) * rows[:, JACOBIAN]
+    points = known_to_laws(block.points)
+    rows = np.zeros((len(points.id), EXPORTED))
+    export_state(s.kin, s.nodes.sums[0, MASS], points, block.laws, rows)
+    return simulation.volume0_of(points.id) * rows[:, JACOBIAN]
 
 
 def _rigid(simulation: Any, block: Any) -> np.ndarray | None:

@@ -34,6 +34,7 @@ class Curve(Rhythmic):
         self.points: list[tuple[float, float]] = []
         self.last_step: int | None = None
         self.id = y.name
+        self.place: Place | None = None
 
     def write(self) -> None:
         """Collect the point of the present state."""

@@ -189,7 +189,7 @@ def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     return message, f"something went wrong before: look at the dumps; {smaller}"
 
 
-def _no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
+def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
     """The trouble with what is NaN, and the formula that it comes from, where that is found."""
     found = culprit(hub, simulation)
     if found is None:
@@ -228,7 +228,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     """What is wrong with the first point that went wrong, and what can be done."""
     wrong = [one for one in simulation.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
-        return _no_number(
+        return no_number(
             hub,
             simulation,
             "the temperature of a point is not a number",
@@ -241,14 +241,14 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     old, new = old[:d], place[:d]
     smaller = _smaller_step(hub, simulation)
     if not np.isfinite(old).all():
-        return _no_number(
+        return no_number(
             hub,
             simulation,
             f"{name} has no position (NaN)",
             f"look for a formula that gives NaN; {smaller}",
         )
     if not np.isfinite(new).all() or not np.isfinite(v).all():
-        return _no_number(
+        return no_number(
             hub,
             simulation,
             f"{name} at {_place(old)} gets a velocity that is not a number",

@@ -6,6 +6,7 @@ once.
 """
 
 from collections.abc import Callable, Iterator
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,14 +17,16 @@ from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpgimp import CPGIMPDiagonal
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws import law_kind, specific_volume
+from karamelo_py.points.laws.eos.fluid import Tait
 from karamelo_py.points.laws.eos.ideal_gas import IdealGas
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.points.transfers.flip import FLIP
 from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
+from karamelo_py.run.diagnosis import no_number
 from karamelo_py.run.foreseen import Foreseen
-from karamelo_py.run.idle import warn_about_rest
+from karamelo_py.run.idle import UNITS, warn_about_rest
 from karamelo_py.run.large_steps import duration_of_later, warn_about_steps
 from karamelo_py.run.noise import ELASTIC, noises
 from karamelo_py.run.simulation import Simulation
@@ -32,6 +35,7 @@ from karamelo_py.run.velocities import warn_about_velocities
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.usl import USL
+from karamelo_py.script.errors import ScriptError
 
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
 FAST = 0.2  # of the speed of waves, from where on usf and usavg feed moments
@@ -41,6 +45,7 @@ SEPARATE = 0.1  # of ASFLIP's strength of separation, which elastic bodies bear
 SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
 DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
 GAS = 1e-3  # kg/m^3, from where on
+IMPOSSIBLE = 30.0  # times the speed of waves: mm/s in the place of m/s make 1000 of 1
 SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
 
 
@@ -216,6 +221,19 @@ def _fast_shocks(s: Foreseen) -> Iterator[Failure]:
         )
 
 
+def _impossible_speeds(s: Foreseen) -> Iterator[Failure]:
+    flowing = {IdealGas, Tait}
+    solid = any(not flowing & set(law_kind(one.material.law)) for one in s.hub.solids.values())
+    if solid and s.speed > IMPOSSIBLE:
+        yield Failure(
+            "units of velocities",
+            f"points move at {s.simulation.fastest():.3g}, {s.speed:.3g} times the speed of waves "
+            f"({s.waves:.3g}), which no solid bears when it meets another or a wall. The units of "
+            "velocities, densities and moduli may be mixed",
+            UNITS,
+        )
+
+
 def _other_units(s: Foreseen) -> Iterator[Failure]:
     """Of materials whose numbers are in others than those that `units` names."""
     units = s.hub.output.units
@@ -253,6 +271,7 @@ RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _lost_spin,
     _loose_points,
     _fast_shocks,
+    _impossible_speeds,
     _other_units,
 )
 
@@ -263,9 +282,11 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     Raises
     ------
     ScriptError
-        If temperatures would swing, in a run that does not halve its step then.
+        If temperatures would swing, in a run that does not halve its step then, or if points have
+        velocities that are no numbers.
     """
     _warn_about_groups(hub)
+    refuse_endless_speeds(hub, simulation)
     scene = Foreseen(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + duration_of_later(hub, simulation)
     if scene.waves > 0 and blows_up(hub, simulation):
@@ -283,6 +304,24 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
                     place=failure.place or hub.update.method.place,
                     hint=failure.cure,
                 )
+
+
+def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
+    """Refuse velocities of points that are no numbers, with the formula that they come from.
+
+    Raises
+    ------
+    ScriptError
+        If there are some.
+    """
+    if not isfinite(simulation.fastest()):
+        found = no_number(
+            hub,
+            simulation,
+            f"points have a velocity that is not a number at time {simulation.time:.6g}",
+            "look for a formula that gives NaN or infinity, such as a division by zero",
+        )
+        raise ScriptError(found.message, place=found.place, hint=found.hint)
 
 
 def _gone(hub: Hub, simulation: Simulation) -> float:

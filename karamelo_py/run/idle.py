@@ -7,7 +7,7 @@ import numpy as np
 
 from karamelo_py.output.fields import COMPONENTS, Fields
 from karamelo_py.points.laws import can, constrained_velocity, law_kind
-from karamelo_py.run.stable import fastest_wave
+from karamelo_py.run.stable import fastest_wave, ruling_limit
 from karamelo_py.scene.hub import Hub
 
 LOOK = 100  # steps: shorter runs look at a scene
@@ -64,6 +64,13 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
     about = f"about {span / simulation.dt:.2g} steps of {simulation.dt:.3g} from here to time"
     if hub.update.fixed_dt is not None:
         hub.warn(f"{about} {end_time:.6g}", hint="a larger step with set_dt, or an earlier end")
+        return
+    if ruling_limit(simulation) == "conduction":
+        hub.warn(
+            f"{about} {end_time:.6g}: heat goes through cells of {hub.domain.h:g} that fast. The "
+            "units of conductivities, heat capacities, lengths and times may be mixed",
+            hint="an earlier end, or larger cells; in m, kg, s, K copper has kappa = 401, cp = 385",
+        )
         return
     hub.warn(f"{about} {end_time:.6g}: {mixed_units(hub, simulation)}", hint=UNITS)
 

@@ -9,6 +9,7 @@ from karamelo_py.kernels.step import Fused, Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
+from karamelo_py.run.foresight import refuse_endless_speeds
 from karamelo_py.run.plan import told
 from karamelo_py.run.savings import savings
 from karamelo_py.run.simulation import Simulation
@@ -23,6 +24,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
     """Print fields with bytes, stages, tiles, memory and the first dt of a run to `end_time`."""
     simulation = hub.simulation
     simulation.begin(end_time)
+    refuse_endless_speeds(hub, simulation)
     simulation.sort_if_due()
     say = hub.console.say
     s = simulation.setup

@@ -79,6 +79,7 @@ class Runner:
             steps = inf if self.steps is None else self.steps
             span = self.end_time - hub.update.time, steps
             hub.later.append(large_steps.step_of(hub, self.halve, span))
+            hub.in_runs += hub.lasting()
             return
         if hub.pausing:
             raise Pause

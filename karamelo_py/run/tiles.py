@@ -467,9 +467,11 @@ def _empty(s: Setup, spans: np.ndarray) -> None:
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """(n,) shares of tiles of nodes with these parts, with as many nodes each, in this order.
+    """(n,) of which share each of n tiles of nodes is, from 0 to SHARES - 1: they do not decrease.
 
-    Tiles with the same number in `beside` follow each other, and are of one share.
+    `parts` (n, 10) are those of all nodes of a tile in use (see `Buffers`). A share gets the tiles
+    whose middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the same
+    number in `beside` (n,) are of one share, that of the first of them.
     """
     size = np.prod(parts[:, 2:5], axis=1)
     middle = np.cumsum(size) - size / 2

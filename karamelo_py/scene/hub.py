@@ -8,6 +8,7 @@ from typing import Any
 
 from karamelo_py.language import registry
 from karamelo_py.language.faults import told
+from karamelo_py.language.unknown import line_below
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
 from karamelo_py.output.schedule import Output
@@ -50,12 +51,16 @@ class Catalogue(dict):
         always = ["all"] if self.kind == "group" else []
         known = ", ".join([*always, *self])
         other = next((c.kind for c in self.hub.catalogues if ID in c and c.kind != self.kind), None)
+        below = line_below(self.hub.interpreter, self.kind, ID)
+        hint = meant(ID, [*always, *self])
+        if self.kind == "group" and other in ("region", "solid"):
+            hint = _group_of(other, ID)
+        if below is not None:
+            hint = f"{self.kind} '{ID}' stands further down: move line {below} up"
         raise ScriptError(
             f"unknown {self.kind} '{ID}'" + (f"; '{ID}' is a {other}" if other else ""),
             expected=f"one of {known}" if known else f"no {self.kind} is defined yet",
-            hint=_group_of(other, ID)
-            if self.kind == "group" and other in ("region", "solid")
-            else meant(ID, [*always, *self]),
+            hint=hint,
         )
 
     def remove(self, ID: str) -> None:
@@ -128,6 +133,10 @@ class Hub:
         What the runs ask for that a rehearsal came to (`run.large_steps.Step`).
     restart
         What the script goes on from, until it is where that was written.
+    open_ended
+        Whether a program may go on behind the script.
+    in_runs
+        What acts, is written or drawn in some run, as far as a rehearsal came to them.
     rehearsing
         True while the rest of a script is tried before the first step: nothing runs or is written.
     answered
@@ -147,6 +156,8 @@ class Hub:
         self.answered = False
         self.checking = False
         self.pausing = False
+        self.open_ended = False
+        self.in_runs: list[Any] = []
         self.interpreter: Any = None
         self.restart: Any = None
         self.domain: Any = None
@@ -236,7 +247,26 @@ class Hub:
         """Try the rest of the script, once, before the first work that takes time."""
         if not self.rehearsed:
             self.rehearsed = True
-            self.interpreter.rehearse(self.rehearsal())
+            other = self.rehearsal()
+            other.in_runs = self.lasting()
+            self.interpreter.rehearse(other)
+            self._tell_of_late(other)
+
+    def lasting(self) -> list[Any]:
+        """What acts, is written or drawn in runs: fixes, dumps and curves."""
+        return [*self.fixes.values(), *self.dumps.values(), *self.output.plots]
+
+    def _tell_of_late(self, rehearsed: Hub) -> None:
+        """Warn of what the script has only behind its last run."""
+        seen = {id(item) for item in rehearsed.in_runs}
+        for item in () if self.open_ended else rehearsed.lasting():
+            if id(item) not in seen and item.place is not None:
+                kind = next((c.kind for c in rehearsed.catalogues if item.id in c), "plot")
+                self.warn(
+                    f"{kind} '{item.id}' stands behind the last run, and does nothing",
+                    place=item.place,
+                    hint="in front of the run that it is for",
+                )
 
     def rehearsal(self) -> Hub:
         """A copy on which the rest of the script can be tried without consequences."""

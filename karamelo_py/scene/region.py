@@ -146,7 +146,9 @@ def check_order(lo: float, hi: float, names: tuple[str, str], place: Place | Non
 def check_radius(radius: float, place: Place | None) -> None:
     """Refuse a radius that is not positive."""
     if radius <= 0:
-        raise ScriptError(f"R = {radius:g} must be above 0", place=place)
+        raise ScriptError(
+            f"R = {radius:g} must be above 0", place=place, expected="a radius above 0"
+        )
 
 
 def within(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):

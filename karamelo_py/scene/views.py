@@ -16,6 +16,7 @@ from karamelo_py.kernels.arrays import (
     POST_UPDATE_GRID_HEAT,
     POST_UPDATE_GRID_STATE,
     POST_VELOCITIES_TO_GRID,
+    known_to_laws,
     of_change,
     of_force,
     of_momentum,
@@ -337,7 +338,7 @@ class PointsView(View):
             [np.broadcast_to(given.get(name, 0.0), len(self.ids)) for name in names], axis=1
         ).astype(s.nodes.sums.dtype)
         for block, rows, own in self._at_hand():
-            points = block.points
+            points = known_to_laws(block.points)
             if len(rows) and can(elastic_law(block.laws), with_stress):
                 chosen = np.zeros(len(points.id), np.bool_)
                 chosen[rows] = True

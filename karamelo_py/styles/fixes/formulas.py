@@ -25,6 +25,10 @@ def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
             f"{plural(len(formulas), 'component')} in {plural(d, 'dimension')}",
             expected=f"{wanted} (NULL leaves a component alone)",
         )
+    if len(formulas) > 3:
+        raise ScriptError(
+            f"{len(formulas)} components, and space has 3 directions", expected=wanted
+        )
     for extra in formulas[d:]:
         if extra is not None and not (extra.is_constant and extra.constant == 0):
             raise ScriptError(
