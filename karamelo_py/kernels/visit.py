@@ -68,31 +68,32 @@ def ask_ahead(w, p, like):
     """
     moment = zero_moment(w.transfer, w.kin, like)
     if w.kin.dimension == 3 and len(moment):
-        rows = (
-            (w.places.x, w.kin.dimension),
-            (w.points.v, w.kin.dimension),
-            (field(w.points.fields, Moment), len(moment)),
-            (w.points.state, len(initial_state(law_of(w, p), w.kin, like))),
-        )
-        _ask(rows, p)
-
-
-@shared
-def _ask(rows, p):
-    for array, count in rows:
-        for k in range(count):
-            prefetch(array, (k, p))
+        _ask_for_motion(w, p)
+        _ask(field(w.points.fields, Moment), len(moment), p)
+        _ask(w.points.state, len(initial_state(law_of(w, p), w.kin, like)), p)
 
 
 @shared
 def ask_ahead_of_stretch(w, p, like):
-    """The same of what points are settled with, while they gather."""
+    """The same of what a stretch of points is settled with, while it gathers."""
     if w.kin.dimension == 3:
+        _ask_for_motion(w, p)
+        _ask(w.points.state, len(initial_state(law_of(w, p), w.kin, like)), p)
         f = field(w.points.fields, DeformationGradient)
-        count = len(initial_state(law_of(w, p), w.kin, like))
-        _ask(((w.points.state, count),), p)
         if f is not None:
-            _ask(((f, len(zero_tensor(w.kin, like))),), p)
+            _ask(f, len(zero_tensor(w.kin, like)), p)
+
+
+@shared
+def _ask_for_motion(w, p):
+    _ask(w.places.x, w.kin.dimension, p)
+    _ask(w.points.v, w.kin.dimension, p)
+
+
+@shared
+def _ask(array, rows, p):
+    for k in range(rows):
+        prefetch(array, (k, p))
 
 
 @point_function(otherwise=True)
