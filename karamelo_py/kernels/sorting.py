@@ -7,7 +7,7 @@ import numpy as np
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import loop, subkernel
-from karamelo_py.compiler.memory import pick_items, put_items
+from karamelo_py.compiler.items import pick_items, put_items
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.visit import place_at
@@ -252,7 +252,7 @@ def sort_points(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
     They are on the grids `of` (n,) and have the numbers `ids` (n,). Of all that they carry, these
-    and the places among it, the addresses of its `rows` are given (:mod:`~.compiler.memory`): one
+    and the places among it, the addresses of its `rows` are given (:mod:`~.compiler.items`): one
     kernel serves all bases and laws in as many dimensions.
     """
     _sort_by_team(mode, kin, grids, sight, tiles, x, of, ids, found, rows)

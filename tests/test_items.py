@@ -5,7 +5,7 @@ import pytest
 
 from karamelo_py.compiler.fields import rows_of_points
 from karamelo_py.compiler.loops import loop
-from karamelo_py.compiler.memory import addresses_of_rows, pick_items, put_items
+from karamelo_py.compiler.items import addresses_of_rows, pick_items, put_items
 
 SMALL, LARGE = np.int32(0), np.int64(0)
 
@@ -45,3 +45,8 @@ def test_rows_by_their_addresses(ordered, kind, like):
 def test_rows_with_gaps_have_no_address():
     with pytest.raises(ValueError, match="one after another"):
         addresses_of_rows([np.zeros((4, 6))[:, ::2]])
+
+
+def test_items_of_other_sizes_have_no_address():
+    with pytest.raises(ValueError, match="items of 1 bytes"):
+        addresses_of_rows([np.zeros((2, 8), bool)])

@@ -16,11 +16,18 @@ def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
     """(m, 2) int64: the address of each row of some arrays (..., n), and the bytes of an item.
 
     Addresses are good as long as the arrays live and are not resized.
+
+    Raises
+    ------
+    ValueError
+        If items do not lie one after another, or do not have 4 or 8 bytes.
     """
     found: list[tuple[int, int]] = []
     for array in arrays:
         if array.strides[-1] != array.itemsize:
             raise ValueError("items of a row do not lie one after another")
+        if array.itemsize not in (4, 8):
+            raise ValueError(f"items of {array.itemsize} bytes, not of 4 or 8")
         places = [array.ctypes.data]
         for count, stride in zip(array.shape[:-1], array.strides[:-1], strict=True):
             places = [place + k * stride for place in places for k in range(count)]
