@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from karamelo_py.compiler.fields import rows_of_points
-from karamelo_py.compiler.loops import loop
 from karamelo_py.compiler.items import addresses_of_rows, pick_items, put_items
+from karamelo_py.compiler.loops import loop
 
 SMALL, LARGE = np.int32(0), np.int64(0)
 

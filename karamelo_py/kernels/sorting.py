@@ -6,8 +6,8 @@ import numpy as np
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import loop, subkernel
 from karamelo_py.compiler.items import pick_items, put_items
+from karamelo_py.compiler.loops import loop, subkernel
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.visit import place_at
