@@ -296,3 +296,22 @@ def test_points_in_contact_may_be_deleted(state_interpreted):
     whole = state_interpreted(script, boxes=True)
     assert same_bits(whole, state_interpreted(script, boxes=True, ranks=2))
     assert not whole["mass"].all()  # that of what is not there is 0
+
+
+TWO_BODIES = (
+    "region(two, block, 0.1, 0.2, 0.3, 0.4)",
+    "material(neo, neo-hookean, 2, 100, 0.3)",
+    "solid(two, region, two, 2, neo, 0.1, 0)",
+    "run(60)",
+)
+
+
+def test_the_last_points_of_a_law_leave(state_interpreted):
+    """The loops over the points of a law go on over none; also where they are a process's all."""
+    script = thrown(2, "delete", *TWO_BODIES).replace(
+        "velocity_particles, all", "velocity_particles, b"
+    )
+    script = script.replace("fix(v,", "group(b, particles, region, box, solid, body)\nfix(v,")
+    whole = state_interpreted(script, boxes=True)
+    assert 0 < np.count_nonzero(whole["mass"]) < len(whole["mass"])
+    assert same_bits(whole, state_interpreted(script, boxes=True, ranks=2))

@@ -50,3 +50,8 @@ def test_rows_with_gaps_have_no_address():
 def test_items_of_other_sizes_have_no_address():
     with pytest.raises(ValueError, match="items of 1 bytes"):
         addresses_of_rows([np.zeros((2, 8), bool)])
+
+
+def test_of_nothing_there_is_no_row():
+    """NumPy gives arrays of nothing strides of 0: they are no rows with gaps."""
+    assert addresses_of_rows([np.empty(0), np.empty((3, 0)), np.empty((0, 4))]).shape == (0, 2)

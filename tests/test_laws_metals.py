@@ -249,6 +249,30 @@ def test_the_return_finds_the_strain_to_round_off(ep, x, n, plateau):
     assert found == pytest.approx(x, rel=0, abs=8 * 2.0**-52 * q / (3 * G))
 
 
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.parametrize("plateau", [None, 0.0, -1e-30])
+def test_the_return_near_virgin_strain(real, plateau):
+    """The slope of a power law overflows there; an elastic point stays as it is, others flow.
+
+    So near its start, where Newton's estimates of what is left fail, the excess is only known to be
+    below the root of round-off.
+    """
+    numbers = (G, A, B) if plateau is None else (G, A, B, plateau)
+    kind = JohnsonCook if plateau is None else Swift
+    rest = (Absent(), Absent()) if plateau is None else ()
+    strength = kind(*(real(number) for number in (*numbers, 0.2)), *rest)
+    strains = [0, *(10.0**-k for k in range(3, 300 if real is np.float64 else 44, 3))]
+    with np.errstate(all="ignore"):
+        for ep in map(real, strains):
+            flow = static_flow(strength, ep)
+            for q in map(real, (0, flow / 2, flow * 0.999, flow * 1.00001, flow * 1.01)):
+                x = plastic_increment(strength, q, (ep,), (), real(1))
+                assert (x > 0) == (q > flow)
+                if x > 0:
+                    left = q - 3 * G * x - static_flow(strength, ep + x)
+                    assert abs(left) <= np.sqrt(np.finfo(real).eps) * q
+
+
 @every_strength
 def test_large_increments_converge(strength):
     """1, 10, 100 increments to 10 % strain at once end alike: at once is within 5 % of ep."""

@@ -15,7 +15,7 @@ from karamelo_py.compiler.compile import by_type
 def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
     """(m, 2) int64: the address of each row of some arrays (..., n), and the bytes of an item.
 
-    Addresses are good as long as the arrays live and are not resized.
+    Arrays of nothing have none. Addresses are good as long as the arrays live and are not resized.
 
     Raises
     ------
@@ -24,6 +24,8 @@ def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
     """
     found: list[tuple[int, int]] = []
     for array in arrays:
+        if not array.size:
+            continue
         if array.strides[-1] != array.itemsize:
             raise ValueError("items of a row do not lie one after another")
         if array.itemsize not in (4, 8):

@@ -171,7 +171,7 @@ def _(task, w, x):
 
 @point_function(otherwise=True)
 def records_read(task, nodes):
-    """The records that a task gathers from, for `prefetch_records`; None of few tasks."""
+    """The records that a task gathers from, for `prefetch_records`; None: not asked for."""
     return None
 
 

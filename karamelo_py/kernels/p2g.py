@@ -154,7 +154,7 @@ def load_of(quantity, w, p, like):
 
 @point_function(otherwise=True)
 def records_given(quantity, nodes):
-    """The records that a quantity is given to, for `prefetch_records`; None of few quantities."""
+    """The records that a quantity is given to, for `prefetch_records`; None: not asked for."""
     return None
 
 

@@ -46,7 +46,7 @@ def _call(simulation: Any, fix: Any, hook: Callable, view: Any) -> None:
     """Call a hook; of one that each process calls for its own, see that all agree."""
     try:
         hook(view)
-        if fix.point_by_point and not type(fix).__module__.startswith("karamelo_py."):
+        if fix.point_by_point:
             _agree(simulation, fix)
     except ScriptError as error:
         error.place = error.place or fix.place

@@ -108,7 +108,8 @@ def plastic_increment(strength, q, memory, heat, dt):
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))
         within = (low < new) & (new < high)
         middle = half * (low + high)
-        x = choose(active, choose(done | within, new, middle), x)
+        # What is rounded may lie below 0: plastic strain only grows.
+        x = choose(active, max(choose(done | within, new, middle), zero), x)
         last = change
         # Lanes that have finished wait for the others.
         active = active & (not (done | (middle <= low) | (middle >= high)))

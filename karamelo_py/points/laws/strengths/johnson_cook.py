@@ -2,7 +2,15 @@
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, fma, in_all, point_function, real, shared
+from karamelo_py.compiler.compile import (
+    choose,
+    fma,
+    in_all,
+    point_function,
+    real,
+    round_off,
+    shared,
+)
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
@@ -126,7 +134,7 @@ def power_law(factor, exponent, strain, value, increment):
     """
     one = real(1, strain)
     near = max(exponent, one) * increment <= real(_NEAR, strain) * strain
-    x = increment * (one / choose(strain > 0, strain, one))
+    x = increment / choose(strain > 0, strain, one)
     series = one
     for k in range(_TERMS, 0, -1):
         series = fma(x * ((exponent - real(k - 1, x)) * real(1 / k, x)), series, one)
@@ -142,14 +150,16 @@ def power_law_guess(exponent, strain, hard, excess, slope):
     """A `first_guess` from the first two derivatives of the power law `hard` (Chebyshev's method).
 
     `excess` is how far the stress lies above the flow stress; it falls by `slope` with the strain.
+    Strains so small that the derivatives may overflow count as none.
     """
     zero, one = real(0, strain), real(1, strain)
-    inverse = choose(strain > 0, one / choose(strain > 0, strain, one), zero)
+    some = strain > round_off(strain)
+    inverse = choose(some, one / choose(some, strain, one), zero)
     steeper = hard * exponent * inverse
     slope = slope + steeper
-    curved = abs(real(0.5, strain) * (one - exponent) * steeper * inverse / slope)
+    curved = real(0.5, strain) * (one - exponent) * steeper * inverse / slope
     x = max(excess, zero) / slope
-    return x + x * min(curved * x, one), curved
+    return x + x * max(min(curved * x, one), real(-0.5, x)), abs(curved)
 
 
 @point_function(tags=2, otherwise=True)
