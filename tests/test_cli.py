@@ -91,6 +91,29 @@ def test_who_builds_no_scene_does_not_wait_for_it():
     assert "numba" not in said.split()
 
 
+STARTED = """
+import gc, runpy, sys
+sys.argv = ["karamelo-py", "in.script"]
+try:
+    {}
+except SystemExit:
+    pass
+print(gc.isenabled(), gc.get_freeze_count() > 100_000)
+"""
+
+
+@pytest.mark.parametrize("module", ["start", "cli", None])
+def test_modules_are_not_searched_for_what_to_throw_away(tmp_path, module):
+    """A program that was started looks for cycles among what is new; a host is let alone."""
+    (tmp_path / "in.script").write_text("a = 3\nprint(a)\n")
+    run = f'runpy.run_module("karamelo_py.app.{module}", run_name="__main__")'
+    text = STARTED.format(run if module else "import karamelo_py.app.cli as cli; cli.main()")
+    words = [sys.executable, "-c", text]
+    said = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert "a = 3" in said
+    assert said.splitlines()[-1] == f"True {module is not None}"
+
+
 def test_an_unknown_subcommand(capsys):
     assert main(["chek", "x.in"]) == 1
     assert "did you mean 'karamelo-py check'?" in capsys.readouterr().err

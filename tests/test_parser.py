@@ -1,5 +1,6 @@
 """The parser: statements, arguments, precedence; what is no script is refused with a place."""
 
+import re
 import time
 
 import pytest
@@ -7,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.script import parser
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse, parse_text
 from karamelo_py.script.syntax import Assignment, Call, Evaluation
@@ -257,3 +259,42 @@ def test_long_scripts_are_read_fast():
 
     work(1)  # The grammar is read once.
     assert work(1000) < 8 * work(250)
+
+
+@pytest.mark.parametrize("state", ["none", "kept", "damaged", "cut off", "a folder", "no folder"])
+def test_a_parser_on_disk_is_read_and_never_a_reason_to_stop(tmp_path, monkeypatch, state):
+    """It makes the same of a script, and of a mistake; a file that is no use is written anew."""
+
+    def parsed() -> tuple:
+        parser._lark.cache_clear()
+        parser._tree.cache_clear()
+        with pytest.raises(ScriptError) as mistake:
+            parse("a = 2^(3\n")
+        statements = re.sub(" at 0x[0-9a-f]+", "", repr(parse(PAPER)))
+        return statements, mistake.value.render()
+
+    usual = parsed()
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    folder = tmp_path / "parsers"
+    if state == "no folder":
+        folder.write_text("")
+    elif state != "none":
+        parsed()
+    files = sorted(folder.iterdir()) if folder.is_dir() else []
+    whole = [file.read_bytes() for file in files]
+    for file, content in zip(files, whole, strict=True):
+        if state == "damaged":
+            file.write_bytes(b"damaged")
+        elif state == "cut off":
+            file.write_bytes(content[: len(content) // 2])
+        elif state == "a folder":
+            file.unlink()
+            file.mkdir()
+    assert parsed() == usual
+    kept = sorted(folder.iterdir()) if folder.is_dir() else []
+    if state not in ("a folder", "no folder"):
+        assert [file.name.partition("-")[0] for file in kept] == ["expression", "script"]
+        assert min(file.stat().st_size for file in kept) > 5000
+    if state == "kept":
+        assert [file.read_bytes() for file in files] == whole  # only read
+    parser._lark.cache_clear()

@@ -6,6 +6,7 @@ answers with one JSON line.
 """
 
 import contextlib
+import gc
 import io
 import json
 import os
@@ -64,7 +65,9 @@ def main() -> None:
 
     import karamelo_py
     from karamelo_py.app.cli import main as command
+    from karamelo_py.run import runner  # noqa: F401
 
+    gc.freeze()  # scenes make many objects, among which alone cycles have to be looked for
     # Which package it is: the first line.
     print(karamelo_py.__file__, flush=True)
     # Interpreted arithmetic warns about what compiled kernels pass over in silence.

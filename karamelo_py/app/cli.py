@@ -23,6 +23,7 @@ from karamelo_py.app.options import (
     positive,
     threads_option,
 )
+from karamelo_py.app.starting import begun
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
 from karamelo_py.run.crew import Crew, launched
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
@@ -152,6 +153,8 @@ def _dispatch(arguments: list[str]) -> int:
             )
         return ERROR
     options.command_line = arguments
+    if options.act is not _run:  # which imports more before it begins
+        begun()
     return options.act(options)
 
 
@@ -312,7 +315,7 @@ def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = Non
         from karamelo_py.output.console import Console
         from karamelo_py.run.runner import Interrupted
         from karamelo_py.scene.hub import Hub
-
+    begun()
     hub = Hub(Console(quiet=options.quiet, terminal=has_terminal()))
     hub.settings.threads = options.threads
     hub.settings.ranks = options.ranks or launched()[0]
@@ -380,4 +383,4 @@ def _help(options: argparse.Namespace) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(import_module("karamelo_py.app.start").main())

@@ -140,7 +140,7 @@ class KernelCache(_Cache):
         content = dumps((tuple(sorted(choices)), dumps(data._reduce())))
         try:
             path = folder() / f"{key}-{stamp[:24]}{_ENDING}"
-            _write(path, hashlib.sha256(content).digest() + content)
+            write(path, hashlib.sha256(content).digest() + content)
             self._forget(key)
         except OSError as error:
             _trouble(error)
@@ -221,7 +221,7 @@ def _setting() -> str:
 _SETTING = _setting()
 
 
-def _write(path: Path, content: bytes) -> None:
+def write(path: Path, content: bytes) -> None:
     """Write a file, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix="new-")
@@ -280,4 +280,4 @@ def keep_time(scene: str, seconds: float) -> None:
     times.pop(scene, None)
     times[scene] = round(seconds, 1)
     with contextlib.suppress(OSError):  # told of by the kernels
-        _write(folder() / _TIMES, json.dumps(dict(list(times.items())[-200:])).encode())
+        write(folder() / _TIMES, json.dumps(dict(list(times.items())[-200:])).encode())

@@ -9,6 +9,7 @@ from typing import Any
 
 from karamelo_py.script import expression_mistakes, mistakes
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.kept import kept_parser
 from karamelo_py.script.mistakes import Mistake
 from karamelo_py.script.syntax import (
     Assignment,
@@ -181,14 +182,18 @@ def _lark(start: str) -> Any:
     from lark import Lark
 
     grammar = Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8")
-    return Lark(
-        grammar,
-        parser="lalr",
-        start=start,
-        transformer=_Builder(),
-        keep_all_tokens=True,
-        maybe_placeholders=False,
-    )
+
+    def made() -> Lark:
+        return Lark(
+            grammar,
+            parser="lalr",
+            start=start,
+            transformer=_Builder(),
+            keep_all_tokens=True,
+            maybe_placeholders=False,
+        )
+
+    return kept_parser(start, grammar, made)
 
 
 def _span(part: Any) -> tuple[int, int]:
