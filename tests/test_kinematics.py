@@ -23,6 +23,7 @@ from tensors import (
     tensors,
 )
 
+from karamelo_py.points.frames import Total, Updated, of_places_before
 from karamelo_py.points.kinematics import (
     Axisymmetric,
     Line,
@@ -151,6 +152,33 @@ def test_total_lagrangian_algebra_is_that_of_matrices(kin, data):
     dl = increment_of(kin, b, f)
     assert close(matrix(kin, dl), matrix(kin, b) @ np.linalg.inv(full))
     assert close(deform(kin, dl, f), np.add(f, b))
+
+
+@every_kinematics
+@given(data=st.data())
+def test_an_increment_of_the_places_after_a_motion(kin, data):
+    """dl = I - F^-1 at the places that a motion F has led to makes I + dl' = F.
+
+    Half of such an increment behind half of one of the places before is the whole: usavg.
+    """
+    motion = data.draw(deformations(kin))
+    unit = np.eye(3)
+    full = matrix(kin, motion, 1.0)
+    after = unit - np.linalg.inv(full)
+    before = of_places_before(Updated(), kin, flat(kin, after))
+    assert close(unit + matrix(kin, before), full)
+    half = of_places_before(Updated(), kin, flat(kin, after / 2))
+    ahead = unit + matrix(kin, before) / 2
+    assert close((unit + matrix(kin, half)) @ ahead, full, 1e-10)
+    assert of_places_before(Total(), kin, before) == before
+
+
+@every_kinematics
+def test_small_increments_keep_their_digits(kin):
+    """dl (I + dl + ...), in single precision too: I added and taken away leaves none of 1e-9."""
+    unit = identity(kin, np.float32(1))
+    dl = tuple(np.float32(1e-9 * (k + 1)) for k in range(len(unit)))
+    assert of_places_before(Updated(), kin, dl) == pytest.approx(dl, rel=1e-6)
 
 
 # --- right stretch ----------------------------------------------------------------------------

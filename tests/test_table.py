@@ -1,12 +1,16 @@
 """A scheme's table: what shares a visit, and what does not."""
 
-from karamelo_py.kernels.g2p import Move, Strain, StrainInMove
+import pytest
+
+from karamelo_py.kernels.g2p import Move, SecondStrain, Strain, StrainInMove, StrainOfLastStep
 from karamelo_py.kernels.nodes import Update
 from karamelo_py.kernels.p2g import InternalForce, MassMomentum
 from karamelo_py.kernels.rows import FORCE, MASS_AND_MOMENTUM, SUMS
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights
 from karamelo_py.kernels.table import Gather, Nodes, Sweep, fused, staged
 from karamelo_py.schemes.musl import MUSL
+from karamelo_py.schemes.usavg import USAVG
+from karamelo_py.schemes.usf import USF
 from karamelo_py.schemes.usl import USL
 
 
@@ -36,6 +40,16 @@ def test_parts_of_a_step_of_other_lengths_do_not_share_a_visit():
     assert (kinds(first), first.share) == ([Move], 1.0)
     assert (second.share, second.scatters) == (0.5, True)
     assert type(second.visit.tasks[0]) is Strain
+
+
+@pytest.mark.parametrize("rows_of", [fused, staged])
+def test_velocities_of_the_last_step_are_of_the_places_after_it(rows_of):
+    """Of both visits of usavg that strain, and of the one of usf, the first alone."""
+    for scheme, expected in (USF, [StrainOfLastStep]), (USAVG, [StrainOfLastStep, SecondStrain]):
+        found = [sweep for sweep in sweeps(rows_of(scheme.rows)) if sweep.gathers]
+        strains = [kind for sweep in found for kind in kinds(sweep) if "Strain" in kind.__name__]
+        assert strains == expected
+        assert [sweep.of_last_step for sweep in found if StrainOfLastStep in kinds(sweep)] == [True]
 
 
 def test_a_scatter_may_stand_alone():

@@ -14,7 +14,9 @@ from karamelo_py.kernels.g2p import (
     SeriesTerm,
     Strain,
     StrainInMove,
+    StrainOfLastStep,
     TrialStrain,
+    TrialStrainOfLastStep,
     gathered_all,
 )
 from karamelo_py.kernels.loss import Lost
@@ -52,8 +54,8 @@ def _without_moments(part, w):
 for _part in (AverageStress, SeriesTerm, Volumes, SeriesBack):
     by_corners.on(_part)(_always)
 for _part in (
-    Move, Strain, SecondStrain, StrainInMove, TrialStrain, InternalForce, AveragedForce,
-    MomentumAgain,
+    Move, Strain, StrainOfLastStep, SecondStrain, StrainInMove, TrialStrain,
+    TrialStrainOfLastStep, InternalForce, AveragedForce, MomentumAgain,
 ):  # fmt: skip
     by_corners.on(_part)(_without_moments)
 

@@ -30,6 +30,7 @@ from karamelo_py.points.frames import (
     DeformationGradient,
     follows,
     inverse_stretch_squared,
+    of_places_before,
     spatial_increment,
     strained,
 )
@@ -78,6 +79,15 @@ class Strain(NamedTuple):
     writes = ("state", "deformation gradient")
 
 
+class StrainOfLastStep(NamedTuple):
+    """The same by the velocity that has led here, at the places that it has led to."""
+
+    in_lanes = True
+    says = "stress"
+    reads = Strain.reads
+    writes = Strain.writes
+
+
 class SecondStrain(NamedTuple):
     """The same for the second of two strain increments of a step."""
 
@@ -96,7 +106,8 @@ class StrainInMove(NamedTuple):
     writes = Strain.writes
 
 
-STRAINS = Strain, SecondStrain, StrainInMove  # which take averaged volumes, where there are
+# Which take averaged volumes, where there are.
+STRAINS = Strain, StrainOfLastStep, SecondStrain, StrainInMove
 
 
 class TrialStrain(NamedTuple):
@@ -106,6 +117,15 @@ class TrialStrain(NamedTuple):
     says = "trial volume"
     reads = Strain.reads
     writes = ("volume ratio",)
+
+
+class TrialStrainOfLastStep(NamedTuple):
+    """The same of `StrainOfLastStep`."""
+
+    in_lanes = True
+    says = "trial volume"
+    reads = Strain.reads
+    writes = TrialStrain.writes
 
 
 class AverageStress(NamedTuple):
@@ -143,6 +163,7 @@ def _(task, w, x):
 
 
 @empty.on(Strain)
+@empty.on(StrainOfLastStep)
 @empty.on(SecondStrain)
 def _(task, w, x):
     return zero_tensor(w.kin, x[0]), no_ratio(w.averaging, x[0])
@@ -155,6 +176,7 @@ def _(task, w, x):
 
 
 @empty.on(TrialStrain)
+@empty.on(TrialStrainOfLastStep)
 def _(task, w, x):
     return zero_tensor(w.kin, x[0])
 
@@ -181,6 +203,7 @@ def _(task, nodes):
 
 
 @records_read.on(Strain)
+@records_read.on(StrainOfLastStep)
 def _(task, nodes):
     return nodes.velocity
 
@@ -240,6 +263,7 @@ def add_gradient(w, stencil, k, total):
 
 
 @gathered.on(Strain)
+@gathered.on(StrainOfLastStep)
 @gathered.on(SecondStrain)
 @gathered.on(StrainInMove)
 def _(task, w, stencil, k, total):
@@ -250,6 +274,7 @@ def _(task, w, stencil, k, total):
 
 
 @gathered.on(TrialStrain)
+@gathered.on(TrialStrainOfLastStep)
 def _(task, w, stencil, k, total):
     return _gradient(w, stencil, k, total)
 
@@ -281,28 +306,45 @@ def settled(task, w, stencil, p, dt, total, totals, fastest):
 
 @settled.on(Strain)
 def _(task, w, stencil, p, dt, total, totals, fastest):
-    return _strain(w, w.places.x, p, dt, total[0], total[1], fastest)
+    return _strain(w, w.places.x, p, dt, scale(dt, total[0]), total[1], fastest)
+
+
+@settled.on(StrainOfLastStep)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    dl = of_places_before(w.frame, w.kin, scale(dt, total[0]))
+    return _strain(w, w.places.x, p, dt, dl, total[1], fastest)
 
 
 @settled.on(SecondStrain)
 def _(task, w, stencil, p, dt, total, totals, fastest):
-    return _strain(w, w.places.y, p, dt, total[0], total[1], fastest)
+    return _strain(w, w.places.y, p, dt, scale(dt, total[0]), total[1], fastest)
 
 
 @settled.on(StrainInMove)
 def _(task, w, stencil, p, dt, total, totals, fastest):
     gradient = known_gradient(w.averaging, w, totals[0][2], total[0])
-    return _strain(w, w.places.x, p, dt, gradient, total[1], fastest)
+    return _strain(w, w.places.x, p, dt, scale(dt, gradient), total[1], fastest)
 
 
 @settled.on(TrialStrain)
 def _(task, w, stencil, p, dt, total, totals, fastest):
+    _keep_ratio(w, p, dt, scale(dt, total))
+    return real(0, dt), fastest
+
+
+@settled.on(TrialStrainOfLastStep)
+def _(task, w, stencil, p, dt, total, totals, fastest):
+    _keep_ratio(w, p, dt, of_places_before(w.frame, w.kin, scale(dt, total)))
+    return real(0, dt), fastest
+
+
+@shared
+def _keep_ratio(w, p, dt, dl):
     law = law_of(w, p)
     state = state_of(w, law, p, dt)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    dl = spatial_increment(w.frame, w.kin, scale(dt, total), f)
-    field(w.points.fields, VolumeRatio)[0, p] = volume_ratio(w.kin, dl)
-    return real(0, dt), fastest
+    increment = spatial_increment(w.frame, w.kin, dl, f)
+    field(w.points.fields, VolumeRatio)[0, p] = volume_ratio(w.kin, increment)
 
 
 @settled.on(AverageStress)
@@ -368,12 +410,12 @@ def _move(w, stencil, p, dt, total):
 
 
 @shared
-def _strain(w, x, p, dt, gradient, ratio, fastest):
+def _strain(w, x, p, dt, dl, ratio, fastest):
     """State of the law and shape of the domain after a step; growth in cells, and rate.
 
-    `x` are the places whose shapes grow.
+    `dl` is dt times the gradient of velocity, `x` are the places whose shapes grow.
     """
-    dl = averaged(w.averaging, w, p, scale(dt, gradient), ratio)
+    dl = averaged(w.averaging, w, p, dl, ratio)
     law = law_of(w, p)
     old = state_of(w, law, p, dt)
     f = deformation_of(w.frame, w.kin, law, old, w.points, p)

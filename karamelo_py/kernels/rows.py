@@ -23,7 +23,7 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
-from karamelo_py.kernels.g2p import AverageStress, Move, SeriesTerm, TrialStrain
+from karamelo_py.kernels.g2p import AverageStress, Move, SeriesTerm
 from karamelo_py.kernels.loss import Lost, Rubbed
 from karamelo_py.kernels.moments import add_work
 from karamelo_py.kernels.nodes import (
@@ -120,13 +120,16 @@ def _(transfer, s, mode):
 
 
 @point_function(otherwise=True)
-def average_volumes(averaging, s, mode, dt):
-    """Average the change of volume of the strain to come at the nodes; by default it is not."""
+def average_volumes(averaging, s, mode, dt, trial):
+    """Average the change of volume of the strain to come at the nodes; by default it is not.
+
+    `trial` is the task that finds it.
+    """
 
 
 @average_volumes.on(FBar)
-def _(averaging, s, mode, dt):
-    visit_here(s, mode, Visit((TrialStrain(),), (Volumes(),), OldWeights()), dt, True, True)
+def _(averaging, s, mode, dt, trial):
+    visit_here(s, mode, Visit((trial,), (Volumes(),), OldWeights()), dt, True, True)
     sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.ranges, dt)
 
 

@@ -17,7 +17,7 @@ from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks
 from karamelo_py.kernels.clock import common_velocity, finish, kick, last_step_size, step_size
-from karamelo_py.kernels.g2p import STRAINS
+from karamelo_py.kernels.g2p import STRAINS, TrialStrain, TrialStrainOfLastStep
 from karamelo_py.kernels.moments import at_nodes, at_points
 from karamelo_py.kernels.passes import check_moves, sweep
 from karamelo_py.kernels.rows import average_volumes
@@ -72,7 +72,8 @@ def _visit(row, s, mode, more):
     whole = last_step_size(s) if row.of_last_step else step_size(s)
     dt = whole if row.share == 1 else real(row.share, whole) * whole
     if row.gathers and any(isinstance(task, STRAINS) for task in row.visit.tasks):
-        average_volumes(s.averaging, s, mode, dt)
+        trial = TrialStrainOfLastStep() if row.of_last_step else TrialStrain()
+        average_volumes(s.averaging, s, mode, dt, trial)
     scatters = more if row.only_if_more else row.scatters
     return sweep(s, mode, row.visit, dt, row.gathers, scatters, row.moves)
 

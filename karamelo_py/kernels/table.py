@@ -13,7 +13,7 @@ Averaged volumes, XPIC, heat and contact are calls that do nothing in scenes wit
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
-from karamelo_py.kernels.g2p import Move, Strain, StrainInMove
+from karamelo_py.kernels.g2p import Move, Strain, StrainInMove, StrainOfLastStep
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 
 
@@ -78,10 +78,19 @@ class Sweep(NamedTuple):
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """The tasks of one visit; strain behind a move knows what that gathered."""
-    tasks = tuple(g.task for g in gathers)
-    moves = any(isinstance(task, Move) for task in tasks)
-    return tuple(StrainInMove() if moves and isinstance(task, Strain) else task for task in tasks)
+    """The tasks of one visit; what strains is told of what comes before it.
+
+    Strain behind a move knows what that gathered. By the velocity of the last step, points are
+    strained where that has led them.
+    """
+    moves = any(isinstance(g.task, Move) for g in gathers)
+
+    def known(g: Gather) -> NamedTuple:
+        if not isinstance(g.task, Strain) or not (moves or g.of_last_step):
+            return g.task
+        return StrainInMove() if moves else StrainOfLastStep()
+
+    return tuple(known(g) for g in gathers)
 
 
 def _kinds(tags: tuple) -> tuple:
@@ -145,7 +154,7 @@ def staged(rows: Iterable[Any]) -> list[Any]:
     out: list[Any] = []
     for row in rows:
         if isinstance(row, Gather):
-            out.append(Sweep(loop_of((row.task,), None), *row[1:], True, False))
+            out.append(Sweep(loop_of(_tasks([row]), None), *row[1:], True, False))
         elif isinstance(row, Scatter):
             visit = loop_of((), row)
             out.append(Sweep(visit, gathers=False, moves=False))

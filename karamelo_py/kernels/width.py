@@ -8,7 +8,7 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import by_type, index, point_function
 from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.compiler.lanes import Eights, Fours, group, lanes_for, spread
-from karamelo_py.kernels.g2p import SecondStrain, Strain
+from karamelo_py.kernels.g2p import SecondStrain, Strain, StrainOfLastStep
 
 
 class OneByOne(NamedTuple):
@@ -102,7 +102,8 @@ def _only_strains(width, visit):
     are found twice.
     """
     tasks = {task.instance_class for task in visit[0]}
-    return width.instance_class is not OneByOne and bool(tasks) and tasks <= {Strain, SecondStrain}
+    strains = {Strain, StrainOfLastStep, SecondStrain}
+    return width.instance_class is not OneByOne and bool(tasks) and tasks <= strains
 
 
 def settled_width(width, visit):

@@ -82,6 +82,19 @@ def _(frame, kin, dl, f):
 
 
 @point_function(otherwise=True)
+def of_places_before(frame, kin, dl):
+    """`dl` of the places before a motion, from that of the places after it."""
+    # grad v there is grad v here (I - dl)^-1, so that F grows by (I - dl)^-1 exactly. As a product
+    # it keeps its digits where dl is small.
+    return increment_of(kin, dl, subtract(identity(kin, dl[0]), dl))
+
+
+@of_places_before.on(Total)
+def _(frame, kin, dl):
+    return dl  # gradients belong to the reference
+
+
+@point_function(otherwise=True)
 def strained(frame, kin, f, dl):
     """F where the frame needs it, after what `spatial_increment` takes from F before it."""
     return f

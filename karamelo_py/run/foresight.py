@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.language import registry
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.cpgimp import CPGIMPDiagonal
@@ -38,7 +37,6 @@ from karamelo_py.schemes.usl import USL
 from karamelo_py.script.errors import ScriptError
 
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
-FAST = 0.2  # of the speed of waves, from where on usf and usavg feed moments
 STRETCH = 0.3  # strain beyond which one is said to stretch
 SWING = 0.05  # strain of vibrations that bodies do not bear for long
 SEPARATE = 0.1  # of ASFLIP's strength of separation, which elastic bodies bear
@@ -86,19 +84,6 @@ def _affine_noise(s: Foreseen) -> Iterator[Failure]:
             f"{s.words} with {s.method.basis_name} functions gains energy, since the velocity that "
             "deforms the points leaves their moments out (a disk in space by a sixth in a turn)",
             cure,
-        )
-
-
-def _strained_before(s: Foreseen) -> Iterator[Failure]:
-    before = getattr(s.scheme, "strained_before", 0)
-    if before and s.moments and s.solids(*ELASTIC) and s.speed > FAST:
-        scheme = registry.name_of("scheme", type(s.scheme))
-        yield Failure(
-            "strain before the forces",
-            f"points move at {s.speed:.2g} times the speed of waves, and {scheme} with {s.words} "
-            "strains them by velocities that the next mapping smooths: elastic bodies that vibrate "
-            "by a tenth gain energy (three times as much in 50 periods with usavg; usf breaks)",
-            "scheme(musl)",
         )
 
 
@@ -260,7 +245,6 @@ def _other_units(s: Foreseen) -> Iterator[Failure]:
 
 RULES: tuple[Callable[[Foreseen], Iterator[Failure]], ...] = (
     _affine_noise,
-    _strained_before,
     _cell_crossing,
     _numerical_fracture,
     _repeated_contact,

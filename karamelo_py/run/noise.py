@@ -28,9 +28,6 @@ from karamelo_py.schemes.usf import USF
 from karamelo_py.styles.fixes.velocity_nodes import VelocityNodes
 
 SLOW = 0.01  # of the speed of waves, up to where nothing is fed in any time that was tried
-USF_TURNS = 0.035  # omega^2 t dt, from where on usf feeds a tenth to a body that turns
-USAVG_TURNS = 0.2  # the same of usavg, with moments
-USAVG_FLIP = 0.04  # that times rim speed over that of waves, with FLIP
 TORN = 9.0, 14.0  # angle, in radian, that a body bears with one point a cell: FLIP, moments
 ELASTIC = LinearElastic, NeoHookean, Thermoelastic
 
@@ -173,20 +170,16 @@ def _turn(s: Any) -> Iterator[Noise]:
         speed, angle = one.spin * one.reach / s.waves, one.spin * s.duration
         if speed <= SLOW or held(s, one).any():
             continue
-        cells, fed = angle * one.reach / spacing, one.spin * angle * dt
-        early = fed / USF_TURNS if isinstance(s.scheme, USF) else 0.0
-        if averages:
-            early = fed / USAVG_TURNS if s.moments else fed * speed / USAVG_FLIP
+        cells = angle * one.reach / spacing
         torn = angle / TORN[s.moments] if one_point else 0.0
         noise = 0.0 if s.moments else cells * dt * s.waves / spacing / bound
-        share = max(noise, early, torn)
+        share = max(noise, torn)
         if share <= most.share:
             continue
         ends = "loses points at its rim" if torn > 1 else "gains a tenth of its energy or more"
         known_cures = {
             f"{2**s.d} points a cell": one_point,
-            "scheme(musl)": early > min(noise, 1),
-            "quadratic-spline in the place of the basis": noise > min(early, 1) and not one_point,
+            "quadratic-spline in the place of the basis": noise > 0 and not one_point,
         }
         cures = [cure for cure, helps in known_cures.items() if helps]
         turns = f"turns by about {angle:.2g} rad, its rim at {speed:.2g} times the speed of waves"
@@ -198,8 +191,7 @@ def _turn(s: Any) -> Iterator[Noise]:
                 f"a body {turns} through about {cells:.0f} cells, and {way} it {ends} on the way",
                 ", ".join([*cures, "or method tlmpm"]),
             ),
-            f"a turn: a body {turns}, {way}"
-            + (", and is strained before the forces have turned" if early > noise else ""),
+            f"a turn: a body {turns}, {way}",
         )
     if most.share:
         yield most

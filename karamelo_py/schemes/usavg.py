@@ -26,8 +26,8 @@ from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 class USAVG(NamedTuple):
     """Half of the strain from the nodal velocity before the forces, half from the one of musl.
 
-    The gain of usf and the loss of musl nearly cancel: energy is kept best, for two updates of the
-    stress a step (Nairn 2003, "Material point method calculations with explicit cracks").
+    Energy is kept best, for two updates of the stress a step (Nairn 2003, "Material point method
+    calculations with explicit cracks"). The two halves make the whole increment of F.
 
     Example
     -------

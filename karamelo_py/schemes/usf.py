@@ -23,8 +23,11 @@ from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 class USF(NamedTuple):
     """The stress follows from the nodal velocity at the start of the step, before the forces.
 
-    Gains a little energy where the other schemes lose some. Stress, volume and strain that are
-    shown after a step are those of the places that it began with; of usavg, half of that.
+    That velocity has led the points to where they are, so that in the updated frame F grows by
+    (I - dt grad v)^-1; as first published, by I + dt grad v, it gains energy and turning bodies
+    shrink. Stress, volume and strain that are shown after a step are those of the places that it
+    began with; of usavg, half of that. A law of rate (linear, the strengths) takes what turns by an
+    angle w dt in a step for a compression by (w dt)^2/2, as with musl; with usavg, by half of that.
 
     Example
     -------

@@ -30,9 +30,10 @@ class CubicSpline(NamedTuple):
     # a free block: 1.9 to 2.7, 1.84 to 2.6 and 1.46 to 2.7, over places, distances, walls, ratios
     # up to 0.49.
     courant_still = 1.4
-    # With usf a ball of 3 cells radius gains by the longer step, 46 % in 200/c, and 1 % by 0.9 h/c:
-    # no matter of stability (in 800/c 32 % at 0.1 of the speed of waves, 4 % at 0.03, none at
-    # 0.001), but of gradients by the places after the motion, which lack (dt grad v)^2.
+    # With usf a ball of 3 cells radius gained 46 % in 200/c by the longer step, 1 % by 0.9 h/c: no
+    # matter of stability (in 800/c 32 % at 0.1 of the speed of waves, 4 % at 0.03, none at
+    # 0.001), but of strains that lacked (dt grad v)^2. They have it since; the bound was not
+    # measured again.
     courant_strained_first = 1.0
     bears_drift = True
 
