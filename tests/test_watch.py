@@ -13,6 +13,10 @@ from selection import covering, parameters
 from karamelo_py.app.cli import main
 from karamelo_py.kernels.arrays import new_control
 from karamelo_py.kernels.watch import LOOKS, judge
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
 
 TRAVEL = "fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y0))"
 
@@ -106,6 +110,21 @@ def test_the_bound_is_what_there_was_and_what_loads_have_brought():
     assert watched([1.0, 10.99])[1]
     assert not watched([1.0, 11.01])[1]
     assert watched([1.0, 25.0], work=[0.0, 4.0])[1]
+
+
+def test_energy_that_is_no_number_ends_the_run():
+    """What a law remembers may be, and nothing else: no speed, no volume tells."""
+    hub = Hub(Console(quiet=True))
+    hub.interpreter = Interpreter(hub)
+    scene = block(2, "fix(v, initial_velocity_particles, all, 0.1*x0, 0)", "set_output(1000)")
+    metal = "eos(e, linear, 2, 100)\nstrength(s, plastic, 40, 1)\n"
+    metal += "material(rubber, eos-strength, e, s)"
+    hub.interpreter.run_text(re.sub("material.*", metal, scene) + "run(5)\n", "in.scene")
+    hub.simulation.stepped.blocks[0].points.state[-2, 7] = np.nan
+    with pytest.raises(
+        ScriptError, match=r"energy is no number any more; the first point .* point 8"
+    ):
+        hub.interpreter.run_text("run(30)\n", "in.more")
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

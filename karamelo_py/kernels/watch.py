@@ -279,7 +279,8 @@ def judge(control):
         clock.grown = max(clock.grown, (mean - clock.first_mean) / unit)
         clock.largest_mean = max(clock.largest_mean, mean)
     given = abs(clock.first_balance) + clock.supplied
-    return not balance - clock.first_balance > max(BOUND * given, clock.energy_floor)
+    # So written, NaN is noticed.
+    return balance - clock.first_balance <= max(BOUND * given, clock.energy_floor)
 
 
 @entered

@@ -150,8 +150,19 @@ def _speeds(points: Fields) -> np.ndarray:
     return np.abs(points.velocity).max(axis=1, initial=0.0)
 
 
+def _no_number(points: Fields) -> np.ndarray:
+    return 1.0 * ~np.isfinite(points.particle("ienergy"))
+
+
 def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     clock = simulation.control.clock[0]
+    if not np.isfinite(clock.balance):
+        _, first = simulation.largest(_no_number)
+        message = (
+            f"step {simulation.step}, time {simulation.time:.6g}: energy is no number any more; "
+            f"the first point whose state is none is {named(hub, first)}"
+        )
+        return message, "look at the parameters of its material, and at what acts on it from Python"
     given = abs(clock.first_balance) + clock.supplied
     cause, cure = cause_of_gain(hub, simulation)
     times = (clock.balance - clock.first_balance) / given if given > 0 else np.inf
