@@ -1,5 +1,6 @@
 """What the tests share: scripts run through the real command line, and read back."""
 
+import gc
 import json
 import os
 import signal
@@ -32,6 +33,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # No test asserts a time, and a failure is the same in every run.
 settings.register_profile("tests", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("tests")
+
+
+def pytest_collection_finish() -> None:
+    """Modules and tests stay to the end: Python's collector need not go through them again."""
+    gc.collect()
+    gc.freeze()
 
 
 def _prepared(folder: Path, script: str | Path) -> Path:
