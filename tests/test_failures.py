@@ -24,8 +24,12 @@ OUTPUT = (
 )
 
 
-def stopped(result, *words):
-    """Check what a stopped run leaves behind; return its message."""
+def stopped(result, *words, too_large=False):
+    """Check what a stopped run leaves behind; return its message.
+
+    With a step that was `too_large` from the start on, the good state is that of the start, and log
+    and dumps show how far it came.
+    """
     message = result.err
     assert message.count("error:") == 1
     for word in ("step ", "time ", "of solid 'body'", "hint: ", "last_good.", *words):
@@ -39,7 +43,7 @@ def stopped(result, *words):
     assert f"last_good.{step}.h5" in message
     log = read_log(result.folder / "log.mpm")
     assert log.Step[0] == 0
-    assert log.Step[-1] == step
+    assert log.Step[-1] > step == 0 if too_large else log.Step[-1] == step
     for path in result.folder.glob("d.*.LAMMPS"):
         assert len(read_dump(path)[0].id) == count
     return message
@@ -116,7 +120,7 @@ def test_a_step_above_the_limit(run_interpreted):
     assert "warning: " in result.err
     assert result.err.index("warning: ") < result.err.index("error: ")
     assert "above the stable limit 0.0" in result.err
-    stopped(result, "too large, as the warning says; set_dt(")
+    stopped(result, "too large, as the warning says. Begin anew with set_dt(", too_large=True)
     # Once: the limit and what follows stand in the warning alone.
     assert result.err.count("above the stable limit") == 1
     assert result.err.count("warning: ") == 1 and "unstable" not in result.out
@@ -126,6 +130,62 @@ def test_a_step_above_the_limit(run_interpreted):
     # Who goes on with another step is told nothing.
     smaller = script.replace("set_dt(0.04)", "set_dt(0.004)").replace("run(500)", "run(20)")
     assert "limit" not in run_interpreted(smaller, "-restart", good.name, status=None).err
+
+
+def too_large(d, *lines):
+    """A block that vibrates, after 5 good steps by one far above the limit."""
+    return block(d, "fix(v, initial_velocity_particles, all, 0.4*sin(30*x0))", "set_dt(0.002)",
+                 *OUTPUT, "run(5)", "set_dt(0.04)", *lines)  # fmt: skip
+
+
+def test_no_state_behind_the_start_is_good_where_the_step_was_too_large_from_there(run_interpreted):
+    """The step to write is by the limit of that start, and goes on as if it had been so before."""
+    script = too_large(1, "restart(2, r.*.h5)", "run(500)")
+    result = run_interpreted(script, status=1)
+    warned, ended = result.err.split("error: ")
+    instead = re.search(r"hint: (set_dt\((\S+)\) or less, or leave set_dt out)", warned)
+    [good] = result.folder.glob("last_good.*")
+    assert good.name == "last_good.5.h5" and result.log.Step[-1] > 5
+    assert f"Begin anew with {instead[1]}. The state before the first step of this run" in ended
+    assert ended.count("set_dt(") == 1
+    # A file from behind that start has a ruined state: nothing to go on from, nor its limit.
+    [late] = [path.name for path in result.folder.glob("r.6.h5")]
+    again = run_interpreted(script, "-restart", late, status=1).err.split("error: ")[1]
+    assert again.endswith("Begin anew with a smaller step\n") and "last_good" not in again
+    same = run_interpreted(script, "-restart", good.name, status=1).err.split("error: ")[1]
+    assert same == ended
+    right = script.replace("0.04", instead[2]).replace("500", "40")
+    went_on = run_interpreted(right, "-restart", good.name).log
+    fresh = run_interpreted(right, folder="fresh").log
+    assert went_on.Step.tolist() == fresh.Step.tolist()
+    assert went_on.Time.tolist() == fresh.Time.tolist()
+
+
+def test_the_last_rows_of_a_long_run_are_not_computed_twice(run_interpreted):
+    """A step 1.3 times the stable one meets a wall after a hundred steps that strained nothing."""
+    lines = (
+        "region(wall, block, 1.2, INF)", "group(wall, nodes, region, wall, all)",
+        "fix(v, initial_velocity_particles, all, 0.3)", "fix(w, velocity_nodes, wall, 0)",
+        "set_dt(0.016)", *OUTPUT, "run(1000)",
+    )  # fmt: skip
+    script = block(1, *lines, law="neo-hookean").replace("0, 1.2", "0, 2.4")
+    result = run_interpreted(script, status=1)
+    assert [path.name for path in result.folder.glob("*.h5")] == ["last_good.0.h5"]
+    assert result.log.Step[-1] > 100
+    assert result.log.Step.tolist() == list(range(0, len(result.log.Step) * 5, 5))
+
+
+def test_where_points_may_be_deleted_no_start_is_kept(run_interpreted):
+    """They would not come back: the message has the step to begin anew by, and there is no file."""
+    result = run_interpreted("boundary(delete)\n" + too_large(1, "run(500)"), status=1)
+    assert re.search(r"Begin anew with set_dt\(\S+\) or less, or leave set_dt out\n", result.err)
+    assert not list(result.folder.glob("last_good.*"))
+
+
+def test_a_halved_step_begins_anew_where_it_was_too_large_from_the_start(run_interpreted):
+    result = run_interpreted(too_large(1, "run(40, on_trouble=halve)"))
+    assert result.err.count("Back to step") == result.err.count("Back to step 5, ") == 1
+    assert result.log.Step.tolist() == [*range(0, 46, 5)]
 
 
 def test_a_step_that_comes_to_lie_above_the_limit(run_interpreted):
@@ -207,29 +267,30 @@ def test_a_step_that_is_given_may_be_large_beside_what_moves(run_interpreted):
 
 
 def test_the_last_good_state_is_nearest_to_where_energy_began_to_grow(run_interpreted):
-    """A body meets a wall at step 33, by a step 1.3 times the stable one: before, nothing strains.
+    """A body meets a wall at step 27, by a step just below the stable one of the start.
 
-    The energy is looked at in steps 1, 11, 21 and so on.
+    It stiffens, and the limit falls; before, nothing strains. The energy is looked at in steps 1,
+    11, 21 and so on.
     """
     lines = (
         "region(wall, block, 1.2, INF)", "group(wall, nodes, region, wall, all)",
-        "fix(v, initial_velocity_particles, all, 1)", "fix(w, velocity_nodes, wall, 0)",
-        "set_dt(0.016)", *OUTPUT, "run(1000)",
+        "fix(v, initial_velocity_particles, all, 2)", "fix(w, velocity_nodes, wall, 0)",
+        "set_dt(0.0097)", *OUTPUT, "run(1000)",
     )  # fmt: skip
     script = block(1, *lines, law="neo-hookean").replace("0, 1.2", "0, 2.4")
     result = run_interpreted(script, status=1)
     assert "after energy had come from nowhere" in result.err
     [good] = result.folder.glob("last_good.*.h5")
-    assert good.name == "last_good.31.h5"
+    assert good.name == "last_good.21.h5"
     with h5py.File(good) as file:
-        assert file["state/points/0/v"][:] == pytest.approx(1, rel=1e-12)
+        assert file["state/points/0/v"][:] == pytest.approx(2, rel=1e-12)
     # What the hint says of the file: the step may be another, nothing else helps.
-    assert "last_good.31.h5 goes on from there, with a smaller step" in result.err
+    assert "last_good.21.h5 goes on from there, with a smaller step" in result.err
     again = run_interpreted(script, "-restart", good.name, status=1)
     assert again.err.split("error: ")[1] == result.err.split("error: ")[1]
     basis = script.replace("linear, 1", "quadratic-spline, 1")
     assert "another script" in run_interpreted(basis, "-restart", good.name, status=1).err
-    smaller = script.replace("set_dt(0.016)", "set_dt(0.006)").replace("run(1000)", "run(150)")
+    smaller = script.replace("set_dt(0.0097)", "set_dt(0.0035)").replace("run(1000)", "run(150)")
     assert "error" not in run_interpreted(smaller, "-restart", good.name).err
 
 

@@ -185,6 +185,10 @@ FAILING = {
         2, "fix(v, velocity_nodes, all, -100*(x0-0.35), 0)", "set_dt(0.02)", "run(5)",
         size=(0.1, 0.2),
     ),
+    "last_good.5.h5 goes on from there, with such a step": block(
+        2, "fix(v, initial_velocity_particles, all, 0.4*sin(30*x0), 0)", "set_dt(0.002)", "run(5)",
+        "set_dt(0.04)", "run(500)",
+    ),
     "the stable limit, which has fallen to": block(1, *LARGE_STEPS).replace("0, 1.2", "0, 120"),
     "domain of point": block(
         2, "fix(v, initial_velocity_particles, all, 3*sin(17*y0), 3*sin(13*x0))", "run(50)",

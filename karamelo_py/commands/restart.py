@@ -48,9 +48,12 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     seen or added up, and the values that the script has read. It is in HDF5, and whole or not
     there: a run that is killed leaves the one before. The last state of each run is written, too;
     that of a run that goes wrong is in last_good.<step>.h5 instead: of one whose energy has grown,
-    the last state in which it had not (to ten steps). Dumps show the state in which a
-    run was interrupted or went wrong; a run that goes on takes that out of their files again, but
-    leaves snapshots that have a file of their own (with a ``*`` in the name).
+    the last state in which it had not (to ten steps); of one whose step was above the stable limit
+    from its start on, the state before its first step (none with boundary(delete), or where the run
+    went on from a file with that step). Dumps show the state in which a run was interrupted or went
+    wrong (with such a step: where that is within a hundred steps); a run that goes on takes that
+    out of their files again, but leaves snapshots that have a file of their own (with a ``*`` in
+    the name).
 
     Example
     -------

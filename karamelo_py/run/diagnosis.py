@@ -28,6 +28,7 @@ GOES_ON = (
     "karamelo-py SCRIPT -restart {} goes on from there, with a smaller step (set_dt, dt_factor): "
     "as it is, it would end here again"
 )
+FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
 
@@ -40,35 +41,85 @@ class Trouble(NamedTuple):
     place: Place | None = None
 
 
+class TooLarge(NamedTuple):
+    """A step above the stable limit of the start of a run: nothing behind that is a good state."""
+
+    smaller: str  # what to write instead, by that limit
+    memories: restart.Memories | None  # of the start, where the snapshot is that
+
+
 def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
     """What went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
         return Trouble(*_above_limit(hub, simulation), hub.update.dt_place)
     if status == SHRUNK:
         return Trouble(*_shrunk(hub, simulation))
-    if status == GAINED:
-        return Trouble(*_gained(hub, simulation))
-    if status == HEATED:
-        return Trouble(*_heated(hub, simulation))
+    too_large = not simulation.control.clock[0].watch_limit
+    if status in (GAINED, HEATED):
+        message, hint = (_gained if status == GAINED else _heated)(hub, simulation)
+        return Trouble(message, _smaller_step(hub, simulation) if too_large else hint)
     message, hint, place = Trouble(*_wrong_point(hub, simulation))
     message = f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}"
     if place is None and has_grown(simulation):
         cause, cure = cause_of_gain(hub, simulation)
         message += f", after energy had come from nowhere. Known to do that here: {cause}"
-        hint = cure
+        hint = _smaller_step(hub, simulation) if too_large else cure
     return Trouble(message, hint, place)
 
 
 def stop(
-    hub: Hub, simulation: Simulation, status: int, snapshot: dict, place: Place | None
+    hub: Hub,
+    simulation: Simulation,
+    status: int,
+    snapshot: dict,
+    place: Place | None,
+    too_large: TooLarge | None = None,
 ) -> NoReturn:
     """Return to the last good state, write it, and raise what the user should know.
 
     Where energy has grown before, that is the last state in which it had not; log and dumps end
-    with the last state that has no trouble of its own.
+    with the last state that has no trouble of its own. Of a step that was too large from the start
+    on it is the state of the start.
     """
-    step = simulation.step
     message, hint, at_fault = trouble(hub, simulation, status)
+    if too_large is None:
+        hint += _keep_good(hub, simulation, status, snapshot)
+    else:
+        hint += _keep_start(hub, simulation, status, snapshot, too_large)
+    error = ScriptError(message, place=at_fault or place, hint=hint)
+    error.complete = at_fault is not None
+    raise error
+
+
+def _keep_start(
+    hub: Hub, simulation: Simulation, status: int, snapshot: dict, too_large: TooLarge
+) -> str:
+    """Write the state that the run began with, end the outputs, and say how to begin anew."""
+    step, path = simulation.step, None
+    simulation.restore(snapshot)
+    if too_large.memories is not None:
+        present = restart.memories(hub)
+        restart.give_back(hub, too_large.memories, cut=False)
+        path = _write_last_good(hub)
+        restart.give_back(hub, present, cut=False)
+    back = step - simulation.step - (status in (GAINED, HEATED))
+    if back <= FAR:
+        if back > 0:
+            simulation.advance(back)
+        _end_outputs(hub)
+    words = f". Begin anew with {too_large.smaller}"
+    if path is None:
+        return words
+    name = os.path.relpath(path)
+    return (
+        f"{words}. The state before the first step of this run is in {name}; karamelo-py SCRIPT "
+        f"-restart {name} goes on from there, with such a step"
+    )
+
+
+def _keep_good(hub: Hub, simulation: Simulation, status: int, snapshot: dict) -> str:
+    """Return to the last good state, write it, end the outputs, and say how to go on from it."""
+    step = simulation.step
     grown = not grown_little(simulation)
     if grown:
         _go_back(simulation, snapshot, step)
@@ -89,13 +140,11 @@ def stop(
             simulation.advance(step - simulation.step)
     path = path or _write_last_good(hub)
     _end_outputs(hub)
-    if path is not None:
-        name = os.path.relpath(path)
-        which = "The state from before energy grew" if grown else "The last good state"
-        hint += f". {which} is in {name}; {GOES_ON.format(name)}"
-    error = ScriptError(message, place=at_fault or place, hint=hint)
-    error.complete = at_fault is not None
-    raise error
+    if path is None:
+        return ""
+    name = os.path.relpath(path)
+    which = "The state from before energy grew" if grown else "The last good state"
+    return f". {which} is in {name}; {GOES_ON.format(name)}"
 
 
 def _go_back(simulation: Simulation, snapshot: dict, end: int) -> None:
@@ -324,7 +373,12 @@ def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
 
 
 def _smaller_step(hub: Hub, simulation: Simulation) -> str:
-    """How to take a smaller step, and whether the present one is too large for sure."""
+    """How to take a smaller step, and whether the present one is too large for sure.
+
+    One that was so from the start on has ruined the state, and its limit with it.
+    """
+    if not simulation.control.clock[0].watch_limit:
+        return "the step is too large" + ", as the warning says" * step_was_told(hub)
     if simulation.above_limit():
         if step_was_told(hub):
             return f"the step is too large, as the warning says; {own_step_instead(hub)}"

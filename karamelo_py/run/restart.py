@@ -253,14 +253,17 @@ def memories(hub: Hub) -> Memories:
     return parts, [array.copy() for array in arrays]
 
 
-def give_back(hub: Hub, kept: Memories) -> None:
-    """Let all parts remember what they did then; outputs go on from there in their files."""
+def give_back(hub: Hub, kept: Memories, *, cut: bool = True) -> None:
+    """Let all parts remember what they did then; outputs go on from there in their files.
+
+    Without `cut` the files stay as they are, for parts that soon remember the present again.
+    """
     parts, arrays = kept[0], [array.copy() for array in kept[1]]
     there = {tuple(key): memory for key, memory in parts}
     for key, part in _parts(hub):
         if key in there:
             remember(part, there[key], arrays)
-            if hasattr(part, "resumed"):
+            if cut and hasattr(part, "resumed"):
                 part.resumed()
 
 

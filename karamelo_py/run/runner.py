@@ -16,7 +16,12 @@ from karamelo_py.run.lowering import check_scene
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.spending import Spent
-from karamelo_py.run.stable import ruling_limit, words_of_own_step, words_of_share
+from karamelo_py.run.stable import (
+    own_step_instead,
+    ruling_limit,
+    words_of_own_step,
+    words_of_share,
+)
 from karamelo_py.run.watch import (
     change_of_energy,
     forget_growth,
@@ -66,6 +71,8 @@ class Runner:
         self.memories: restart.Memories = ([], [])
         self.snapshot: dict[str, np.ndarray] = {}  # of the last good state
         self.kept = -1  # its step
+        self.begun_at = -1  # the step of the start of this run, where its state is at hand
+        self.smaller = ""  # what to write for a step that was above the stable limit there
         self.place = hub.place
         self.spent = Spent(hub)
         self.interrupted = 0  # the signal
@@ -129,7 +136,7 @@ class Runner:
     def _keep(self, simulation: Simulation) -> None:
         self.snapshot, self.kept = simulation.snapshot(self.snapshot), simulation.step
         self.returns = 0
-        if self.halve:
+        if self.halve or self.smaller:
             self.memories = restart.memories(self.hub)
 
     @property
@@ -158,16 +165,23 @@ class Runner:
             file = hub.restart.path
             hub.restart.take(hub, outputs=True)
             hub.restart = hub.interpreter.replay = None
+            ruined = not simulation.control.clock[0].watch_limit and simulation.step > first_step
             simulation.go_on(self.end_time, self.halvings)
             if not self.halvings:  # else the step is not that of the script
                 large_steps.warn_about_steps(hub, simulation, self.halve, again=True)
             self._tell_of_no_step_left(file, simulation, first_step)
         else:
+            ruined = False
             simulation.begin(self.end_time)
             foresight.warn(hub, simulation, self.duration, self.halve)
             warn_about_length(hub, simulation, self.end_time)
+        if not simulation.control.clock[0].watch_limit:
+            # Said of the first state: a later one is ruined, and its limit with it.
+            self.smaller = "a smaller step" if ruined else own_step_instead(hub)
         simulation.compile()
         began = simulation.step
+        # Points that are deleted would not come back.
+        self.begun_at = -1 if ruined or hub.update.boundary == "delete" else began
         self._banner(simulation, going_on)
         with heeding(self._note):
             with self.spent.counted("output"):
@@ -237,7 +251,7 @@ class Runner:
             if self.condition is not None:
                 target = step + 1
             due = step != self.kept and (step % CHUNK == 0 or step == first_step + 1)
-            if due and grown_little(simulation):
+            if due and not self._keeps_start(simulation) and grown_little(simulation):
                 self._keep(simulation)
             compiled, before = (spent.on[name][0] for name in ("compilation", "steps"))
             with spent.counted("steps"):
@@ -249,7 +263,11 @@ class Runner:
                 if status == STOPPED and boundary.delete_leaving(hub, simulation, self.snapshot):
                     self._keep(simulation)
                 elif not self._try_half(simulation, status=status):
-                    diagnosis.stop(hub, simulation, status, self.snapshot, self.place)
+                    start = None
+                    if self.smaller and not simulation.control.clock[0].watch_limit:
+                        good = self.memories if self.kept == self.begun_at else None
+                        start = diagnosis.TooLarge(self.smaller, good)
+                    diagnosis.stop(hub, simulation, status, self.snapshot, self.place, start)
                 chunk = 1
                 continue
             found = None if simulation.told_of_growth else growth(hub, simulation)
@@ -278,6 +296,10 @@ class Runner:
                     simulation.time,
                     self._fraction(simulation, first_step, first_time),
                 )
+
+    def _keeps_start(self, simulation: Simulation) -> bool:
+        """Whether no state but the first is a good one: the step was too large from there on."""
+        return self.kept == self.begun_at and not simulation.control.clock[0].watch_limit
 
     def _try_half(self, simulation: Simulation, message: str = "", status: int = DONE) -> bool:
         """Go back to the last good state with half the step, where the script asks for that."""
