@@ -135,6 +135,9 @@ def unknown_name(script: Names, name: str, place: Any) -> ScriptError:
         hint = f"write {' or '.join(own)}" if own else hint
     if name.lower() in ("true", "false"):
         hint = f"write {int(name.lower() == 'true')}"
+        own = script.statement
+        if isinstance(own, Assignment) and own.right.code.strip() == name:
+            hint = f'write "{name.lower()}", in quotes'
     return ScriptError(
         f"unknown name '{name}'",
         place=place,
