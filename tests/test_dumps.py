@@ -308,6 +308,19 @@ def test_a_title_lies_within_the_picture_and_colours_beside_the_axes(plane, size
     assert max(number.x1 for number in numbers) < picture.scale.label.get_window_extent().x0
 
 
+@pytest.mark.parametrize("size", [(400, 700), (300, 450), (200, 500), (800, 250)])
+def test_names_of_axes_lie_within_the_picture(plane, size):
+    """In a domain much higher than wide, too, as that of a bar upon a wall."""
+    plane.domain.hi[0] = plane.domain.lo[0] + 0.38 * (plane.domain.hi[1] - plane.domain.lo[1])
+    dump = PyPlot(plane, 1, "p.png", *size, "seq")
+    dump.write()
+    axes = dump._picture.axes
+    for label in (axes.xaxis.label, axes.yaxis.label):
+        box = label.get_window_extent()
+        assert min(box.x0, box.y0) >= 0
+        assert box.x1 <= size[0] and box.y1 <= size[1]
+
+
 def test_numbers_that_hardly_differ_are_told_apart(plane):
     plane.fields.points["seq"] = 1000 + np.linspace(0, 1, plane.fields.count)
     dump = PyPlot(plane, 1, "p.png", 4, 3, "seq")

@@ -285,7 +285,11 @@ def test_variables_of_the_command_line(run_interpreted):
     """They are those of the file; others are an error."""
     text = with_files("n = 4\n" + FLY.replace("run(4)", "run(n)"))
     run_interpreted(text, "-var", "n", "6")
-    assert run_interpreted(text, "-restart", "r.2.h5").log.Step[-1] == 6
+    result = run_interpreted(text, "-restart", "r.2.h5")
+    assert result.log.Step[-1] == 6
+    assert result.out.startswith("n = 6 taken from r.2.h5, as -var had it\n")
+    result = run_interpreted(text, "-restart", "r.2.h5", "-var", "n", "6")
+    assert "taken from" not in result.out
     result = run_interpreted(text, "-restart", "r.2.h5", "-var", "n", "5", status=1)
     assert "was written with -var n 6; now it is -var n 5" in result.err
 
@@ -306,6 +310,18 @@ def test_another_script(run_interpreted, old, new, says):
     assert "r.2.h5 was written by another script" in result.err
     assert says in result.err
     assert result.err.count("error:") == 1
+
+
+def test_a_longer_run_by_a_variable(run_interpreted):
+    """The number stands in the last run; the message says what to write, and that works."""
+    text = with_files("n = 4\n" + FLY.replace("run(4)", "run(2*n)"))
+    run_interpreted(text)
+    result = run_interpreted(text.replace("n = 4", "n = 6"), "-restart", "r.4.h5", status=1)
+    assert "hint: leave n=4 as it was here, and write run(2*6) in the place of run(2*n)" in (
+        result.err
+    )
+    longer = text.replace("run(2*n)", "run(2*6)")
+    assert run_interpreted(longer, "-restart", "r.4.h5").log.Step[-1] == 12
 
 
 def test_the_state_alone(run_interpreted):

@@ -57,6 +57,29 @@ def test_what_follows_from_a_missing_part_is_not_told(run_interpreted, wrong, ot
     assert [text.split(": ")[-1] for _, text in found[1:]] == others
 
 
+@pytest.mark.parametrize(
+    ("unknown", "wrong"),
+    [
+        ("pair_style(hybrid)", [4, 8]),  # material(...) stands for it: one may be missing
+        ("invented(copper, 1)", [4, 8]),  # copper may be what it makes
+        ("invented(1)", [4, 5, 8]),
+        ("thermo(100)", [4, 5, 8]),  # makes nothing
+    ],
+)
+def test_what_an_unknown_command_may_have_made(run_interpreted, unknown, wrong):
+    script = f"""\
+        method(ulmpm, FLIP, linear, 1)
+        dimension(2, 0, 1, 0, 1, 0.1)
+        region(b, block, 0.3, 0.6, 0.3, 0.6)
+        {unknown}
+        solid(s, region, b, 2, copper, 0.1)
+        group(g, particles, region, b, solid, s)
+        run(10)
+        delete_fix(nobody)
+        """
+    assert [line for line, _ in places(run_interpreted(script, status=1).err)] == wrong
+
+
 def test_mistakes_behind_the_first_run_are_found_before_it(run_interpreted):
     lines = ["run(1)", "a = 1 + nothing", "run(abc)", "dump(d, all, partikle, 1, d.*)"]
     result = run_interpreted(block(2, *lines), status=1)

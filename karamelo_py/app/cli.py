@@ -330,7 +330,9 @@ def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = Non
         from karamelo_py.run.restart import Restart
 
         hub.restart = Restart(options.restart)
-        presets = hub.restart.presets(presets)
+        given, presets = presets, hub.restart.presets(presets)
+        if taken := [f"{name} = {text}" for name, text in presets.items() if name not in given]:
+            hub.console.say(f"{', '.join(taken)} taken from {hub.restart.path}, as -var had it")
     interpreter = Interpreter(hub, presets=presets)
     if hub.restart is not None:
         interpreter.replay = hub.restart.replay()

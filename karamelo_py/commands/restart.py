@@ -40,9 +40,11 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     number of threads; the log and the dumps go on in their files, whose later lines are cut off.
     Up to there the script has to be the same, except for commands that only say how a run
     goes on or what it writes (set_dt, dt_factor, set_output, dump, plot and the like); how long the
-    last run is may change. A longer ``run(n)`` has the bits of one that was as long from the
-    beginning. The last two steps of ``run_time(T)`` are shortened alike: a longer one has the bits
-    of one that was as long from the beginning where the file was written before those two.
+    last run is may change, as a number in its own line: variables stay what they were, and those
+    that ``-var`` had set are taken from the file. A longer ``run(n)`` has the bits of one that was
+    as long from the beginning. The last two steps of ``run_time(T)`` are shortened alike: a longer
+    one has the bits of one that was as long from the beginning where the file was written before
+    those two.
 
     A file holds everything that points and nodes carry, what fixes, computes, dumps and plots have
     seen or added up, and the values that the script has read. It is in HDF5, and whole or not

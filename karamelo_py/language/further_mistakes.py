@@ -35,6 +35,8 @@ class Dependents:
 
     def __init__(self) -> None:
         self._names: set[str] = set()
+        # Of what kinds something may be missing, under a name that nobody knows.
+        self.kinds: set[str] = set()
 
     def add(self, names: set[str]) -> None:
         """Note names, too."""
@@ -47,8 +49,8 @@ class Dependents:
         if not isinstance(statement, Call):
             return True
         name = statement.name
-        if not registry.knows("command", name) and instead("command", name) is None:
-            name = nearest(name, registry.names("command")) or name
+        if not registry.knows("command", name):
+            name = self._meant(name, statement)
         if name in _BASIS:
             return False
         if name in _SCENE:
@@ -56,6 +58,19 @@ class Dependents:
         if name in _SCENE | _NAMED and statement.arguments:
             self._names.add(statement.arguments[0].code.strip())
         return True
+
+    def _meant(self, name: str, statement: Call) -> str:
+        """The command that one nobody knows stands for; else it is noted what it may have made."""
+        other = instead("command", name)
+        if other is None and (close := nearest(name, registry.names("command"))):
+            return close
+        ID = statement.arguments[0].code.strip() if statement.arguments else ""
+        self.kinds |= set(re.findall(r"\b(\w+)\(", other or "")) & (_SCENE | _NAMED)
+        if other is None and ID.isidentifier():
+            self._names |= {ID, *_RUNS}
+        elif self.kinds & _SCENE:
+            self._names |= _RUNS
+        return name
 
     def includes(self, statement: Statement) -> bool:
         """Whether a statement names something of that, such as F or F_x of a fix F."""
@@ -80,10 +95,11 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
     def tell(error: ScriptError) -> None:
         # One name that is not known may stand in many lines. It follows where an ID was given
-        # twice: the second of the two was meant to have another, which nobody knows.
+        # twice: the second of the two was meant to have another, which nobody knows. So it does
+        # behind a command of another program that says by other names what one here makes.
         for one in (error, *error.others):
-            given_twice = (kind for kind, again in map(_given_twice, seen) if again)
-            follows = any(one.message.startswith(f"unknown {kind} '") for kind in given_twice)
+            kinds = {kind for kind, again in map(_given_twice, seen) if again} | dependents.kinds
+            follows = any(one.message.startswith(f"unknown {kind} '") for kind in kinds)
             if one.message not in seen and not follows:
                 found.append(one)
             seen.add(one.message)

@@ -265,11 +265,27 @@ def _of_words(words: tuple[str, ...]) -> Callable[[Any, Argument], str]:
     def convert(hub: Any, argument: Argument) -> str:
         word = argument.words(words)
         if word not in words:
-            raise Unfit(f"'{word}'", hint=meant(word, words))
+            raise _no_word_of(words, word, argument)
         return word
 
     return convert
 
+
+def _no_word_of(words: tuple[str, ...], word: str, argument: Argument) -> Unfit:
+    value = argument._interpreter.variables.get(word)
+    got = f"'{word}'"
+    if isinstance(value, float):
+        got += f", which is {number_text(value)}"
+    elif NUMBER.fullmatch(word):
+        value = float(word)
+    hint = meant(word, words)
+    if words == TRUTH and value in (0, 1):
+        truth = TRUTH[not value]
+        hint = f"write {truth}" if NUMBER.fullmatch(word) else f'write {word} = "{truth}"'
+    return Unfit(got, hint=hint)
+
+
+TRUTH = ("true", "false")
 
 _SIMPLE = {
     float: Kind("a number", _to_number),
@@ -277,8 +293,8 @@ _SIMPLE = {
     str: Kind("a word", _to_text),
     bool: Kind(
         "true or false",
-        lambda hub, argument: _of_words(("true", "false"))(hub, argument) == "true",
-        words=("true", "false"),
+        lambda hub, argument: _of_words(TRUTH)(hub, argument) == "true",
+        words=TRUTH,
     ),
     Expression: Kind("a number or a formula", _to_expression),
     Argument: Kind("anything", lambda hub, argument: argument),

@@ -77,7 +77,20 @@ class Replay:
         before = self.record.statements[self.number]
         # A run that was in progress may become longer or shorter.
         if text != before and not (self.at_end and self.within):
-            raise self.other_script(f"there this statement was {before}", place)
+            error = self.other_script(f"there this statement was {before}", place)
+            error.hint = self._longer_by(before, text) or error.hint
+            raise error
+
+    def _longer_by(self, before: str, text: str) -> str | None:
+        """How a run that was in progress is given the length that a variable of it now has."""
+        run = self.record.statements[-1]
+        name, assigns, value = text.partition("=")
+        if not (assigns and name.isidentifier() and before.startswith(f"{name}=") and self.within):
+            return None
+        longer = re.sub(rf"\b{name}\b", lambda _: value, run)
+        if longer == run:
+            return None
+        return f"leave {before} as it was here, and write {longer} in the place of {run}"
 
     def value(self) -> float:
         """What the next value(...) of the present statement gave."""

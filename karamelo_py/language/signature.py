@@ -227,7 +227,12 @@ def _bind(
             hint = values.get(word or "", hint) or SURPLUS.get(name)
         if gap:
             hint = f"is a comma missing in '{gap.text}'?"
-        missing = [p.shown for p in slots[len(given) : needed]] or [f"{m}=..." for m in missing]
+        left_out = _left_out(slots[:needed], given) if len(given) < needed and not gap else []
+        if left_out:
+            surplus, filled = _filled(slots[:needed], given, left_out)
+            hint = hint or (filled and f"{name}({filled})")
+        missing = [f"{m}=..." for m in missing]
+        missing = [p.shown for p in left_out or slots[len(given) : needed]] or missing
         raise ScriptError(
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
             if missing
@@ -241,6 +246,29 @@ def _bind(
     for k, argument in enumerate(given):
         parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic
         bound.setdefault(parameter.name, []).append(argument)
+
+
+def _left_out(slots: list[Parameter], given: Sequence[Argument]) -> list[Parameter]:
+    """The parameters that words which fit only further back have left out; none where unclear."""
+    missing, rest = [], list(given)
+    for slot in slots:
+        words = () if slot.shown == slot.name else slot.kind.words
+        if rest and (not words or rest[0].text in words):
+            del rest[0]
+        else:
+            missing.append(slot)
+    return [] if rest or missing == slots[len(given) :] else missing
+
+
+def _filled(
+    slots: list[Parameter], given: Sequence[Argument], missing: list[Parameter]
+) -> tuple[Argument | None, str | None]:
+    """What stands in the place of the first that is missing; all arguments, if words fill them."""
+    rest, before = iter(given), next(k for k, slot in enumerate(slots) if slot in missing)
+    words = [p.kind.words[0] if p in missing and p.kind.words else p in missing for p in slots]
+    if True in words:
+        return given[before], None
+    return given[before], ", ".join(word or next(rest).text for word in words)
 
 
 def _unknown_keyword(

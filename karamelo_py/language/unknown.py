@@ -131,10 +131,14 @@ def unknown_name(script: Names, name: str, place: Any) -> ScriptError:
     if name.upper() in WORDS:
         hint = f"write {name.upper()}"
     if re.match("[vcf]_", name):  # as in LAMMPS
-        own = [n for n in known if re.fullmatch(f"{name[2:]}(_[^_]+)?", n)]
-        hint = f"write {' or '.join(own)}" if own else hint
+        own = [n for n in known if n == name[2:]]
+        own = own or [n for n in known if re.fullmatch(f"{re.escape(name[2:])}_[^_]+", n)]
+        hint = f"write {' or '.join(own)}" if own else ENERGIES.get(name[2:], hint)
     if name.lower() in ("true", "false"):
         hint = f"write {int(name.lower() == 'true')}"
+        own = script.statement
+        if isinstance(own, Assignment) and own.right.code.strip() == name:
+            hint = f'write "{name.lower()}", in quotes'
     return ScriptError(
         f"unknown name '{name}'",
         place=place,

@@ -192,6 +192,8 @@ class Restart:
                 raise ScriptError(
                     f"{self.path} was written with {was}; now it is -var {name} {text}",
                     expected="the same variables; those of the file are taken where none are given",
+                    hint="leave it out; how long the last run is may be changed in its own line, "
+                    "as a number",
                 )
         return before
 

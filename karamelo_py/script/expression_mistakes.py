@@ -273,6 +273,8 @@ def _block_or_call(name: str, words: list[str]) -> str:
             return other
         if words[1] == "all" or other:  # LAMMPS has the group in front of the style
             words[1:3] = style or words[2], words[1]
+    if name == "group" and words[1:2] == ["region"] and len(words) == 3:  # as in LAMMPS
+        words = [words[0], "particles", *words[1:], "all"]
     if all(re.fullmatch(r"[\w.*/+-]+|\"[^\"]*\"", word) for word in words):
         return f"arguments go in parentheses: {name}({', '.join(words)})"
     return f"arguments go in parentheses: {name}(...)"

@@ -73,6 +73,7 @@ INSTEAD = {
         "move": "fix(ID, velocity_particles, group, vx, vy) moves points",
         "velocity": _VELOCITY,
         "wall/reflect": "boundary(reflect)",
+        "wall_reflect": "boundary(reflect)",
     },
     "compute": {
         "ke": "the style kinetic_energy",

@@ -209,6 +209,7 @@ class Picture:
         for _ in range(2):  # a second time where the aspect of the axes has moved them
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
+        self._make_room_at_left()
         if self.scale is not None:
             axes = self.scale.axes
             if axes is not self.axes:  # a colour bar, no higher than the axes
@@ -220,6 +221,16 @@ class Picture:
             at = axes.transAxes.inverted().transform((self.scale.label.get_position()[0], 0))
             self.scale.set_label_coords(at[0], 0.5)
         self._laid_out = True
+
+    def _make_room_at_left(self) -> None:
+        """Narrow axes of equal units may be laid out with the name of y outside the picture."""
+        label = self.axes.yaxis.label
+        out = MARGIN - label.get_window_extent(self.canvas.get_renderer()).x0
+        if out <= MARGIN or not self.axes.axison or not label.get_text():
+            return
+        box, share = self.axes.get_position(), out / self.figure.bbox.width
+        self.axes.set_position((box.x0 + share, box.y0, box.width - share, box.height))
+        self.figure.draw_without_rendering()
 
     def _pixels_per_unit(self) -> float:
         """Points (1/72 inch) on paper per unit of x."""
