@@ -123,8 +123,11 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, snapshot: dict) ->
     grown = not grown_little(simulation)
     if grown:
         _go_back(simulation, snapshot, step)
-    elif status in (GAINED, HEATED, STOPPED):
+    else:
         simulation.restore(snapshot)
+        if status not in (GAINED, HEATED, STOPPED) and step > simulation.step:
+            # What nodes have depends on how many steps ran at once: here always on as many.
+            simulation.advance(step - simulation.step)
     path = _write_last_good(hub) if grown else None
     if status not in (GAINED, HEATED) and step > simulation.step:
         before = simulation.energy()
