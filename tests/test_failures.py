@@ -161,15 +161,19 @@ def test_no_state_behind_the_start_is_good_where_the_step_was_too_large_from_the
     assert went_on.Time.tolist() == fresh.Time.tolist()
 
 
-def test_the_last_rows_of_a_long_run_are_not_computed_twice(run_interpreted):
-    """A step 1.3 times the stable one meets a wall after a hundred steps that strained nothing."""
+def against_a_wall(v: float, dt: float) -> str:
+    """A body that nothing strains before it meets a wall."""
     lines = (
         "region(wall, block, 1.2, INF)", "group(wall, nodes, region, wall, all)",
-        "fix(v, initial_velocity_particles, all, 0.3)", "fix(w, velocity_nodes, wall, 0)",
-        "set_dt(0.016)", *OUTPUT, "run(1000)",
+        f"fix(v, initial_velocity_particles, all, {v})", "fix(w, velocity_nodes, wall, 0)",
+        f"set_dt({dt})", *OUTPUT, "run(1000)",
     )  # fmt: skip
-    script = block(1, *lines, law="neo-hookean").replace("0, 1.2", "0, 2.4")
-    result = run_interpreted(script, status=1)
+    return block(1, *lines, law="neo-hookean").replace("0, 1.2", "0, 2.4")
+
+
+def test_the_last_rows_of_a_long_run_are_not_computed_twice(run_interpreted):
+    """A step 1.3 times the stable one meets a wall after a hundred steps that strained nothing."""
+    result = run_interpreted(against_a_wall(0.3, 0.016), status=1)
     assert [path.name for path in result.folder.glob("*.h5")] == ["last_good.0.h5"]
     assert result.log.Step[-1] > 100
     assert result.log.Step.tolist() == list(range(0, len(result.log.Step) * 5, 5))
@@ -272,12 +276,7 @@ def test_the_last_good_state_is_nearest_to_where_energy_began_to_grow(run_interp
     It stiffens, and the limit falls; before, nothing strains. The energy is looked at in steps 1,
     11, 21 and so on.
     """
-    lines = (
-        "region(wall, block, 1.2, INF)", "group(wall, nodes, region, wall, all)",
-        "fix(v, initial_velocity_particles, all, 2)", "fix(w, velocity_nodes, wall, 0)",
-        "set_dt(0.0097)", *OUTPUT, "run(1000)",
-    )  # fmt: skip
-    script = block(1, *lines, law="neo-hookean").replace("0, 1.2", "0, 2.4")
+    script = against_a_wall(2, 0.0097)
     result = run_interpreted(script, status=1)
     assert "after energy had come from nowhere" in result.err
     [good] = result.folder.glob("last_good.*.h5")

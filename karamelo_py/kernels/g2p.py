@@ -22,7 +22,15 @@ from karamelo_py.kernels.averaging import (
     no_ratio,
 )
 from karamelo_py.kernels.loss import Rubbed, in_company, reflect, warm, warm_by_friction
-from karamelo_py.kernels.visit import deformation_of, for_tags, in_turn, law_of, place_at, state_of
+from karamelo_py.kernels.visit import (
+    deformation_of,
+    for_tags,
+    in_turn,
+    law_of,
+    place_at,
+    records_of,
+    state_of,
+)
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.boundary import Bounces, reflected
@@ -191,19 +199,13 @@ def _(task, w, x):
     return subtract(x, x)
 
 
-@point_function(otherwise=True)
-def records_read(task, nodes):
-    """The records that a task gathers from, for `prefetch_records`; None: not asked for."""
-    return None
-
-
-@records_read.on(Move)
+@records_of.on(Move)
 def _(task, nodes):
     return nodes.update
 
 
-@records_read.on(Strain)
-@records_read.on(StrainOfLastStep)
+@records_of.on(Strain)
+@records_of.on(StrainOfLastStep)
 def _(task, nodes):
     return nodes.velocity
 
@@ -451,7 +453,6 @@ def store_optional(array, p, value):
         store(array, p, value)
 
 
-all_records_read = for_tags(records_read, "nodes")
 empty_all = for_tags(empty, "w, x")
 gathered_all = for_tags(gathered, "w, stencil, k, totals", each="totals")
 settled_all = in_turn(settled)

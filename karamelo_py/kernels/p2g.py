@@ -9,7 +9,7 @@ from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, VELOCITY_WIDTH, of_forc
 from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.g2p import zero_vector
 from karamelo_py.kernels.loss import Lost, bring_energy
-from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, state_of
+from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, records_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, add_force, force_stress
 from karamelo_py.points.kinematics import add_pressure, dimension, stretching_mean, zero_symmetric
@@ -152,18 +152,12 @@ def load_of(quantity, w, p, like):
     """What a point brings to the nodes."""
 
 
-@point_function(otherwise=True)
-def records_given(quantity, nodes):
-    """The records that a quantity is given to, for `prefetch_records`; None: not asked for."""
-    return None
-
-
-@records_given.on(MassMomentum)
+@records_of.on(MassMomentum)
 def _(quantity, nodes):
     return nodes.sums
 
 
-@records_given.on(MomentumAgain)
+@records_of.on(MomentumAgain)
 def _(quantity, nodes):
     return nodes.velocity
 
@@ -360,6 +354,5 @@ def accumulate_optional(array, i, values):
         accumulate(array, i, 0, values)
 
 
-all_records_given = for_tags(records_given, "nodes")
 load_all = for_tags(load_of, "w, p, like")
 scattered_all = for_tags(scattered, "w, stencil, k, loads", each="loads")

@@ -18,8 +18,9 @@ from karamelo_py.kernels.corners import (
     scatter_corners,
     shows_corners,
 )
-from karamelo_py.kernels.g2p import all_records_read, empty_all, gathered_all
-from karamelo_py.kernels.p2g import all_records_given, scattered_all
+from karamelo_py.kernels.g2p import empty_all, gathered_all
+from karamelo_py.kernels.p2g import scattered_all
+from karamelo_py.kernels.visit import all_records_of
 from karamelo_py.kernels.width import OneByOne
 from karamelo_py.points.basis import entry, support
 from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, is_whole, of_one
@@ -67,7 +68,7 @@ def _(width, stencil, tasks, w, totals):
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
     if sees_same_nodes(stencil):
         return _gather_parts(tasks, w, with_one_node(stencil), totals)
-    _ask_ahead(all_records_read(tasks, w.nodes), w, stencil)
+    _ask_ahead(tasks, w, stencil)
     return _gather_parts(tasks, w, stencil, totals)
 
 
@@ -93,10 +94,10 @@ def _(width, stencil, tasks, w, totals):
 
 
 @shared
-def _ask_ahead(arrays, w, stencil):
+def _ask_ahead(tags, w, stencil):
     """Ask the memory for records of nodes behind the last of a stencil: the others were seen."""
     last = entry(w.basis, w.kin, w.grid, stencil, support(w.basis, w.kin) - 1)[0]
-    for array in arrays:
+    for array in all_records_of(tags, w.nodes):
         if array is not None:
             prefetch_records(array, last)
 
@@ -125,7 +126,7 @@ def _(width, stencil, quantities, w, loads):
     elif sees_same_nodes(stencil):
         _scatter_parts(width, quantities, w, with_one_node(stencil), loads, parts)
     else:
-        _ask_ahead(all_records_given(quantities, w.nodes), w, stencil)
+        _ask_ahead(quantities, w, stencil)
         _scatter_parts(width, quantities, w, stencil, loads, parts)
 
 

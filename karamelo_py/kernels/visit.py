@@ -97,6 +97,15 @@ def _ask(array, rows, p):
 
 
 @point_function(otherwise=True)
+def records_of(tag, nodes):
+    """The records that a task gathers from, or a quantity is given to, for `prefetch_records`.
+
+    None: they are not asked for.
+    """
+    return None
+
+
+@point_function(otherwise=True)
 def deformation_of(frame, kin, law, state, points, p):
     """F of a point where the frame needs it."""
     return ()
@@ -155,3 +164,6 @@ def in_turn(function: Callable) -> Callable:
         return moved, fastest
 
     return loop
+
+
+all_records_of = for_tags(records_of, "nodes")
