@@ -21,7 +21,7 @@ from karamelo_py.compiler.fields import field, load, store
 from karamelo_py.compiler.lanes import Eights, Fours, group
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.powers import exponential, logarithm, power
+from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_one, power
 from karamelo_py.compiler.tuples import row, scale
 from karamelo_py.kernels.arrays import arrays_of, with_nodes
 from karamelo_py.kernels.averaging import NodalMean
@@ -239,6 +239,7 @@ def test_laws_unchanged(law, kin):
 def _powers(x, y, out, p):
     out[0, p] = power(x[p], y[p])
     out[1, p] = logarithm(x[p])
+    out[3, p] = logarithm_near_one(x[p])
     out[2, p] = exponential(y[p])
 
 
@@ -261,17 +262,20 @@ def test_powers(real_type):
     rng = np.random.default_rng(4)
     x = (10 ** rng.uniform(-4, 4, 2000)).astype(real_type)
     x[:1000] = rng.uniform(0.9, 1.1, 1000)
+    x[:400] = 1 + rng.choice([-1, 1], 400) * 10 ** rng.uniform(-8, np.log10(1 / 16), 400)
     y = rng.uniform(-8, 8, 2000).astype(real_type)
-    alone, together = np.zeros((2, 3, 2000), real_type)
+    alone, together = np.zeros((2, 4, 2000), real_type)
     _powers_alone(x, y, alone, 2000)
     _powers_in_lanes(tag, width, x, y, together, 2000)
     assert together.tobytes() == alone.tobytes()
     a, b = x.astype(np.longdouble), y.astype(np.longdouble)
     eps = np.finfo(real_type).eps
     growth = 2 + np.abs(b * np.log(a))
-    off = np.abs(alone - np.stack([a**b, np.log(a), np.exp(b)]))
+    off = np.abs(alone - np.stack([a**b, np.log(a), np.exp(b), np.log(a)]))
     assert (off[0] <= eps * growth * a**b).all()
     assert (off[1] <= 2 * eps * np.abs(np.log(a))).all()
+    near = np.abs(a - 1) <= 1 / 16
+    assert (off[3] <= np.where(near, 0.6, 2) * eps * np.abs(np.log(a))).all()
     assert (off[2] <= 2 * eps * np.exp(b)).all()
 
 
@@ -282,7 +286,7 @@ def test_powers_at_the_ends(real_type):
     last = np.log2(np.finfo(real_type).smallest_subnormal) + 4
     x = np.array([0.0, 0.0, 1.0, 2.0, 2.0, 2.0, -1.0, np.nan, 0.0, 0.0], real_type)
     y = np.array([0.4, 0.0, 1e3, 2e3, -2e3, last, 0.5, 0.5, -0.5, -2.0], real_type)
-    out, alone = np.zeros((2, 3, 10), real_type)
+    out, alone = np.zeros((2, 4, 10), real_type)
     _powers_in_lanes(tag, width, x, y, out, 10)
     _powers_alone(x, y, alone, 10)
     np.testing.assert_array_equal(out, alone)
@@ -292,6 +296,7 @@ def test_powers_at_the_ends(real_type):
     assert out[0, 5] == pytest.approx(2.0**last, rel=1 / 16)
     assert np.isnan(out[0, 6:8]).all()
     np.testing.assert_array_equal(out[1, :3], [-np.inf, -np.inf, 0])
+    np.testing.assert_array_equal(out[3], out[1])
 
 
 GRID = Grid(

@@ -6,6 +6,7 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.codegen import get_host_cpu_features
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import (
@@ -30,7 +31,9 @@ from karamelo_py.compiler.lanes.registers import (
 )
 from karamelo_py.compiler.tuples import row
 
-WIDEST = 8  # components of records that a field is given to at once
+# Bytes of a record that a field is given to at once: a register. Of wider vectors LLVM makes two,
+# and where registers are narrow there are too few of them for that.
+_AT_ONCE = 64 if "+avx512f" in get_host_cpu_features() else 32
 
 AHEAD = 16  # nodes by which records are asked of the memory ahead of their use
 
@@ -312,10 +315,11 @@ def _accumulate_affine(typing_context, array, nodes, first, weights, value, slop
             for slope in cgutils.unpack_tuple(builder, arguments[5])
         ]
         width = round(len(nodes) ** (1 / max(1, len(growths))))
-        for begin in range(0, len(values), WIDEST):
-            some = slice(begin, begin + WIDEST)
+        widest = min(_AT_ONCE // size, 8)
+        for begin in range(0, len(values), widest):
+            some = slice(begin, begin + widest)
             left = len(values[some])
-            count = WIDEST if left > 4 else _chunks(left)[0][1]
+            count = widest if left > 4 else _chunks(left)[0][1]
             column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
             vector = ir.VectorType(element(array.dtype), count)
             one = Lanes(array.dtype, count)

@@ -7,7 +7,7 @@ from math import exp
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.powers import logarithm
+from karamelo_py.compiler.powers import logarithm_near_one
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import (
@@ -106,7 +106,7 @@ def _(law, kin, state, dl, dt):
 @kirchhoff_stress.on(NeoHookean)
 def _(law, kin, state):
     # P = G (F - F^-T) + lam ln J F^-T, so tau = P F^T = G (b - I) + lam ln J I
-    pressure = law.lam * logarithm(determinant(kin, state)) - law.G
+    pressure = law.lam * logarithm_near_one(determinant(kin, state)) - law.G
     return add_pressure(kin, law.G, left_cauchy_green(kin, state), pressure)
 
 
@@ -130,8 +130,8 @@ def _(law, kin, state):
 def _(law, kin, state):
     # Along a principal direction of stretch a, the tangent of P gives
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
-    one = real(1, law.G)
-    return _speed_squared(law, kin, state, law.lam * (one - logarithm(determinant(kin, state))))
+    ln_j = logarithm_near_one(determinant(kin, state))
+    return _speed_squared(law, kin, state, law.lam * (real(1, law.G) - ln_j))
 
 
 @wave_speed_bound.on(NeoHookean)
@@ -152,7 +152,7 @@ def _speed_squared(law, kin, state, bulk):
 @energy_density.on(NeoHookean)
 def _(law, kin, state):
     half = real(0.5, law.G)
-    ln_j = logarithm(determinant(kin, state))
+    ln_j = logarithm_near_one(determinant(kin, state))
     excess = trace(left_cauchy_green(kin, state)) - real(3, law.G)
     return half * law.G * excess - law.G * ln_j + half * law.lam * ln_j * ln_j
 

@@ -106,9 +106,11 @@ def cold_pressure(eos, j):
     inside = min(closed, tangent_from(eos, j))
     y = eos.S * inside
     flat = one - y
-    slope = (one + y) / (flat * flat * flat)
-    curve = eos.modulus * (inside / (flat * flat) + slope * (closed - inside))
-    return choose(closed < 0, eos.modulus * closed / j, curve)
+    in_tension = closed < 0
+    inverse = one / choose(in_tension, j, flat)
+    slope = (one + y) * inverse
+    curve = (inside + slope * (closed - inside)) * (inverse * inverse)
+    return eos.modulus * choose(in_tension, closed * inverse, curve)
 
 
 @point_function(otherwise=True)
@@ -132,9 +134,10 @@ def _(eos, j, memory, heat):
     one = real(1, j)
     closed = one - j
     y = eos.S * min(closed, tangent_from(eos, j))
-    flat = one - y
-    curve = j * eos.modulus * (one + y) / (flat * flat * flat)
-    return choose(closed < 0, eos.modulus / j, curve)
+    in_tension = closed < 0
+    inverse = one / choose(in_tension, j, one - y)
+    curve = j * (one + y) * (inverse * inverse)
+    return eos.modulus * choose(in_tension, inverse, curve * inverse)
 
 
 @compression_energy.on(Shock)

@@ -156,9 +156,9 @@ def power_law_guess(exponent, strain, hard, excess, slope):
     some = strain > round_off(strain)
     inverse = choose(some, one / choose(some, strain, one), zero)
     steeper = hard * exponent * inverse
-    slope = slope + steeper
-    curved = real(0.5, strain) * (one - exponent) * steeper * inverse / slope
-    x = max(excess, zero) / slope
+    flatter = one / (slope + steeper)
+    curved = real(0.5, strain) * (one - exponent) * steeper * inverse * flatter
+    x = max(excess, zero) * flatter
     return x + x * max(min(curved * x, one), real(-0.5, x)), abs(curved)
 
 
