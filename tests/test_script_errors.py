@@ -173,6 +173,8 @@ COMMANDS = [
     ("compute(Ek, kinetic_energy, all)\na = 2*c_Ek", 7, "hint: write Ek"),
     ("log_modify(custom, step, c_Ek)", 26, "hint: compute(Ek, kinetic_energy, all) gives Ek"),
     ("group(p, particles, region, b)", 1, "all|solid is missing"),
+    ("group(p)", 1, "group: particles|nodes, region, regionID, all|solid are missing"),
+    ("group(p, particles, region)", 1, "group: regionID, all|solid are missing"),
     ("group(p, region, b)", 10, "group: particles|nodes, all|solid are missing"),
     ("group(p, region, b)", 10, "hint: group(p, particles, region, b, all)"),
     ("group(p, region, b, all)", 10, "hint: group(p, particles, region, b, all)"),

@@ -252,7 +252,9 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
             expected=forms.line(count),
         )
     try:
-        return Domain(count, lo, hi, h)
+        domain = Domain(count, lo, hi, h)
     except ScriptError as error:
         error.argument, error.place = None, place_of(names, bounds, "h")
         raise
+    domain.place = hub.place
+    return domain

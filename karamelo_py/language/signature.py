@@ -232,7 +232,7 @@ def _bind(
             surplus, filled = _filled(slots[:needed], given, left_out)
             hint = hint or (filled and f"{name}({filled})")
         missing = [f"{m}=..." for m in missing]
-        missing = [p.shown for p in left_out or slots[len(given) : needed]] or missing
+        missing = _named(left_out or slots[len(given) : needed], slots) or missing
         raise ScriptError(
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
             if missing
@@ -258,6 +258,12 @@ def _left_out(slots: list[Parameter], given: Sequence[Argument]) -> list[Paramet
         else:
             missing.append(slot)
     return [] if rest or missing == slots[len(given) :] else missing
+
+
+def _named(missing: list[Parameter], slots: list[Parameter]) -> list[str]:
+    """What is missing; the ID of what a word of its own stands before is no second such word."""
+    words = {p.shown for p in slots if p.shown != p.name}
+    return [f"{p.name}ID" if p.shown == p.name in words else p.shown for p in missing]
 
 
 def _filled(

@@ -69,6 +69,8 @@ class Crew:
     ----------
     beside
         How many of them have the same cores as this one, itself among them.
+    on_machine
+        How many of them share the memory of its machine.
     waited
         Seconds in which this process waited for others, or for what they sent, in steps.
     amid
@@ -84,7 +86,7 @@ class Crew:
         If mpi4py is not there, or finds no MPI.
     """
 
-    beside = 1
+    beside = on_machine = 1
     waited = 0.0
     signal = 0
     amid = parted = False
@@ -109,6 +111,9 @@ class Crew:
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
         mine = socket.gethostname(), cores
         self.beside = self.everyone(mine).count(mine)
+        near = MPI.COMM_WORLD.Split_type(MPI.COMM_TYPE_SHARED)
+        self.on_machine = near.Get_size()
+        near.Free()
 
     @property
     def leads(self) -> bool:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -15,6 +15,7 @@ from karamelo_py.output.fields import Fields
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.large_steps import step_was_told
+from karamelo_py.run.marks import Marks
 from karamelo_py.run.no_number import culprit
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead
@@ -48,6 +49,14 @@ class TooLarge(NamedTuple):
     memories: restart.Memories | None  # of the start, where the snapshot is that
 
 
+class Good(NamedTuple):
+    """What is known of the last good state."""
+
+    snapshot: dict
+    marks: Marks  # how far outputs had come
+    too_large: TooLarge | None = None
+
+
 def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
     """What went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
@@ -71,9 +80,8 @@ def stop(
     hub: Hub,
     simulation: Simulation,
     status: int,
-    snapshot: dict,
+    good: Good,
     place: Place | None,
-    too_large: TooLarge | None = None,
 ) -> NoReturn:
     """Return to the last good state, write it, and raise what the user should know.
 
@@ -82,21 +90,17 @@ def stop(
     on it is the state of the start.
     """
     message, hint, at_fault = trouble(hub, simulation, status)
-    if too_large is None:
-        hint += _keep_good(hub, simulation, status, snapshot)
-    else:
-        hint += _keep_start(hub, simulation, status, snapshot, too_large)
+    keep = _keep_good if good.too_large is None else _keep_start
+    hint += keep(hub, simulation, status, good)
     error = ScriptError(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error
 
 
-def _keep_start(
-    hub: Hub, simulation: Simulation, status: int, snapshot: dict, too_large: TooLarge
-) -> str:
+def _keep_start(hub: Hub, simulation: Simulation, status: int, good: Good) -> str:
     """Write the state that the run began with, end the outputs, and say how to begin anew."""
-    step, path = simulation.step, None
-    simulation.restore(snapshot)
+    step, path, too_large = simulation.step, None, good.too_large
+    simulation.restore(good.snapshot)
     if too_large.memories is not None:
         present = restart.memories(hub)
         restart.give_back(hub, too_large.memories, cut=False)
@@ -117,9 +121,9 @@ def _keep_start(
     )
 
 
-def _keep_good(hub: Hub, simulation: Simulation, status: int, snapshot: dict) -> str:
+def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str:
     """Return to the last good state, write it, end the outputs, and say how to go on from it."""
-    step = simulation.step
+    step, snapshot = simulation.step, good.snapshot
     grown = not grown_little(simulation)
     if grown:
         _go_back(simulation, snapshot, step)
@@ -128,7 +132,7 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, snapshot: dict) ->
         if status not in (GAINED, HEATED, STOPPED) and step > simulation.step:
             # What nodes have depends on how many steps ran at once: here always on as many.
             simulation.advance(step - simulation.step)
-    path = _write_last_good(hub) if grown else None
+    path = _write_last_good(hub, good.marks) if grown else None
     if status not in (GAINED, HEATED) and step > simulation.step:
         before = simulation.energy()
         kept = simulation.step
@@ -139,7 +143,7 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, snapshot: dict) ->
             # The watch looks at means of a hundred steps, and has not seen it yet.
             grown = True
             _go_back(simulation, snapshot, step)
-            path = _write_last_good(hub)
+            path = _write_last_good(hub, good.marks)
             simulation.advance(step - simulation.step)
     path = path or _write_last_good(hub)
     _end_outputs(hub)
@@ -397,13 +401,17 @@ def _place(x: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
 
 
-def _write_last_good(hub: Hub) -> Path | None:
-    """Write the present state to a file to go on from; a file of somebody else is left alone."""
+def _write_last_good(hub: Hub, marks: Marks | None = None) -> Path | None:
+    """Write the present state to a file to go on from; a file of somebody else is left alone.
+
+    With `marks` outputs have written later states, which who goes on from there will write anew.
+    """
     written: list[Path] = []
     path = restart.path_of(hub, Path(LAST_GOOD))
     if hub.output.writes and (not path.exists() or restart.is_restart(path)):
         with _told(hub):
-            written.append(restart.write(hub, Path(LAST_GOOD), within=True))
+            with marks.at(hub.update.step) if marks is not None else nullcontext():
+                written.append(restart.write(hub, Path(LAST_GOOD), within=True))
             # The files of restart(...) would hold the same once more.
             for item in hub.output.last:
                 item.last_step = hub.update.step

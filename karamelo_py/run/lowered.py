@@ -24,6 +24,7 @@ from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.by_id import ById
 from karamelo_py.run.by_number import ByNumber
 from karamelo_py.run.lowering import State, chosen, lower, thread_count, warms_by_friction
+from karamelo_py.run.room import check_room, no_room
 from karamelo_py.run.state import (
     Stored,
     changing,
@@ -69,8 +70,12 @@ class Lowered(ById, ByNumber):
     def __init__(self, hub: Hub, previous: Lowered | None = None):
         self.hub = hub
         self.key = scene_key(hub)
-        state = previous.state() if previous else None
-        self.setup, self.tiles = self._lowered(state)
+        check_room(hub, copied=previous is None and hub.running is not None)
+        try:
+            state = previous.state() if previous else None
+            self.setup, self.tiles = self._lowered(state)
+        except MemoryError as error:
+            raise no_room(hub, error) from None
         self.control = self.setup.control
         try_parts(hub, self.setup)
         self.count = sum(s.count for s in hub.solids.values())

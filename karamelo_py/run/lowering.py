@@ -304,6 +304,16 @@ def start(law, T0: float | None, kin, real: type) -> np.ndarray:
     return np.array(state if T0 is None else with_temperature(law, kin, state, real(T0)), real)
 
 
+def point_kinds(hub: Hub, real: type) -> tuple[type, ...]:
+    """The declared fields of the points, as far as no array of nodes has to be made for that."""
+    method, thermal = hub.update.method, hub.update.thermal
+    owners = [method.frame, hub.update.transfer_tag(real), method.averaging(hub)]
+    owners += [Conducting] if thermal else []
+    owners += [ReflectingGrid] if hub.update.boundary == "reflect" else []
+    owners += [*hub.fixes.values(), hub.update.scheme, method.basis, method]
+    return fields.declared(owners, "point_fields")
+
+
 def lower_block(
     hub: Scene,
     solids: list,
@@ -314,13 +324,20 @@ def lower_block(
     previous: State | None,
 ) -> Block:
     """The points of all solids whose law is of one kind."""
+    block = Block(*lower_points(hub, solids, kin, kinds, real), tiles.empty_tiling())
+    return block if previous is None else resumed(block, previous)
+
+
+def lower_points(
+    hub: Scene, solids: list, kin: NamedTuple, kinds: tuple[type, ...], real: type
+) -> tuple[Points, NamedTuple]:
+    """The points of solids whose laws are of one kind, and these laws."""
     method = hub.update.method
     known = [law_on(s.material.law, s.h, s.T0) for s in solids]
     if hub.fields.rate_is_asked_for():
         known = [with_rate(law, kin, s.h) for law, s in zip(known, solids, strict=True)]
     laws_of_solids = list(dict.fromkeys(known))
     laws = law_table(laws_of_solids, real)
-
     ends = np.cumsum([s.count for s in solids])
     count = int(ends[-1])
 
@@ -354,8 +371,7 @@ def lower_block(
         id=joined((np.arange(s.first_id, s.first_id + s.count) for s in solids), np.int64),
         fields=tuple(fields.at_points(kind, kin, count, real) for kind in own),
     )
-    block = Block(points, laws, tiles.empty_tiling())
-    return block if previous is None else resumed(block, previous)
+    return points, laws
 
 
 def resumed(block: Block, previous: State) -> Block:

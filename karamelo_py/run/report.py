@@ -18,6 +18,7 @@ from karamelo_py.run.stable import ruling_limit, words_of_share
 from karamelo_py.run.watch import not_watched, unknown_work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
+from karamelo_py.scene.room import free_bytes
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
@@ -60,6 +61,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
     memory = memory_of(simulation, s, tiles.box_bytes(s))
     say(f"memory         {_size(sum(memory))} in a run, of which")
     say(f"               {_size(memory.copied)} are a copy of the last good state")
+    if (free := free_bytes()) is not None:
+        say(f"               {_size(free)} are free on this machine, beside what check has taken")
     if hub.settings.ranks > 1:
         say("")
         for line in told(simulation, hub.settings.ranks):

@@ -13,6 +13,7 @@ from karamelo_py.run import diagnosis, foresight, large_steps, restart
 from karamelo_py.run.crew import heeding
 from karamelo_py.run.idle import warn_about_length
 from karamelo_py.run.lowering import check_scene
+from karamelo_py.run.marks import Marks
 from karamelo_py.run.report import bytes_per_point, report
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.spending import Spent
@@ -69,6 +70,7 @@ class Runner:
         self.halvings = 0
         self.returns = 0  # to the last good state, since energy grew from there on
         self.memories: restart.Memories = ([], [])
+        self.marks = Marks()
         self.snapshot: dict[str, np.ndarray] = {}  # of the last good state
         self.kept = -1  # its step
         self.begun_at = -1  # the step of the start of this run, where its state is at hand
@@ -136,6 +138,7 @@ class Runner:
     def _keep(self, simulation: Simulation) -> None:
         self.snapshot, self.kept = simulation.snapshot(self.snapshot), simulation.step
         self.returns = 0
+        self.marks.forget_before(self.kept)
         if self.halve or self.smaller:
             self.memories = restart.memories(self.hub)
 
@@ -186,6 +189,7 @@ class Runner:
         with heeding(self._note):
             with self.spent.counted("output"):
                 hub.output.begin(within=going_on)
+            self.marks.note(hub)
             hub.console.begin_run(simulation.step, 0.0)
             try:
                 self._loop(simulation, first_step, first_time)
@@ -265,9 +269,10 @@ class Runner:
                 elif not self._try_half(simulation, status=status):
                     start = None
                     if self.smaller and not simulation.control.clock[0].watch_limit:
-                        good = self.memories if self.kept == self.begun_at else None
-                        start = diagnosis.TooLarge(self.smaller, good)
-                    diagnosis.stop(hub, simulation, status, self.snapshot, self.place, start)
+                        begun = self.memories if self.kept == self.begun_at else None
+                        start = diagnosis.TooLarge(self.smaller, begun)
+                    good = diagnosis.Good(self.snapshot, self.marks, start)
+                    diagnosis.stop(hub, simulation, status, good, self.place)
                 chunk = 1
                 continue
             found = None if simulation.told_of_growth else growth(hub, simulation)
@@ -291,6 +296,7 @@ class Runner:
             with self.spent.counted("output"):
                 if simulation.step < last_step and simulation.time < self.end_time:
                     output.write()
+                    self.marks.note(hub)
                 hub.console.progress(
                     simulation.step,
                     simulation.time,
@@ -312,6 +318,7 @@ class Runner:
         simulation.restore(self.snapshot)
         # Rows of log and dumps that have been written since go with what they show.
         restart.give_back(self.hub, self.memories)
+        self.marks.forget_after(simulation.step)
         simulation.halve_step(self.halvings)
         while simulation.above_limit() and self.halvings < HALVINGS:
             # What is above the limit would only come back.

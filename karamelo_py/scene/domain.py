@@ -7,7 +7,7 @@ import numpy as np
 from karamelo_py.language.own_words import words_of
 from karamelo_py.language.scene import Scene
 from karamelo_py.scene.lattice import CHUNK, RELATIVE_TOLERANCE, Lattice
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Place, ScriptError
 
 __all__ = ["CHUNK", "Domain", "require_domain", "require_grid"]
 
@@ -37,9 +37,12 @@ class Domain:
         Cells per direction, 1 in unused directions.
     axisymmetric : bool
         Whether x is a radius and y the axis.
+    place : Place or None
+        Where a script makes it.
     """
 
     axisymmetric = False
+    place: Place | None = None
 
     def __init__(self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float | None):
         self.dimension = dimension

@@ -209,7 +209,12 @@ def _in_order(along: np.ndarray, dimension: int) -> np.ndarray:
 
 
 def fill(
-    region: Region, domain: Domain, lattice: Lattice, ppc: int, rule: str | None = None
+    region: Region,
+    domain: Domain,
+    lattice: Lattice,
+    ppc: int,
+    rule: str | None = None,
+    room: float = math.inf,
 ) -> Placement:
     """The points of `lattice` that fill `region` within the domain.
 
@@ -219,7 +224,7 @@ def fill(
     Raises
     ------
     ScriptError
-        When there would be more points than can be numbered.
+        When there would be more points than can be numbered, or than memory has `room` for.
     """
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
@@ -276,6 +281,12 @@ def fill(
             continue
         kept &= in_domain
         x0.keep(kept)
+        if len(x0) > room:
+            raise ScriptError(
+                f"the scene has more than {room:.3g} points, and this machine has no memory for "
+                "so many",
+                hint="larger cells, or fewer points per cell",
+            )
         if not even:
             numbers.append(np.flatnonzero(kept) % len(places))
     if reaches_out.any() and not counted:

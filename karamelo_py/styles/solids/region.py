@@ -8,6 +8,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import fill, lattice_of
 from karamelo_py.scene.region import Region
+from karamelo_py.scene.room import room_for
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError
 
@@ -96,7 +97,8 @@ class RegionSolid(Solid):
                 argument="points",
                 hint="points=regular, a solid from a mesh, or another basis",
             )
-        placement = fill(region, domain, lattice, ppc, points)
+        room = room_for(hub, self.first_id, domain.dimension)
+        placement = fill(region, domain, lattice, ppc, points, room)
         self.put(hub, placement, may_be_empty=region.unknown)
         if placement.missed:
             hub.warn(
