@@ -308,8 +308,8 @@ class Holding(Leading):
             part.tiles.owner = owner
             part.tiles.empty_nodes(part.setup)
             part.put(own_share(part, state, owner))
-            reached = zip(*self.crew.everyone(part.tiles.reached), strict=True)
-            take_nodes(part, state, part.tiles.spans_of(*map(np.concatenate, reached)))
+            reached = self.crew.everyone(part.tiles.reached_by(part.setup))
+            take_nodes(part, state, part.tiles.spans_of_all(reached))
             self.present[:] = state["present"][()]
         if not self.crew.leads:
             self.control.totals[WORK] = 0

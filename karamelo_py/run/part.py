@@ -154,8 +154,8 @@ class Part:
 
     def tell_of_tiles(self) -> dict:
         """Tiles, the boxes of nodes that they reach, and work done."""
-        work = self.setup.control.totals[WORK].copy()
-        return {"tiling": self.tilings(), "reached": self.tiles.reached, "work": work}
+        work, reached = self.setup.control.totals[WORK].copy(), self.tiles.reached_by(self.setup)
+        return {"tiling": self.tilings(), "reached": reached, "work": work}
 
     def give_tiles(self, k: int, first: int, end: int) -> dict[str, Any]:
         """Points of the k-th block in tiles with numbers from `first` to before `end`."""

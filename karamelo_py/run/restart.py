@@ -19,12 +19,16 @@ from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.run.memory import carried, memory_of, remember, remembered
-from karamelo_py.run.state import Stored
+from karamelo_py.run.state import Stored, reading
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 FORMAT, VERSION = "karamelo-py restart", 6
 OURS = "a file that restart or write_restart of karamelo-py has written"
+CONTENT = (
+    "within", "statements", "values of statements", "presets", "variables", "runs", "scene",
+    "values", "begun", "parts",
+)  # fmt: skip
 FLAT = {"track_times": False}
 
 
@@ -167,8 +171,8 @@ class Restart:
                         f"the {age.split()[1]} karamelo-py that wrote it",
                     )
                 self.content = json.loads(root["content"][()].tobytes())
-                _ = root["state"]
-        except (OSError, KeyError) as error:
+                _ = root["state"], *(self.content[name] for name in CONTENT)
+        except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
             why = "" if "signature" in str(error) else f": {error}"
             raise ScriptError(f"{what}{why}", argument="file", expected=OURS) from None
 
@@ -217,13 +221,13 @@ class Restart:
         simulation = hub.simulation
         try:
             simulation.take_stored(self.path)
+            with reading(), h5py.File(self.path, "r", locking=False) as root:
+                arrays = root.get("memory", ())
+                arrays = [arrays[str(k)][()] for k in range(len(arrays))]
+                good = "good" in root
         except ScriptError as error:
             error.message = f"{self.path}: {error.message}"
             raise
-        with h5py.File(self.path, "r", locking=False) as root:
-            arrays = root.get("memory", ())
-            arrays = [arrays[str(k)][()] for k in range(len(arrays))]
-            good = "good" in root
         for name, value in self.content["values"].items():
             if name in hub.values:
                 hub.values.set(name, value)

@@ -4,7 +4,7 @@ Each process has the points of tiles that lie beside each other. Nodes that seve
 by each of them, from the same boxes in the same order.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -314,6 +314,18 @@ class SharedTiles(Tiles):
                 found.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
         self._marked = np.concatenate(found)
         self.foreign[self._marked] = 1
+
+    def reached_by(self, s: Setup) -> tuple[np.ndarray, ...]:
+        """Of the nodes in use here what `spans_of_all` asks for."""
+        return (s.spans[1 : 1 + s.spans[0, 0]],) if self.direct else self.reached
+
+    def spans_of_all(self, reached: Iterable[tuple[np.ndarray, ...]]) -> np.ndarray:
+        """(k, 2) spans of the nodes in use, from what all processes reach.
+
+        Where points give straight to the nodes one process has them all.
+        """
+        found = [np.concatenate(of) for of in zip(*reached, strict=True)]
+        return found[0] if self.direct else self.spans_of(*found)
 
     def give(self, s: Setup, number: int, what: int) -> None:
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""

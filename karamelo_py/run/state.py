@@ -112,12 +112,27 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, Any]]:
     """The arrays in a file to go on from, by name; they are read when they are looked at."""
     import h5py
 
-    with h5py.File(path, "r", locking=False) as root:
+    with reading(), h5py.File(path, "r", locking=False) as root:
         found: dict[str, Any] = {}
-        root[group].visititems(
-            lambda name, item: found.update({name: item}) if hasattr(item, "shape") else None
-        )
+        try:
+            root[group].visititems(
+                lambda name, item: found.update({name: item}) if hasattr(item, "shape") else None
+            )
+        except (RuntimeError, KeyError, ValueError) as error:
+            raise OSError(str(error)) from error
         yield found
+
+
+@contextmanager
+def reading() -> Iterator[None]:
+    """Within this, what HDF5 cannot read is told of as a file that is damaged."""
+    try:
+        yield
+    except OSError as error:
+        raise ScriptError(
+            f"the file is damaged: {error}",
+            hint="an earlier file, or the script from its beginning, without a file",
+        ) from error
 
 
 def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
@@ -186,7 +201,8 @@ def go_back(simulation: Any, kept: Mapping[str, np.ndarray]) -> None:
     s.control.values[:] = kept["values"]
     for marks in remembered_at(simulation, np.array([[0, simulation.hub.fields.node_count]])):
         marks[marks != 0] = 0
-        marks[kept["touched/nodes"]] = kept["touched/rows"]
+        if "touched/nodes" in kept:  # a process that has no points has no nodes in use, either
+            marks[kept["touched/nodes"]] = kept["touched/rows"]
 
 
 def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:

@@ -34,8 +34,7 @@ def stored(ranks: Any) -> Iterator[Stored]:
     """The arrays of `state.arrays_by_name`, with the same bits, in the same order."""
     parts = ranks.together("tell_of_tiles")
     yield from _in_tiles(ranks, parts, ranks.control.clock, "give_tiles")
-    reached = zip(*(part["reached"] for part in parts), strict=True)
-    spans = ranks.tiles.spans_of(*map(np.concatenate, reached))
+    spans = ranks.part.tiles.spans_of_all(part["reached"] for part in parts)
     if memory := ranks.part.memory():
         yield from _nodes(ranks, spans, {"contact": memory[0]})
     yield from wholes(known(ranks))

@@ -1,0 +1,95 @@
+"""Files to go on from that something has ruined, and those of processes with few points."""
+
+import shutil
+from pathlib import Path
+
+import h5py
+import pytest
+from going_on import same_files
+from scenes import block
+from test_mpi import by_ranks, needs_mpi
+from test_ranks import HALVED, TOUCHING
+
+SCENE = block(1, "set_dt(0.001)", "restart(2, r.*.h5)", "run(4)")
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:3000])
+
+
+def overwritten(path: Path) -> None:
+    with h5py.File(path, "a") as root:
+        root["content"][5:50] = 0
+
+
+def spoilt(path: Path) -> None:
+    """Bytes in the description of an array: HDF5 itself finds that."""
+    with h5py.File(path) as root:
+        where = h5py.h5o.get_info(root["state/points/0/v"].id).addr
+    content = bytearray(path.read_bytes())
+    content[where : where + 40] = b"\xa5" * 40
+    path.write_bytes(content)
+
+
+def incomplete(path: Path) -> None:
+    with h5py.File(path, "a") as root:
+        del root["state/points/0/v"]
+
+
+def of_another(path: Path) -> None:
+    with h5py.File(path, "w") as root:
+        root["positions"] = [1.0]
+
+
+def older(path: Path) -> None:
+    with h5py.File(path, "a") as root:
+        root.attrs["version"] = 4
+
+
+@pytest.mark.parametrize(
+    ("ruin", "said"),
+    [
+        (cut, "r.2.h5 is no file that this program can go on from: "),
+        (overwritten, "r.2.h5 is no file that this program can go on from: "),
+        (of_another, "r.2.h5 is no file that this program can go on from\nexpected: a file that"),
+        (spoilt, "r.2.h5: the file is damaged: "),
+        (incomplete, "r.2.h5: its state is not one of this scene: v of points"),
+        (older, "r.2.h5 has format 4, of an older karamelo-py"),
+    ],
+)
+def test_a_file_that_is_ruined_is_told_and_nothing_is_lost(run_interpreted, ruin, said):
+    first = run_interpreted(SCENE)
+    ruin(first.folder / "r.2.h5")
+    log = (first.folder / "log.mpm").read_text(encoding="utf-8")
+    again = run_interpreted(SCENE, "-restart", "r.2.h5", status=1)
+    assert said in again.err and again.err.count("error: ") == 1
+    assert "internal" not in again.err
+    assert (again.folder / "log.mpm").read_text(encoding="utf-8") == log
+
+
+@needs_mpi
+@pytest.mark.parametrize("halved", [False, True])
+def test_few_points_that_one_of_two_processes_has(tmp_path, halved):
+    """Files of two are those of one, and two go on from them; lines and warnings come once."""
+    lines = HALVED if halved else ("set_dt(0.004)", "run(8)")
+    text = block(2, "restart(6, r.*.h5)", "region(no, block, 0.9, 1, 0.9, 1)",
+                 "group(no, particles, region, no, all)", *lines, 'print("behind")', "run(2)",
+                 scheme="usavg")  # fmt: skip
+    if halved:
+        for old, new in TOUCHING.items():
+            assert old in text
+            text = text.replace(old, new)
+        text = text.replace("run(60", "run(24")
+    path = tmp_path / "in.script"
+    path.write_text(text, encoding="utf-8")
+    one, two, again = (tmp_path / name for name in ("one", "two", "again"))
+    for folder, ranks in ((one, 1), (two, 2)):
+        status, _, err = by_ranks(folder, path, ranks)
+        assert status == 0, err
+    same_files(one, two)
+    shutil.copytree(two, again)
+    status, out, err = by_ranks(again, path, 2, "-restart", "r.6.h5")
+    assert status == 0, err
+    same_files(one, again)
+    assert out.count("behind") == 1 and "one has all points" in out
+    assert err.count("group 'no'") == 1
