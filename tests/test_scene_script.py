@@ -165,3 +165,20 @@ def test_help_shows_the_forms():
         "region(ID, block, xlo, xhi[, ylo, yhi[, zlo, zhi]][, exterior])"
     )
     assert syntax("region", "difference") == "region(ID, difference, first, second)"
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("dimension(2, 0, 1, 0, 2, 2.5)", True),
+        ("dimension(1, 0, 1, 1.01)", True),
+        ("create_domain(0, 1, 0, 2, 0, 1, 3)", True),
+        ("dimension(2, 0, 1, 0, 2, 2)", False),  # a column
+        ("dimension(2, 0, 0.1, 0, 2, 0.5)", False),
+        ("dimension(3, 0, 0.3, 0, 0.3, 0, 0.3, 0.1*3)", False),  # an element
+        ("method(tlmpm, FLIP, linear, 1)\ndimension(2, 0, 1, 0, 1, 2)", False),  # has no such grid
+    ],
+)
+def test_cells_larger_than_the_domain_are_told(line, told):
+    warnings = run(line).warnings
+    assert told == any("larger than the domain, whose longest side is" in one for one in warnings)

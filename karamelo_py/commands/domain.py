@@ -8,6 +8,8 @@ from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import Domain, require_domain
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.lattice import RELATIVE_TOLERANCE
+from karamelo_py.scene.solid import own_grids
 from karamelo_py.script.errors import ScriptError
 
 _BOUNDS = ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
@@ -257,4 +259,13 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
         error.argument, error.place = None, place_of(names, bounds, "h")
         raise
     domain.place = hub.place
+    sides = [b - a for a, b in zip(lo, hi, strict=True)]
+    # One cell along a side is a line, or a column; a domain of one cell is an element that deforms.
+    if h is not None and h > max(sides) * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
+        hub.warn(
+            f"cells of {h:g} are larger than the domain, whose longest side is {max(sides):g}: the "
+            "grid is one cell, and its nodes at the upper ends lie outside",
+            place=place_of(names, bounds, "h"),
+            hint="smaller cells, or the same unit of length for both",
+        )
     return domain
