@@ -64,6 +64,12 @@ def along(basis, kin, grid, place, direction):
 
 
 @point_function(otherwise=True)
+def affine_along(basis, grid, line, direction):
+    """N D^-1 (X_I - x) of each node of a line, where `along` leaves it to those who need it."""
+    return line.affine
+
+
+@point_function(otherwise=True)
 def spacing(basis, like):
     """Distance of neighbouring nodes, in cells."""
     return real(1, like)
@@ -138,12 +144,13 @@ def _written(kin: type, width: int) -> dict[Callable, Callable]:
     weights = [line.weights[k] for line, k in zip(lines, at, strict=True)]
     weight = prod(weights)
 
-    def with_one(of: str) -> list[Symbol]:
-        """For each direction the product of the weights, with `of` in the place of its own."""
-        others = [getattr(line, of)[k] for line, k in zip(lines, at, strict=True)]
+    def with_one(of: list[Symbol]) -> list[Symbol]:
+        """For each direction the product of the weights, with one of `of` in place of its own."""
+        others = [values[k] for values, k in zip(of, at, strict=True)]
         return [prod([*weights[:i], others[i], *weights[i + 1 :]]) for i in range(d)]
 
-    gradient = with_one("gradients")
+    gradient = with_one([line.gradients for line in lines])
+    affine = [call(affine_along, basis, grid, line, i) for i, line in enumerate(lines)]
     if axisymmetric:
         gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
     first = node_number(grid.first, [line.first for line in lines])
@@ -155,7 +162,7 @@ def _written(kin: type, width: int) -> dict[Callable, Callable]:
         support: define("basis, kin", f"return {width**d}"),
         entry: written(seen, (node, weight, gradient)),
         reach: written(seen, arms),
-        affine_weight: written(seen, with_one("affine")),
+        affine_weight: written(seen, with_one(affine)),
     }
 
 

@@ -4,7 +4,14 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, in_all, real, shared
 from karamelo_py.points.basis import first_node
-from karamelo_py.points.basis.product import Along, along, evenly, inverse_spread, register
+from karamelo_py.points.basis.product import (
+    Along,
+    affine_along,
+    along,
+    evenly,
+    inverse_spread,
+    register,
+)
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -40,11 +47,7 @@ def _(basis, kin, grid, place, direction):
     left, right = half - t, half + t
     weights = (half * left * left, real(0.75, a) - t * t, half * right * right)
     gradients = (-left * grid.inv_h, -(t + t) * grid.inv_h, right * grid.inv_h)
-    # D = h^2 / 4
-    r = real(1, a) + t
-    four = real(4, a) * grid.inv_h
-    affine = (-four * r * weights[0], -four * t * weights[1], four * (left + half) * weights[2])
-    line = Along(nearest - 1, r, weights, gradients, affine)
+    line = Along(nearest - 1, real(1, a) + t, weights, gradients, ())
     if in_all(bulk):
         return line
     return choose(bulk, line, _at_wall(grid, a, last))
@@ -64,8 +67,21 @@ def _at_wall(grid, a, last):
         choose(second, -grid.inv_h, grid.inv_h),
         choose(second, grid.inv_h, zero),
     )
-    # For hat functions, N D^-1 (X - x) is the gradient.
-    return Along(first, a - real(first, a), weights, gradients, gradients)
+    return Along(first, a - real(first, a), weights, gradients, ())
+
+
+@shared
+def _in_bulk(grid, line, direction):
+    """Whether these are the splines, and not the functions at a wall."""
+    return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
+
+
+@affine_along.on(QuadraticSpline)
+def _(basis, grid, line, direction):
+    # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
+    four, r = real(4, line.r) * grid.inv_h, line.r
+    affine = tuple([four * (real(k, r) - r) * weight for k, weight in enumerate(line.weights)])
+    return choose(_in_bulk(grid, line, direction), affine, line.gradients)
 
 
 @inverse_spread.on(QuadraticSpline)
@@ -75,10 +91,7 @@ def _(basis, grid):
 
 @evenly.on(QuadraticSpline)
 def _(basis, grid, stencil):
-    first, *rest = (
-        (cells_along(grid, d) > 1) & (line.r >= 0.5) & (line.r < 1.5)
-        for d, line in enumerate(stencil.lines)
-    )
+    first, *rest = (_in_bulk(grid, line, d) for d, line in enumerate(stencil.lines))
     for bulk in rest:
         first = first & bulk
     return first
