@@ -224,13 +224,13 @@ COMMANDS = [
 
 # As LAMMPS says it.
 LAMMPS = [
-    ("timestep 0.001", 10, "set_dt(dt)"),
+    ("timestep 0.001", 10, "set_dt(0.001)"),
     ("timestep(0.001)", 1, "set_dt(dt)"),
     ("timestep = 0.001", 1, "set_dt(dt)"),
     ("dt = 0.001", 1, "set_dt(dt)"),
-    ("unfix f", 7, "delete_fix(ID)"),
+    ("unfix f", 7, "delete_fix(f)"),
     ("undump(d)", 1, "delete_dump(ID)"),
-    ("thermo 100", 8, "set_output(N)"),
+    ("thermo 100", 8, "set_output(100)"),
     ("thermo_style custom step pe", 14, "log_modify(custom, "),
     ("velocity(all, set, 1, 0)", 1, "initial_velocity_particles"),
     ("variable a equal 3", 10, "name = expression"),

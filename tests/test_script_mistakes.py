@@ -108,7 +108,7 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
     ("line", "hint"),
     [
         ("fix 1 all nve", "leave it out: points move without a fix"),
-        ("fix 1 all body_force 0 -9.81", "fix(1, body_force, all, 0, -9.81)"),
+        ("fix 1 all body_force 0 -9.81", "fix(n1, body_force, all, 0, -9.81)"),
         ("compute Ek all ke", "compute(Ek, kinetic_energy, all)"),
         ("units lj", "units(m, kg, s)"),
         ("write_data end.dat", "write_restart(file)"),

@@ -31,13 +31,15 @@ from numba.core.serialize import dumps
 from karamelo_py.compiler import held, inlining
 from karamelo_py.compiler.choices import WHOLE, Choice, Unknown, contents, keep_choices, name_of
 from karamelo_py.compiler.fingerprint import describe, fingerprint
+from karamelo_py.compiler.turns import Turns, giving
 
 VARIANTS = 4  # of a kernel for the same types: as many states of the sources are kept
 ROOM = 400e6  # bytes; of what takes more, the files that were used least recently are forgotten
 
-_ENDING = ".kernel"
+_ENDING, _LOCK = ".kernel", ".lock"
 _OURS = re.compile(r"[\w.]+-[0-9a-f]{24}-[0-9a-f]{24}\.kernel")
 _TIMES = "times.json"
+_turns = Turns()
 
 
 def folder() -> Path:
@@ -110,6 +112,18 @@ class KernelCache(_Cache):
             arguments, key = self._key(sig, target_context.codegen())
         except Unknown:
             return None
+        found = self._found(arguments, key, target_context)
+        if found is None:
+            lock = folder() / f"{key}{_LOCK}"
+            _turns.take(lock)
+            # Another process may have compiled it since the first look.
+            found = self._found(arguments, key, target_context)
+            if found is not None:
+                _turns.give(lock)
+        return found
+
+    def _found(self, arguments: tuple, key: str, target_context: Any) -> CompileResult | None:
+        """The kernel in a file."""
         for path in self._files(key):
             choices, data = _read(path)
             if choices is None or self._stamp(arguments, choices) != path.stem.rpartition("-")[2]:
@@ -127,15 +141,22 @@ class KernelCache(_Cache):
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
         """Keep a kernel that was compiled just now, if that can be done."""
+        try:
+            arguments, key = self._key(sig, data.codegen)
+        except Unknown as what:
+            self._tell_of_unknown(what)
+            return
+        with giving(_turns, folder() / f"{key}{_LOCK}"):
+            self._save(arguments, key, data)
+
+    def _save(self, arguments: tuple, key: str, data: CompileResult) -> None:
         if data.library.has_dynamic_globals or data.lifted:
             return
         try:
-            arguments, key = self._key(sig, data.codegen)
             choices, codes = contents(data.library)
             stamp = fingerprint([self._function, self._options], arguments, choices, codes)
         except Unknown as what:
-            # Never without a word: somebody would wait for it in every run.
-            _say(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
+            self._tell_of_unknown(what)
             return
         content = dumps((tuple(sorted(choices)), dumps(data._reduce())))
         try:
@@ -144,6 +165,10 @@ class KernelCache(_Cache):
             self._forget(key)
         except OSError as error:
             _trouble(error)
+
+    def _tell_of_unknown(self, what: Unknown) -> None:
+        # Never without a word: somebody would wait for it in every run.
+        _say(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
 
     def enable(self) -> None:
         """It always is."""

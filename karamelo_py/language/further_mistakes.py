@@ -18,6 +18,7 @@ from karamelo_py.script.other_programs import instead
 from karamelo_py.script.syntax import Assignment, Call, Statement
 
 MOST = 9
+MOST_OF_TEXT = 24  # a script of another program is wrong in every line
 # Nearly everything depends on these.
 _BASIS = frozenset({"method", "dimension", "create_domain", "axisymmetric", "include", "quit"})
 # What these define is needed by a run, others by what names them only.
@@ -143,7 +144,7 @@ def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     What is wrong in its text, and names of commands and styles that are not known.
     """
     found = [*first.others, *misnamed(interpreter, first.statements)]
-    return sorted(found, key=_order)[:MOST]
+    return sorted(found, key=_order)[:MOST_OF_TEXT]
 
 
 def misnamed(interpreter: Any, statements: Iterable[Statement]) -> list[ScriptError]:

@@ -11,6 +11,7 @@ import numpy as np
 from numba.core import event
 
 from karamelo_py.compiler import cache
+from karamelo_py.compiler.turns import WAITS
 from karamelo_py.output.console import duration
 from karamelo_py.scene.hub import Hub
 
@@ -71,6 +72,7 @@ class Spent(event.Listener):
         try:
             with (
                 event.install_listener("numba:compile", self),
+                event.install_listener(WAITS, self),
                 cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER)),
             ):
                 yield
@@ -81,7 +83,7 @@ class Spent(event.Listener):
                 cache.keep_time(scene, spent)
 
     def on_start(self, _: Any) -> None:
-        """Numba compiles a function."""
+        """Numba compiles a function, or another process does, and this one waits for it."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()

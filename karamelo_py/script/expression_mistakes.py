@@ -7,6 +7,7 @@ what the user did follows from these.
 import re
 from typing import Any, NamedTuple
 
+from karamelo_py.script.lammps import line_of, with_name
 from karamelo_py.script.mistakes import CLOSES_NOTHING, Mistake, open_parenthesis, open_quote
 from karamelo_py.script.other_programs import OTHERWISE, instead
 
@@ -264,6 +265,8 @@ def _block_or_call(name: str, words: list[str]) -> str:
     """What to write instead of ``name word word``."""
     if name in BLOCKS:
         return NO_BLOCKS
+    if own := line_of(name, words):
+        return own
     if other := OTHERWISE.get(name) or instead("command", name):
         return other
     if name in ("fix", "compute") and len(words) > 2:
@@ -275,6 +278,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
             words[1:3] = style or words[2], words[1]
     if name == "group" and words[1:2] == ["region"] and len(words) == 3:  # as in LAMMPS
         words = [words[0], "particles", *words[1:], "all"]
+    words = with_name(name, words)
     if all(re.fullmatch(r"[\w.*/+-]+|\"[^\"]*\"", word) for word in words):
         return f"arguments go in parentheses: {name}({', '.join(words)})"
     return f"arguments go in parentheses: {name}(...)"

@@ -31,6 +31,8 @@ class Recovering(NamedTuple):
     shows the hardening.
     """
 
+    in_lanes = True
+
     G: Annotated[float, Positive]
     A: Annotated[float, Positive]
     H: Annotated[float, NonNegative]
