@@ -90,7 +90,8 @@ def small(monkeypatch):
     def set_to(free: float) -> None:
         for module in ("run.room", "scene.room", "run.report"):
             monkeypatch.setattr(f"karamelo_py.{module}.free_bytes", lambda *_: free)
-        monkeypatch.setattr("karamelo_py.run.room.FEW", 0)
+        for module in ("run.room", "scene.placement"):
+            monkeypatch.setattr(f"karamelo_py.{module}.FEW", 0)
 
     return set_to
 

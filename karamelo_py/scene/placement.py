@@ -3,6 +3,7 @@
 import itertools
 import math
 from bisect import bisect_right
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
 
 MAX_POINTS = 2**31 - 1
+FEW = 1_000_000  # points that memory has room for everywhere, whatever their fields
 # Beyond this many candidates the points outside the domain are no longer counted, only mentioned.
 _MAX_COUNTED = 20_000_000
 
@@ -214,7 +216,7 @@ def fill(
     lattice: Lattice,
     ppc: int,
     rule: str | None = None,
-    room: float = math.inf,
+    room: Callable[[], float] = lambda: math.inf,
 ) -> Placement:
     """The points of `lattice` that fill `region` within the domain.
 
@@ -224,7 +226,8 @@ def fill(
     Raises
     ------
     ScriptError
-        When there would be more points than can be numbered, or than memory has `room` for.
+        When there would be more points than can be numbered, or than memory has `room` for, which
+        is asked where there may be many.
     """
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
@@ -267,6 +270,7 @@ def fill(
     numbers: list[np.ndarray] = []  # which point of the pattern each one is
     left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
+    most = room() if inner > FEW else math.inf
     for k, (begin, _) in enumerate(x0.chunks):
         x = x0.candidates(k)
         if rule == "cut":
@@ -281,9 +285,9 @@ def fill(
             continue
         kept &= in_domain
         x0.keep(kept)
-        if len(x0) > room:
+        if len(x0) > most:
             raise ScriptError(
-                f"the scene has more than {room:.3g} points, and this machine has no memory for "
+                f"the scene has more than {most:.3g} points, and this machine has no memory for "
                 "so many",
                 hint="larger cells, or fewer points per cell",
             )

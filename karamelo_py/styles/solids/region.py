@@ -1,5 +1,6 @@
 """Solid style region."""
 
+from functools import partial
 from typing import Annotated, Literal
 
 from karamelo_py.language.signature import AtLeast, Positive
@@ -97,7 +98,7 @@ class RegionSolid(Solid):
                 argument="points",
                 hint="points=regular, a solid from a mesh, or another basis",
             )
-        room = room_for(hub, self.first_id, domain.dimension)
+        room = partial(room_for, hub, self.first_id, domain.dimension)
         placement = fill(region, domain, lattice, ppc, points, room)
         self.put(hub, placement, may_be_empty=region.unknown)
         if placement.missed:
