@@ -20,7 +20,7 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 WAITS = "karamelo_py:waits"  # an event of Numba's: to the user it is as if it compiled
-PATIENCE = 120.0  # seconds; a process that holds a lock may have been stopped
+PATIENCE = 120.0  # seconds; who holds a lock so long has been stopped, perhaps with others
 PAUSE = 0.02  # seconds between two looks
 
 
@@ -32,6 +32,7 @@ class Turns(event.Listener):
 
     def __init__(self) -> None:
         self._held: dict[Path, int] = {}
+        self._waits = True  # until that was in vain
         event.register("numba:compile", self)
 
     def on_start(self, _: event.Event) -> None:
@@ -55,9 +56,9 @@ class Turns(event.Listener):
         locked = False
         try:
             locked = _locked(file)
-            if not locked:
+            if not locked and self._waits:
                 with event.trigger_event(WAITS):
-                    locked = _locked_in_time(file)
+                    self._waits = locked = _locked_in_time(file)
         except OSError:  # a file system without locks
             return
         finally:
