@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tensors import ALL_KINEMATICS, numbers, tensors
 
@@ -60,6 +60,8 @@ of_any_data = pytest.mark.parametrize(
         for basis, kin in product([Linear(), QuadraticSpline(), CubicSpline()], ALL_KINEMATICS)
     ],
 )  # fmt: skip
+# What holds for each transfer with each basis needs few examples of each.
+few = settings(max_examples=12)
 everywhere = st.one_of(st.sampled_from([0.0, 1.0, 0.5]), st.floats(0, 1))
 # Where D does not vanish: affine fields are then taken exactly.
 inner = st.floats(0.01, 0.99)
@@ -148,6 +150,7 @@ def test_definitions():
 
 @over("transfer", [*PLAIN, *AFFINE, *TAYLOR], str)
 @of_any_data
+@few
 @given(data=st.data())
 def test_linear_momentum_is_given_whole(transfer, basis, kin, data):
     """sum_I p_I = m v, whatever the point keeps beside its velocity."""
@@ -161,6 +164,7 @@ def test_linear_momentum_is_given_whole(transfer, basis, kin, data):
 
 @over("transfer", AFFINE, str)
 @of_any_data
+@few
 @given(data=st.data())
 def test_affine_transfers_give_their_angular_momentum_whole(transfer, basis, kin, data):
     """sum_I (X_I - x) p_I^T = m B^T: the moment arrives at the nodes (Jiang et al. 2017)."""
@@ -174,6 +178,7 @@ def test_affine_transfers_give_their_angular_momentum_whole(transfer, basis, kin
 
 @over("transfer", [*AFFINE, *TAYLOR], str)
 @of_any_data
+@few
 @given(data=st.data())
 def test_an_affine_field_is_taken_and_given_as_it_is(transfer, basis, kin, data):
     """The nodal field v + C (X - x) comes back from the point exactly: mass times weight times it.
@@ -194,6 +199,7 @@ def test_an_affine_field_is_taken_and_given_as_it_is(transfer, basis, kin, data)
 
 @over("transfer", [*AFFINE, *TAYLOR], str)
 @of_any_data
+@few
 @given(data=st.data())
 def test_what_is_said_of_all_nodes_at_once(transfer, basis, kin, data):
     """v + C (X - x) with `affine_velocity`'s C is what nodes get; the moment is that of arms."""
