@@ -102,7 +102,9 @@ def together(size: int, act: Callable[[Crew], Any]) -> list:
             errors.append(error)
             barrier.abort()
 
-    threads = [threading.Thread(target=run, args=(rank,)) for rank in range(size)]
+    threads = [
+        threading.Thread(target=run, args=(rank,), name=f"rank {rank}") for rank in range(size)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:

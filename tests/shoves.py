@@ -1,5 +1,7 @@
 """Functions for fix python that remember nothing."""
 
+import threading
+
 import numpy as np
 
 
@@ -42,3 +44,26 @@ def warm(view):
 def carry(points):
     """Points go a bit further at the start of each step, by themselves, some beyond their tile."""
     points.position[:, 0] += 0.02 * (1 + np.sin(9 * points.position[:, 1]))
+
+
+def _is_second():
+    return threading.current_thread().name == "rank 1"  # see crews.py
+
+
+def is_silent(points):
+    """What one process answers, and another does not."""
+    return None if _is_second() else 1
+
+
+def differs(points):
+    """What is another number on each process."""
+    return 0.1 + _is_second()
+
+
+def asks(points):
+    """What asks for a total on one process."""
+    return points.total(points.mass) if _is_second() else 1.0
+
+
+for function in (asks, is_silent, differs):
+    function.point_by_point = True

@@ -402,6 +402,21 @@ def test_python_at_every_moment(state_interpreted, tmp_path, script):
     assert shared(state_interpreted, tmp_path, with_files(scripts[script]), ranks=3)
 
 
+@pytest.mark.parametrize(
+    "function, says",
+    [
+        ("is_silent", "is_silent returns 1.0 on one process and None on another"),
+        ("asks", "comes to its end on one process, and to a total on another"),
+        ("differs", "differs returns 0.1 on one process and 1.1 on another"),
+    ],
+)
+def test_a_function_answers_otherwise_on_one_process(state_interpreted, function, says):
+    lines = f"fix(f, python, all, shoves.{function}, final_integrate)", "set_output(1)", "run(9)"
+    script = block(2, MOVING[0], *lines, size=(0.2, 0.2))
+    assert says in state_interpreted(script, boxes=True, ranks=2, fails=True)
+    assert state_interpreted(script, boxes=True)["time"][1] == 9  # alone it is well
+
+
 @pytest.mark.parametrize("beside", [(), ("fix(p, python, all, shoves.push)",)])
 def test_points_that_touch(state_interpreted, tmp_path, beside):
     """The pairs lie on several processes; also where all points are at one already."""
