@@ -4,16 +4,18 @@ import os
 import re
 import subprocess
 import sys
+import tracemalloc
 from contextlib import suppress
 from math import inf
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from conftest import INPUTS, ROOT
 
 from karamelo_py.app.cli import main
 from karamelo_py.compiler.choices import contents
-from karamelo_py.compiler.fields import name_of
+from karamelo_py.compiler.fields import name_of, rows_of_points, some_points
 from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
@@ -476,3 +478,17 @@ def test_check_prints_what_could_be_left_out(tmp_path, monkeypatch, capsys):
     )  # fmt: skip
     part = done.stdout[done.stdout.index("could be left out") :]
     assert "set_dt(0.0001): " in part and "instead: leave set_dt out, or set_dt(" in part
+
+
+def test_to_look_at_some_points_copies_no_others():
+    """Dumps look at so many points at a time: of many points they would take ever longer."""
+    array = rows_of_points((3, 200_000), np.float64)
+    array[...] = np.arange(200_000)
+    points = np.array([7, 3, 199_999])
+    some_points(array, points)
+    tracemalloc.start()
+    found = some_points(array, points)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found.tolist() == [points.tolist()] * 3 and found.flags.c_contiguous
+    assert most < array.nbytes / 100

@@ -153,6 +153,14 @@ def as_rows_of_points(array: np.ndarray) -> np.ndarray:
     return found
 
 
+def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The numbers (..., k) of some points, from those of all (..., n).
+
+    Of arrays with gaps between their rows ``np.take`` makes a copy first, of all points.
+    """
+    return np.ascontiguousarray(array[..., points])
+
+
 def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     """The field of `count` points, (components, count), as it starts."""
     array = rows_of_points((kind.shape(kin), count), real)

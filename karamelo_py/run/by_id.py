@@ -337,7 +337,7 @@ class Some(ById):
         return self._stepped._replace(blocks=(block._replace(points=points),))
 
     def _taken(self, array: np.ndarray) -> np.ndarray:
-        return np.take(array, self._rows, axis=-1).T
+        return fields.some_points(array, self._rows).T
 
     @property
     def x(self) -> np.ndarray:

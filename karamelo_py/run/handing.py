@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from karamelo_py.compiler.fields import some_points
 from karamelo_py.kernels.arrays import Block, Setup, Tiling, arrays_of
 from karamelo_py.run.boxes import between
 from karamelo_py.run.shares import occupied
@@ -22,8 +23,7 @@ def share_of_block(k: int, block: Block, own: np.ndarray) -> dict[str, np.ndarra
     """The points and tiles of the k-th block in tiles of which `own` says so, by name."""
     points, found = share_of_tiling(k, block.tiling, own)
     return found | {
-        f"points/{k}/{name}": np.take(array, points, axis=-1)
-        for name, array in arrays_of(block.points)
+        f"points/{k}/{name}": some_points(array, points) for name, array in arrays_of(block.points)
     }
 
 

@@ -398,5 +398,6 @@ def resumed(block: Block, previous: State) -> Block:
 def chosen(block: Block, rows: np.ndarray) -> Block:
     """The block with the points in these rows, in this order; they are to be sorted anew."""
     points = block.points
-    found = (fields.as_rows_of_points(np.take(a, rows, axis=-1)) for _, a in arrays_of(points))
+    arrays = (fields.some_points(array, rows) for _, array in arrays_of(points))
+    found = map(fields.as_rows_of_points, arrays)
     return block._replace(points=made_of(points, found))
