@@ -12,13 +12,13 @@ from typing import Any
 
 from karamelo_py.language import registry
 from karamelo_py.language.unknown import unknown_call
-from karamelo_py.script.errors import Quit, ScriptError, nearest
+from karamelo_py.script.errors import Quit, ScriptError, nearest, plural
 from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.other_programs import instead
 from karamelo_py.script.syntax import Assignment, Call, Statement
 
 MOST = 9
-MOST_OF_TEXT = 24  # a script of another program is wrong in every line
+MOST_OF_TEXT = 200  # a script of another program is wrong in every line
 # Nearly everything depends on these.
 _BASIS = frozenset({"method", "dimension", "create_domain", "axisymmetric", "include", "quit"})
 # What these define is needed by a run, others by what names them only.
@@ -141,10 +141,13 @@ def _given_twice(message: str) -> tuple[str, bool]:
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     """Mistakes in a script whose text is wrong somewhere, behind the first of them.
 
-    What is wrong in its text, and names of commands and styles that are not known.
+    What is wrong in its text, and names of commands and styles that are not known. Where there are
+    too many to be read, the last one says how many there are besides.
     """
-    found = [*first.others, *misnamed(interpreter, first.statements)]
-    return sorted(found, key=_order)[:MOST_OF_TEXT]
+    found = sorted([*first.others, *misnamed(interpreter, first.statements)], key=_order)
+    more = len(found) - MOST_OF_TEXT
+    besides = [ScriptError(f"and {plural(more, 'more mistake')} behind these")] if more > 0 else []
+    return [*found[:MOST_OF_TEXT], *besides]
 
 
 def misnamed(interpreter: Any, statements: Iterable[Statement]) -> list[ScriptError]:
