@@ -116,11 +116,15 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
 
 
 def _put(group: Any, found: Iterator[Stored]) -> None:
+    begun: dict[str, Any] = {}
     for name, shape, where, array in found:
-        if name not in group:
-            group.create_dataset(name, shape, array.dtype, **FLAT)
+        if array.shape == shape and array.size and name not in begun:
+            group.create_dataset(name, data=array, **FLAT)  # in half the time
+            continue
+        if name not in begun:
+            begun[name] = group.create_dataset(name, shape, array.dtype, **FLAT)
         if array.size:
-            group[name][where] = array
+            begun[name][where] = array
 
 
 def is_restart(path: Path) -> bool:
