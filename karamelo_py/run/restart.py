@@ -134,7 +134,7 @@ def is_restart(path: Path) -> bool:
     try:
         with h5py.File(path, "r", locking=False) as root:
             return root.attrs.get("format") == FORMAT
-    except OSError:
+    except (OSError, KeyError, TypeError):  # what HDF5 says of one that is damaged
         return False
 
 
@@ -176,7 +176,7 @@ class Restart:
                     )
                 self.content = json.loads(root["content"][()].tobytes())
                 _ = root["state"], *(self.content[name] for name in CONTENT)
-        except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+        except (OSError, KeyError, ValueError, TypeError) as error:
             why = "" if "signature" in str(error) else f": {error}"
             raise ScriptError(f"{what}{why}", argument="file", expected=OURS) from None
 

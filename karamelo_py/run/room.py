@@ -1,7 +1,9 @@
-"""Scenes that do not fit into memory are refused before their arrays are made.
+"""Scenes that no memory of the machine holds are refused before their arrays are made.
 
 What is compared is the least that a run has to hold: of what would run nothing is refused.
 """
+
+import gc
 
 import numpy as np
 
@@ -9,7 +11,7 @@ from karamelo_py.kernels.arrays import SUMS_WIDTH, UPDATE_WIDTH, VELOCITY_WIDTH,
 from karamelo_py.run.lowering import PRECISIONS, check_scene, lower_points, part_of, point_kinds
 from karamelo_py.run.sizes import point_fields
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.room import free_bytes, share_of_machine, too_large
+from karamelo_py.scene.room import TooLarge, machine_memory, on_machine, share_of_machine
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
 
@@ -17,7 +19,7 @@ FEW = 100_000  # points; so many have room everywhere
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
-    """Refuse a scene that needs more memory than this machine has free.
+    """Refuse a scene that needs more memory than this machine has, and warn of what is not free.
 
     Parameters
     ----------
@@ -32,22 +34,28 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         At the line of the largest solid.
     """
     count = sum(solid.count for solid in hub.solids.values())
-    if count <= FEW or (free := free_bytes()) is None:
+    if count <= FEW or (there := machine_memory(on_machine(hub))) is None:
         return
     check_scene(hub)
     crew, share = hub.settings.crew, share_of_machine(hub)
-    beside = f" for {crew.on_machine} of {crew.size} processes" if share < 1 else ""
     need = share * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
-    if need <= free:
+    if need > there.free:
+        # Scenes of before, which point to themselves, stay until someone looks.
+        gc.collect()
+        there = machine_memory(on_machine(hub)) or there
+    if need <= there.free:
         return
-    single = 0.0
-    if hub.settings.precision == "double":
-        single = share * least_bytes(hub, np.float32, copied)
-    largest = max(hub.solids.values(), key=lambda solid: solid.count)
-    raise too_large(
-        plural(count, "point"), need, free, hub.domain.dimension, place=largest.place,
-        beside=beside, single=single,
-    )  # fmt: skip
+    found = TooLarge(
+        plural(count, "point"),
+        need,
+        hub.domain.dimension,
+        max(hub.solids.values(), key=lambda solid: solid.count).place,
+        f" for {crew.on_machine} of {crew.size} processes" if share < 1 else "",
+        share * least_bytes(hub, np.float32, copied) if hub.settings.precision == "double" else 0.0,
+    )
+    if need > there.whole:
+        raise found.error(there)
+    hub.warn(found.warning(there), place=found.place, hint=found.ways(there.free))
 
 
 def least_bytes(hub: Hub, real: type, copied: bool) -> float:

@@ -1,7 +1,7 @@
 """All arrays of a simulation that a step changes, by name: to return to, to write, to read."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -107,25 +107,51 @@ def wholes(arrays: Mapping[str, np.ndarray]) -> Iterator[Stored]:
         yield name, array.shape, ..., array
 
 
+class InFile:
+    """An array in a file: read when it is looked at, which a file that is damaged may not allow."""
+
+    def __init__(self, data: Any):
+        self._data = data
+        self.shape, self.dtype, self.size = data.shape, data.dtype, data.size
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, where: Any) -> Any:
+        with reading():
+            return self._data[where]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        # At once, where NumPy would ask for one number after the other.
+        return np.asarray(self[()], dtype)
+
+
 @contextmanager
-def opened(path: Path, group: str = "state") -> Iterator[dict[str, Any]]:
+def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
     """The arrays in a file to go on from, by name; they are read when they are looked at."""
     import h5py
 
-    with reading(), h5py.File(path, "r", locking=False) as root:
-        found: dict[str, Any] = {}
-        try:
-            root[group].visititems(
-                lambda name, item: found.update({name: item}) if hasattr(item, "shape") else None
-            )
-        except (RuntimeError, KeyError, ValueError) as error:
-            raise OSError(str(error)) from error
+    with ExitStack() as until_end:
+        found: dict[str, InFile] = {}
+        with reading():
+            root = until_end.enter_context(h5py.File(path, "r", locking=False))
+            try:
+                root[group].visititems(
+                    lambda name, item: (
+                        found.update({name: InFile(item)}) if hasattr(item, "shape") else None
+                    )
+                )
+            except (RuntimeError, KeyError, ValueError) as error:
+                raise OSError(str(error)) from error
         yield found
 
 
 @contextmanager
 def reading() -> Iterator[None]:
-    """Within this, what HDF5 cannot read is told of as a file that is damaged."""
+    """Within this, what HDF5 cannot read is told of as a file that is damaged.
+
+    Only what reads belongs there: what else fails for the system is not the fault of the file.
+    """
     try:
         yield
     except OSError as error:
@@ -267,7 +293,7 @@ def _checked(found: Mapping[str, np.ndarray], name: str, like: np.ndarray) -> np
     there = found.get(name)
     if there is None or there.shape != like.shape or there.dtype != like.dtype:
         raise _misfit(name)
-    return there
+    return there[()]
 
 
 def _misfit(what: str) -> ScriptError:

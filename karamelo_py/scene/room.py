@@ -1,7 +1,9 @@
-"""How much memory this machine has free, and what is said where a scene needs more."""
+"""How much memory this machine has, and what is said where a scene needs more."""
 
 from math import ceil, inf
+from mmap import PAGESIZE
 from pathlib import Path
+from typing import NamedTuple
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import Place, ScriptError
@@ -11,62 +13,106 @@ SLACK = 0.03
 GIB = 2**30
 
 
-def free_bytes(root: Path = Path("/")) -> float | None:
-    """Memory that can be had at most: free, or held by caches and swap; None where no one tells.
+class MachineMemory(NamedTuple):
+    """Bytes that a machine, or a job on it, has yet, and has in all; swap is among them.
+
+    More than `free` may be had where the system does not tell of all that it can give back (caches
+    of ZFS); more than `whole` may not.
+    """
+
+    free: float
+    whole: float
+
+
+def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
+    """What can be had at most: free, or held by caches and swap; None where no one tells.
 
     The machine's (Linux), or less where the processes of a container or of a batch job have a limit
-    (cgroup, of either version). `root` is for tests.
+    (cgroup, of either version), or each of its own (ulimit -v).
+
+    Parameters
+    ----------
+    processes
+        How many share the scene on this machine: so many limits of a process are there.
+    root
+        For tests.
     """
     machine = _numbers(root / "proc/meminfo", 1024)
     try:
-        swap = machine["SwapFree:"]
-        found = [machine["MemAvailable:"] + swap + SLACK * machine["MemTotal:"]]
-        groups = (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines()
+        total = machine["MemTotal:"]
+        swap = MachineMemory(machine["SwapFree:"], machine["SwapTotal:"])
+        left = machine["MemAvailable:"] + swap.free + SLACK * total
     except KeyError:
         return None
-    except OSError:
-        groups = []
-    for line in groups:
+    found = [MachineMemory(left, total + swap.whole), *_of_process(root / "proc/self", processes)]
+    for line in _lines(root / "proc/self/cgroup"):
         _, controllers, path = line.split(":", 2)
         if controllers == "":
-            top, left = root / "sys/fs/cgroup", _left_of_second
+            top, limits = root / "sys/fs/cgroup", _of_second
         elif "memory" in controllers.split(","):
-            top, left = root / "sys/fs/cgroup/memory", _left_of_first
+            top, limits = root / "sys/fs/cgroup/memory", _of_first
         else:
             continue
         # In a container the path may be that outside; its own limit stands at the top then.
         inner = top / path.strip("/")
         for folder in (inner, *inner.parents):
-            found += left(folder, swap)
+            found += limits(folder, swap)
             if folder == top:
                 break
-    return min(found)
+    return MachineMemory(*map(min, zip(*found, strict=True)))
 
 
-def _left_of_second(folder: Path, swap: float) -> list[float]:
-    """What a group of version 2 may have yet."""
+def free_bytes() -> float | None:
+    """What is free, see `machine_memory`."""
+    found = machine_memory()
+    return None if found is None else found.free
+
+
+def _of_process(folder: Path, processes: int) -> list[MachineMemory]:
+    """What so many processes with the limit of this one may have: of addresses, used or not."""
+    for line in _lines(folder / "limits"):
+        if line.startswith("Max address space") and line.split()[3] != "unlimited":
+            limit = float(line.split()[3])
+            pages = [float(word) for text in _lines(folder / "statm") for word in text.split()[:1]]
+            left = limit - PAGESIZE * sum(pages) + SLACK * limit
+            return [MachineMemory(processes * left, processes * limit)]
+    return []
+
+
+def _of_second(folder: Path, swap: MachineMemory) -> list[MachineMemory]:
+    """What a group of version 2 may have."""
     limit, used = (_number(folder / f"memory.{name}") for name in ("max", "current"))
     if limit is None or used is None:
         return []
     stat = _numbers(folder / "memory.stat", 1)
     kept = ("active_file", "inactive_file", "slab_reclaimable")
     most, out = (_number(folder / f"memory.swap.{name}") for name in ("max", "current"))
-    swap = swap if most is None or out is None else min(swap, most - out)
-    return [limit - used + sum(stat.get(name, 0) for name in kept) + swap + SLACK * limit]
+    if most is not None and out is not None:
+        swap = MachineMemory(min(swap.free, most - out), min(swap.whole, most))
+    left = limit - used + sum(stat.get(name, 0) for name in kept) + swap.free + SLACK * limit
+    return [MachineMemory(left, limit + swap.whole)]
 
 
-def _left_of_first(folder: Path, swap: float) -> list[float]:
-    """What a group of version 1 may have yet."""
+def _of_first(folder: Path, swap: MachineMemory) -> list[MachineMemory]:
+    """What a group of version 1 may have."""
     limit, used = (_number(folder / f"memory.{n}_in_bytes") for n in ("limit", "usage"))
     if limit is None or used is None:
         return []
     stat = _numbers(folder / "memory.stat", 1)
     cached = sum(stat.get(f"total_{name}_file", 0) for name in ("active", "inactive"))
-    found = [limit - used + cached + swap + SLACK * limit]
+    found = [MachineMemory(limit - used + cached + swap.free + SLACK * limit, limit + swap.whole)]
     limit, used = (_number(folder / f"memory.memsw.{n}_in_bytes") for n in ("limit", "usage"))
     if limit is not None and used is not None:
-        found.append(limit - used + cached + SLACK * limit)
+        found.append(MachineMemory(limit - used + cached + SLACK * limit, limit))
     return found
+
+
+def _lines(path: Path) -> list[str]:
+    """The lines of a file; none where there is no file."""
+    try:
+        return path.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
 
 
 def _number(path: Path) -> float | None:
@@ -80,16 +126,20 @@ def _number(path: Path) -> float | None:
 def _numbers(path: Path, unit: int) -> dict[str, float]:
     """A number in each line of a file, by the word before it."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-        return {word: float(number) * unit for word, number, *_ in map(str.split, lines)}
-    except (OSError, ValueError):
+        return {word: float(number) * unit for word, number, *_ in map(str.split, _lines(path))}
+    except ValueError:
         return {}
+
+
+def on_machine(hub: Scene) -> int:
+    """How many processes share the scene on this machine."""
+    return 1 if hub.settings.crew is None else hub.settings.crew.on_machine
 
 
 def share_of_machine(hub: Scene) -> float:
     """Which part of a scene is on this machine, where several share it."""
     crew = hub.settings.crew
-    return 1.0 if crew is None else crew.on_machine / crew.size
+    return 1.0 if crew is None else on_machine(hub) / crew.size
 
 
 def room_for(hub: Scene, already: int, dimension: int) -> float:
@@ -98,7 +148,9 @@ def room_for(hub: Scene, already: int, dimension: int) -> float:
     Two places, a velocity and a mass in single precision, and three numbers that are whole.
     """
     of_one = 4 * (3 * dimension + 1) + 16
-    return max((free_bytes() or inf) / share_of_machine(hub) / of_one - already, 0.0)
+    found = machine_memory(on_machine(hub))
+    whole = inf if found is None else found.whole
+    return max(whole / share_of_machine(hub) / of_one - already, 0.0)
 
 
 def in_words(count: float) -> str:
@@ -107,18 +159,15 @@ def in_words(count: float) -> str:
     return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
 
 
-def too_large(
-    what: str, need: float, free: float, dimension: int, *, place: Place | None,
-    beside: str = "", single: float = 0.0,
-) -> ScriptError:  # fmt: skip
-    """The error for a scene with `what`, which needs more bytes than there are.
+class TooLarge(NamedTuple):
+    """A scene that needs more than is there.
 
-    Parameters
+    Attributes
     ----------
     what
         What it has, such as ``400000000 points``.
-    need, free
-        Bytes.
+    need
+        Bytes, at least.
     dimension
         Of the scene: bytes go with that power of the number of cells along a side.
     place
@@ -128,17 +177,40 @@ def too_large(
     single
         What single precision would need; 0 where nobody asks.
     """
-    # Two digits, rounded up.
-    larger = ceil(10 * (need / free) ** (1 / dimension)) / 10
-    ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
-    if 0 < single < free:
-        ways.append(f"precision(single), which needs at least {in_words(single)}")
-    ways.append("processes on several machines (mpiexec), which share the points out")
-    error = ScriptError(
-        f"the scene has {what}, which take at least {in_words(need)} of memory{beside}; "
-        f"this machine has {in_words(free)} free",
-        place=place,
-        hint="; ".join(ways),
-    )
-    error.command = "solid"
-    return error
+
+    what: str
+    need: float
+    dimension: int
+    place: Place | None
+    beside: str = ""
+    single: float = 0.0
+
+    @property
+    def words(self) -> str:
+        """What it needs."""
+        need = in_words(self.need)
+        return f"the scene has {self.what}, which take at least {need} of memory{self.beside}"
+
+    def ways(self, there: float) -> str:
+        """What would bring it down to what is `there`."""
+        # Two digits, rounded up.
+        larger = ceil(10 * (self.need / max(there, 1.0)) ** (1 / self.dimension)) / 10
+        ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
+        if 0 < self.single < there:
+            ways.append(f"precision(single), which needs at least {in_words(self.single)}")
+        ways.append("processes on several machines (mpiexec), which share the points out")
+        return "; ".join(ways)
+
+    def error(self, there: MachineMemory) -> ScriptError:
+        """The error for more than there ever is."""
+        error = ScriptError(
+            f"{self.words}; this machine has {in_words(there.whole)} in all",
+            place=self.place,
+            hint=self.ways(there.whole),
+        )
+        error.command = "solid"
+        return error
+
+    def warning(self, there: MachineMemory) -> str:
+        """What is said of more than is free: who may have it the system knows alone."""
+        return f"{self.words}; this machine has {in_words(there.free)} free: it may not fit"
