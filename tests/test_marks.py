@@ -4,6 +4,8 @@ import re
 from itertools import pairwise
 
 import h5py
+import numpy as np
+from scenes import block
 from test_failures import against_a_wall
 
 OUTPUTS = """\
@@ -43,3 +45,53 @@ def test_what_goes_on_from_before_energy_grew_shows_each_state_once(run_interpre
     assert len(times) == 1 + 6 + 1 and all(a < b for a, b in pairwise(times))
     assert frames(again.folder / "m.gif") == 4  # steps 0, 20, 40, 60
     assert drawn(again.folder / "p.svg") == 21  # steps 0, 3, ..., 60
+
+
+SUMS = """\
+compute(e, error, all, vx, 2, L1)
+fix(s, check_solution, all, 0.01*time)
+log_modify(custom, step, time, e, e_history, e_max, s_x, s_z)
+"""
+
+
+def test_what_goes_on_from_before_energy_grew_adds_up_each_state_once(run_interpreted):
+    """Sums over time are those of a run that took the smaller step from that state on."""
+    script = against_a_wall(2, 0.0097).replace("log_modify(custom, step, time)\n", SUMS)
+    broken = run_interpreted(script, folder="a", status=1)
+    assert "last_good.21.h5 goes on" in broken.err and broken.log.Step[-1] == 80
+    smaller = script.replace("set_dt(0.0097)", "set_dt(0.0035)").replace("run(1000)", "run(60)")
+    again = run_interpreted(smaller, "-restart", "last_good.21.h5", folder="a")
+    # A file of a run that has not broken yet holds the same state.
+    early = script.replace("run(1000)", "restart(21, at.*.h5)\nrun(30)")
+    run_interpreted(early, folder="b")
+    through = run_interpreted(smaller, "-restart", "at.21.h5", folder="b")
+    assert through.log.Step.tolist() == list(range(0, 61, 5))
+    for name in ("Step", "Time", "e", "e_history", "e_max", "s_x", "s_z"):
+        assert np.array_equal(again.log[name], through.log[name]), name
+
+
+COUNTS = """\
+remembers = ("called", "seen")
+called, seen = 0, []
+
+def count(points):
+    global called
+    called += 1
+    seen.append(points.time)
+    return called
+"""
+
+
+def test_a_function_remembers_each_step_once_in_the_last_good_state(run_interpreted, tmp_path):
+    """A block leaves the domain in step 63: steps from 1 on are taken once more before."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "counting.py").write_text(COUNTS, encoding="utf-8")
+    lines = ("fix(v, initial_velocity_particles, all, 10)", "fix(c, python, all, counting.count)",
+             "set_dt(0.001)", "set_output(5)", "log_modify(custom, step, c)")  # fmt: skip
+    script = block(1, *lines, "run(200)")
+    broken = run_interpreted(script, status=1)
+    assert "last_good.62.h5 goes on" in broken.err
+    assert broken.log.Step[-1] == broken.log.c[-1] == 62
+    smaller = script.replace("set_dt(0.001)", "set_dt(0.0001)").replace("run(200)", "run(65)")
+    again = run_interpreted(smaller, "-restart", "last_good.62.h5")
+    assert again.log.Step[-1] == 65 and again.log.c.tolist() == again.log.Step.tolist()
