@@ -1,6 +1,9 @@
 """Outputs go on from an earlier state than the last that they show, and show no state twice."""
 
+import os
 import re
+import subprocess
+import sys
 from itertools import pairwise
 
 import h5py
@@ -95,3 +98,47 @@ def test_a_function_remembers_each_step_once_in_the_last_good_state(run_interpre
     smaller = script.replace("set_dt(0.001)", "set_dt(0.0001)").replace("run(200)", "run(65)")
     again = run_interpreted(smaller, "-restart", "last_good.62.h5")
     assert again.log.Step[-1] == 65 and again.log.c.tolist() == again.log.Step.tolist()
+
+
+# Prints how many states are marked at most, and how many of them lie ahead, script by script.
+HELD = """\
+import sys
+from karamelo_py.app.cli import main
+from karamelo_py.run import runner
+
+class Counted(runner.Marks):
+    most = ahead = 0
+    def note(self, **options):
+        super().note(**options)
+        Counted.most = max(Counted.most, len(self._of))
+        ahead = sum(step > self.hub.update.step for step in self._of)
+        Counted.ahead = max(Counted.ahead, ahead)
+
+runner.Marks = Counted
+for script in sys.argv[1:]:
+    Counted.most = Counted.ahead = 0
+    main([script])
+    print("most", Counted.most, Counted.ahead)
+"""
+
+
+def test_no_more_states_are_marked_than_a_run_may_go_back_to(tmp_path):
+    """Those since the last good one; none where that is the start, as the step is too large.
+
+    Those behind the good one that half the step begins at are not marked any more.
+    """
+    fly = "fix(v, initial_velocity_particles, all, 0.01*sin(30*x0))"
+    for name, dt in (("good", 0.001), ("large", 0.0125)):
+        script = block(1, fly, f"set_dt({dt})", "set_output(1)", "run(250)")
+        (tmp_path / name).write_text(script, encoding="utf-8")
+    script = against_a_wall(2, 0.0097).replace("run(1000)", "run(100, on_trouble=halve)")
+    (tmp_path / "halved").write_text(script, encoding="utf-8")
+    said = subprocess.run(
+        [sys.executable, "-c", HELD, "good", "large", "halved"], cwd=tmp_path, capture_output=True,
+        text=True, env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert "above the stable limit" in said.stderr
+    assert "with 1/2 of the step" in said.stderr
+    good, large, halved = re.findall(r"^most (\d+) (\d+)", said.stdout, re.M)
+    assert (good, large) == (("100", "0"), ("0", "0")), said.stderr
+    assert int(halved[0]) > 1 and halved[1] == "0"

@@ -128,6 +128,8 @@ def _seen(part: Any, grows: bool) -> dict[str, Any]:
 
 
 def _copied(value: Any) -> Any:
+    if value is None or type(value) in (bool, int, float, str, bytes):
+        return value  # soon: this is done for all parts at every output
     try:
         return copy.deepcopy(value)
     except Exception:  # what a function in Python keeps: no file takes it, which is told there
