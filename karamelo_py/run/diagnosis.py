@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -15,7 +15,7 @@ from karamelo_py.output.fields import Fields
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run import restart
 from karamelo_py.run.large_steps import step_was_told
-from karamelo_py.run.marks import Marks
+from karamelo_py.run.marks import Mark, Marks
 from karamelo_py.run.no_number import culprit
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable import own_step_instead
@@ -46,14 +46,15 @@ class TooLarge(NamedTuple):
     """A step above the stable limit of the start of a run: nothing behind that is a good state."""
 
     smaller: str  # what to write instead, by that limit
-    memories: restart.Memories | None  # of the start, where the snapshot is that
+    at_hand: bool  # whether the last good state is that of the start
 
 
 class Good(NamedTuple):
     """What is known of the last good state."""
 
     snapshot: dict
-    marks: Marks  # how far outputs had come
+    step: int
+    marks: Marks  # what parts remembered at that step and later ones
     too_large: TooLarge | None = None
 
 
@@ -101,11 +102,9 @@ def _keep_start(hub: Hub, simulation: Simulation, status: int, good: Good) -> st
     """Write the state that the run began with, end the outputs, and say how to begin anew."""
     step, path, too_large = simulation.step, None, good.too_large
     simulation.restore(good.snapshot)
-    if too_large.memories is not None:
-        present = restart.memories(hub)
-        restart.give_back(hub, too_large.memories, cut=False)
-        path = _write_last_good(hub)
-        restart.give_back(hub, present, cut=False)
+    if too_large.at_hand:
+        with good.marks.at(good.step):
+            path = _write_last_good(hub)
     back = step - simulation.step - (status in (GAINED, HEATED))
     if back <= FAR:
         if back > 0:
@@ -123,29 +122,31 @@ def _keep_start(hub: Hub, simulation: Simulation, status: int, good: Good) -> st
 
 def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str:
     """Return to the last good state, write it, end the outputs, and say how to go on from it."""
-    step, snapshot = simulation.step, good.snapshot
+    step, present = simulation.step, Mark.of_outputs(hub)
     grown = not grown_little(simulation)
     if grown:
-        _go_back(simulation, snapshot, step)
+        _go_back(simulation, good, step)
     else:
-        simulation.restore(snapshot)
-        if status not in (GAINED, HEATED, STOPPED) and step > simulation.step:
+        simulation.restore(good.snapshot)
+        good.marks.give(good.step)
+        if status not in (GAINED, HEATED, STOPPED):
             # What nodes have depends on how many steps ran at once: here always on as many.
-            simulation.advance(step - simulation.step)
-    path = _write_last_good(hub, good.marks) if grown else None
+            good.marks.again(simulation.advance, step)
+    path = _write_last_good(hub) if grown else None
     if status not in (GAINED, HEATED) and step > simulation.step:
         before = simulation.energy()
-        kept = simulation.step
-        simulation.advance(step - kept)
+        good.marks.again(simulation.advance, step)
         if path is None and simulation.energy() - before > IN_ALL * max(
             abs(before), float(simulation.control.clock[0].energy_floor)
         ):
             # The watch looks at means of a hundred steps, and has not seen it yet.
             grown = True
-            _go_back(simulation, snapshot, step)
-            path = _write_last_good(hub, good.marks)
-            simulation.advance(step - simulation.step)
+            _go_back(simulation, good, step)
+            path = _write_last_good(hub)
+            good.marks.again(simulation.advance, step)
     path = path or _write_last_good(hub)
+    if simulation.step < step:
+        present.give(hub)  # their files stay as they are, with later rows
     _end_outputs(hub)
     if path is None:
         return ""
@@ -154,21 +155,26 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str
     return f". {which} is in {name}; {GOES_ON.format(name)}"
 
 
-def _go_back(simulation: Simulation, snapshot: dict, end: int) -> None:
-    """Return to the last state before step `end` whose energy has not grown since the `snapshot`.
+def _go_back(simulation: Simulation, good: Good, end: int) -> None:
+    """Return to the last state before step `end` whose energy has not grown since the good one.
 
     These steps are taken once more, from one look at the energy to the next.
     """
+    snapshot, kept, marks = good.snapshot, good.step, good.marks
     simulation.restore(snapshot)
+    marks.give(kept)
     clock = simulation.control.clock[0]
     before = float(clock.balance)
     while clock.watch_energy and simulation.step + LOOK < end:
-        healthy = simulation.advance(LOOK - (simulation.step - 1) % LOOK) == DONE
+        look = simulation.step + LOOK - (simulation.step - 1) % LOOK
+        healthy = marks.again(simulation.advance, look) == DONE
         if not (healthy and grown_little(simulation)):
             break
         if clock.balance - before < GROWTH * unit_of(clock):
-            snapshot = simulation.snapshot(snapshot)
+            snapshot, kept = simulation.snapshot(snapshot), look
+            marks.note(always=True)
     simulation.restore(snapshot)
+    marks.give(kept)
 
 
 def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
@@ -401,17 +407,13 @@ def _place(x: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
 
 
-def _write_last_good(hub: Hub, marks: Marks | None = None) -> Path | None:
-    """Write the present state to a file to go on from; a file of somebody else is left alone.
-
-    With `marks` outputs have written later states, which who goes on from there will write anew.
-    """
+def _write_last_good(hub: Hub) -> Path | None:
+    """Write the present state to a file to go on from; a file of somebody else is left alone."""
     written: list[Path] = []
     path = restart.path_of(hub, Path(LAST_GOOD))
     if hub.output.writes and (not path.exists() or restart.is_restart(path)):
         with _told(hub):
-            with marks.at(hub.update.step) if marks is not None else nullcontext():
-                written.append(restart.write(hub, Path(LAST_GOOD), within=True))
+            written.append(restart.write(hub, Path(LAST_GOOD), within=True))
             # The files of restart(...) would hold the same once more.
             for item in hub.output.last:
                 item.last_step = hub.update.step

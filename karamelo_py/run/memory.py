@@ -8,8 +8,9 @@ A part names the attributes in which it keeps what it has seen or added up::
 Numbers, texts, bytes, arrays, generators of random numbers of NumPy, lists, tuples, sets and
 dictionaries of these can be kept, and objects whose class says in the same way what they remember.
 Classes add to what their bases name. After a part has got back what it remembers, its method
-``resumed()`` is called where it has one. What writes files, such as a dump, begins them anew in
-another script (read_restart), and gets back there only what it names in ``carries``, too.
+``resumed()`` is called where it has one; before a file takes that, ``filed()``. What writes files,
+such as a dump, begins them anew in another script (read_restart), and gets back there only what it
+names in ``carries``, too.
 """
 
 from typing import Any
@@ -42,6 +43,8 @@ def memory_of(part: Any, arrays: list[np.ndarray]) -> dict[str, Any]:
     ScriptError
         If an attribute is there that cannot be written.
     """
+    if hasattr(part, "filed"):
+        part.filed()
     found = {}
     for name in remembered(part):
         try:

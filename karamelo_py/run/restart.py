@@ -100,7 +100,7 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
         "scene": described(hub),
         "values": {name: hub.values.get(name) for name in hub.values.names()},
         "begun": hub.simulation.begun,
-        "parts": [[*key, memory_of(part, arrays)] for key, part in _parts(hub)],
+        "parts": [[*key, memory_of(part, arrays)] for key, part in parts(hub)],
     }
     with whole(path) as out, h5py.File(out, "w") as root:
         root.attrs["format"], root.attrs["version"] = FORMAT, VERSION
@@ -237,7 +237,7 @@ class Restart:
                 hub.values.set(name, value)
         simulation.begun = self.content["begun"]
         kept = {tuple(key): memory for *key, memory in self.content["parts"]}
-        for key, part in _parts(hub):
+        for key, part in parts(hub):
             if key not in kept:
                 continue
             if outputs or key[0] not in OUTPUTS:
@@ -255,32 +255,26 @@ Memories = tuple[list, list[np.ndarray]]
 
 
 def memories(hub: Hub) -> Memories:
-    """What all parts of a scene but its run remember now, for `give_back`."""
+    """What all parts of a scene but its run remember now, for `give_back`, as files take it."""
     arrays: list[np.ndarray] = []
-    parts = [
-        [list(key), memory_of(part, arrays)] for key, part in _parts(hub) if part is not hub.running
+    found = [
+        [list(key), memory_of(part, arrays)] for key, part in parts(hub) if part is not hub.running
     ]
-    return parts, [array.copy() for array in arrays]
+    return found, [array.copy() for array in arrays]
 
 
-def give_back(hub: Hub, kept: Memories, *, cut: bool = True) -> None:
-    """Let all parts remember what they did then; outputs go on from there in their files.
-
-    Without `cut` the files stay as they are, for parts that soon remember the present again.
-    """
-    parts, arrays = kept[0], [array.copy() for array in kept[1]]
-    there = {tuple(key): memory for key, memory in parts}
-    for key, part in _parts(hub):
+def give_back(hub: Hub, kept: Memories) -> None:
+    """Let all parts remember what they did then; files of outputs stay as they are."""
+    there = {tuple(key): memory for key, memory in kept[0]}
+    for key, part in parts(hub):
         if key in there:
-            remember(part, there[key], arrays)
-            if cut and hasattr(part, "resumed"):
-                part.resumed()
+            remember(part, there[key], kept[1])
 
 
 OUTPUTS = ("dump", "log", "curve", "restart")
 
 
-def _parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
+def parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
     """All that remembers something: family, ID and style of each, and the part."""
     return ((key, part) for key, part in _all_parts(hub) if remembered(part))
 

@@ -69,8 +69,8 @@ class Runner:
         self.halve = halve
         self.halvings = 0
         self.returns = 0  # to the last good state, since energy grew from there on
-        self.memories: restart.Memories = ([], [])
-        self.marks = Marks()
+        self.marks = Marks(hub)  # of that state and of later ones
+        self.memories: restart.Memories | None = None  # of that state, from a file
         self.snapshot: dict[str, np.ndarray] = {}  # of the last good state
         self.kept = -1  # its step
         self.begun_at = -1  # the step of the start of this run, where its state is at hand
@@ -128,7 +128,10 @@ class Runner:
     @property
     def good(self) -> tuple[int, restart.Memories] | None:
         """The last good state, for files that hold its snapshot, too: a run may go back to it."""
-        return (self.kept, self.memories) if self.halve and self.snapshot else None
+        if not (self.halve and self.snapshot):
+            return None
+        with self.marks.at(self.kept):
+            return self.kept, restart.memories(self.hub)
 
     @good.setter
     def good(self, state: tuple[int, restart.Memories] | None) -> None:
@@ -138,9 +141,7 @@ class Runner:
     def _keep(self, simulation: Simulation) -> None:
         self.snapshot, self.kept = simulation.snapshot(self.snapshot), simulation.step
         self.returns = 0
-        self.marks.forget_before(self.kept)
-        if self.halve or self.smaller:
-            self.memories = restart.memories(self.hub)
+        self.marks.begin()
 
     @property
     def duration(self) -> float:
@@ -189,7 +190,6 @@ class Runner:
         with heeding(self._note):
             with self.spent.counted("output"):
                 hub.output.begin(within=going_on)
-            self.marks.note(hub)
             hub.console.begin_run(simulation.step, 0.0)
             try:
                 self._loop(simulation, first_step, first_time)
@@ -241,6 +241,8 @@ class Runner:
         chunk = 1
         if not self.snapshot:
             self._keep(simulation)
+        elif self.memories is not None:
+            self.marks.begin_from(self.kept, self.memories)
         while simulation.step < last_step and simulation.time < self.end_time:
             if self.condition is not None and not self._goes_on():
                 if simulation.step == first_step:
@@ -257,6 +259,8 @@ class Runner:
             due = step != self.kept and (step % CHUNK == 0 or step == first_step + 1)
             if due and not self._keeps_start(simulation) and grown_little(simulation):
                 self._keep(simulation)
+            elif not self._keeps_start(simulation):  # whose rows are not gone back to
+                self.marks.note(always=self.condition is not None)
             compiled, before = (spent.on[name][0] for name in ("compilation", "steps"))
             with spent.counted("steps"):
                 status = simulation.advance(int(target) - step)
@@ -269,9 +273,8 @@ class Runner:
                 elif not self._try_half(simulation, status=status):
                     start = None
                     if self.smaller and not simulation.control.clock[0].watch_limit:
-                        begun = self.memories if self.kept == self.begun_at else None
-                        start = diagnosis.TooLarge(self.smaller, begun)
-                    good = diagnosis.Good(self.snapshot, self.marks, start)
+                        start = diagnosis.TooLarge(self.smaller, self.kept == self.begun_at)
+                    good = diagnosis.Good(self.snapshot, self.kept, self.marks, start)
                     diagnosis.stop(hub, simulation, status, good, self.place)
                 chunk = 1
                 continue
@@ -296,7 +299,6 @@ class Runner:
             with self.spent.counted("output"):
                 if simulation.step < last_step and simulation.time < self.end_time:
                     output.write()
-                    self.marks.note(hub)
                 hub.console.progress(
                     simulation.step,
                     simulation.time,
@@ -317,8 +319,8 @@ class Runner:
         self.halvings += 1
         simulation.restore(self.snapshot)
         # Rows of log and dumps that have been written since go with what they show.
-        restart.give_back(self.hub, self.memories)
-        self.marks.forget_after(simulation.step)
+        self.marks.give(self.kept, cut=True)
+        self.marks.begin()
         simulation.halve_step(self.halvings)
         while simulation.above_limit() and self.halvings < HALVINGS:
             # What is above the limit would only come back.

@@ -164,7 +164,15 @@ class Python(Fix):
 
     @property
     def state(self) -> dict[str, Any]:
-        """What the function keeps and names; what else it has changed is told, once."""
+        """What the function keeps and names."""
+        return self.keeper.state()
+
+    @state.setter
+    def state(self, kept: dict[str, Any]) -> None:
+        self.keeper.restore(kept)
+
+    def filed(self) -> None:
+        """What else the function has changed is told, once: files do not hold it."""
         keeper = self.keeper
         forgotten = [] if self.told else keeper.forgotten()
         if forgotten:
@@ -176,11 +184,6 @@ class Python(Fix):
                 hint=f"remembers = {(*keeper.names, *forgotten)!r} in {keeper.place}, or in the "
                 "class of an object that is called",
             )
-        return self.keeper.state()
-
-    @state.setter
-    def state(self, kept: dict[str, Any]) -> None:
-        self.keeper.restore(kept)
 
     def _act(self, view: Any) -> None:
         try:
