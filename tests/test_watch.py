@@ -112,8 +112,9 @@ def test_the_bound_is_what_there_was_and_what_loads_have_brought():
     assert watched([1.0, 25.0], work=[0.0, 4.0])[1]
 
 
-def test_energy_that_is_no_number_ends_the_run():
+def test_energy_that_is_no_number_ends_the_run(tmp_path, monkeypatch):
     """What a law remembers may be, and nothing else: no speed, no volume tells."""
+    monkeypatch.chdir(tmp_path)
     hub = Hub(Console(quiet=True))
     hub.interpreter = Interpreter(hub)
     scene = block(2, "fix(v, initial_velocity_particles, all, 0.1*x0, 0)", "set_output(1000)")
