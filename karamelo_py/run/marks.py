@@ -46,8 +46,7 @@ class Mark(NamedTuple):
     @classmethod
     def of_outputs(cls, hub: Hub) -> "Mark":
         """What outputs alone remember now."""
-        outputs = (part for key, part in restart.parts(hub) if key[0] in restart.OUTPUTS)
-        return cls([(part, _seen(part, True)) for part in outputs], {})
+        return cls([(part, _seen(part, True)) for part in _outputs(hub)], {})
 
     def give(self, hub: Hub, *, cut: bool = False) -> None:
         """Let all parts remember that; with `cut` outputs go on from there in their files."""
@@ -80,8 +79,7 @@ class Marks:
     def note(self, *, always: bool) -> None:
         """Mark the present state, `always` or if something has been written of it."""
         step = self.hub.update.step
-        outputs = (part for key, part in restart.parts(self.hub) if key[0] in restart.OUTPUTS)
-        if always or any(part.last_step == step for part in outputs):
+        if always or any(part.last_step == step for part in _outputs(self.hub)):
             self._of[step] = Mark.of(self.hub)
 
     def give(self, step: int, *, cut: bool = False) -> None:
@@ -112,6 +110,10 @@ class Marks:
             if update.step in self._of:
                 self.give(update.step)
         return DONE
+
+
+def _outputs(hub: Hub) -> Iterator[Any]:
+    return (part for key, part in restart.parts(hub) if key[0] in restart.OUTPUTS)
 
 
 def _seen(part: Any, grows: bool) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         plural(count, "point"),
         need,
         hub.domain.dimension,
-        max(hub.solids.values(), key=lambda solid: solid.count).place,
+        _largest(hub).place,
         f" for {crew.on_machine} of {crew.size} processes" if share < 1 else "",
         share * least_bytes(hub, np.float32, copied) if hub.settings.precision == "double" else 0.0,
     )
@@ -81,6 +81,11 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
     return points + nodes * per_cell * of_node
 
 
+def _largest(hub: Hub) -> Solid:
+    """The solid with most points."""
+    return max(hub.solids.values(), key=lambda solid: solid.count)
+
+
 def _cells(solid: Solid) -> float:
     """How many cells a solid fills at least."""
     ppc = getattr(solid, "ppc", 0)
@@ -91,12 +96,11 @@ def no_room(hub: Hub, error: MemoryError) -> ScriptError:
     """The error for a scene whose arrays the system does not give, whoever would use them."""
     nodes = sum(lattice.node_count for lattice in hub.lattices)
     count = sum(solid.count for solid in hub.solids.values())
-    largest = max(hub.solids.values(), key=lambda solid: solid.count)
     of_grid = nodes > count
     found = ScriptError(
         f"the arrays of {plural(nodes, 'node')} and {plural(count, 'point')} do not fit into "
         f"memory: {str(error) or 'the system gives no more'}",
-        place=hub.domain.place if of_grid else largest.place,
+        place=hub.domain.place if of_grid else _largest(hub).place,
         hint="larger cells, or a smaller domain" if of_grid else "larger cells, or fewer points",
     )
     found.command = "dimension" if of_grid else "solid"
