@@ -37,7 +37,7 @@ class QuadraticSpline(NamedTuple):
 
 
 @along.on(QuadraticSpline)
-def _(basis, kin, grid, place, direction):
+def _along_quadratic_spline(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
     nearest = int(a + real(0.5, a))
@@ -77,7 +77,7 @@ def _in_bulk(grid, line, direction):
 
 
 @affine_along.on(QuadraticSpline)
-def _(basis, grid, line, direction):
+def _affine_along_quadratic_spline(basis, grid, line, direction):
     # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
     four, r = real(4, line.r) * grid.inv_h, line.r
     affine = tuple([four * (real(k, r) - r) * weight for k, weight in enumerate(line.weights)])
@@ -85,12 +85,12 @@ def _(basis, grid, line, direction):
 
 
 @inverse_spread.on(QuadraticSpline)
-def _(basis, grid):
+def _inverse_spread_quadratic_spline(basis, grid):
     return (4 * grid.inv_h * grid.inv_h,)
 
 
 @evenly.on(QuadraticSpline)
-def _(basis, grid, stencil):
+def _evenly_quadratic_spline(basis, grid, stencil):
     first, *rest = (_in_bulk(grid, line, d) for d, line in enumerate(stencil.lines))
     for bulk in rest:
         first = first & bulk
@@ -98,7 +98,7 @@ def _(basis, grid, stencil):
 
 
 @first_node.on(QuadraticSpline)
-def _(basis, like):
+def _first_node_quadratic_spline(basis, like):
     return real(0.5, like)
 
 

@@ -108,7 +108,7 @@ def viscous_after(viscosity, law, j, m, rate):
 
 
 @viscous_after.on(Absent)
-def _(viscosity, law, j, m, rate):
+def _viscous_after_absent(viscosity, law, j, m, rate):
     return ()
 
 
@@ -119,7 +119,7 @@ def slowed_by_viscosity(viscosity, law, j, m, squared, density):
 
 
 @slowed_by_viscosity.on(Absent)
-def _(viscosity, law, j, m, squared, density):
+def _slowed_by_viscosity_absent(viscosity, law, j, m, squared, density):
     return squared
 
 
@@ -133,7 +133,7 @@ def borne_share(damage, memory, like):
 
 
 @borne_share.on(Absent)
-def _(damage, memory, like):
+def _borne_share_absent(damage, memory, like):
     return real(1, like)
 
 
@@ -149,7 +149,7 @@ def broken_further(damage, law, kin, m, strain, s, j, dt):
 
 
 @broken_further.on(Absent)
-def _(damage, law, kin, m, strain, s, j, dt):
+def _broken_further_absent(damage, law, kin, m, strain, s, j, dt):
     return ()
 
 
@@ -163,5 +163,5 @@ def released(damage, law, kin, j, s, m, broken):
 
 
 @released.on(Absent)
-def _(damage, law, kin, j, s, m, broken):
+def _released_absent(damage, law, kin, j, s, m, broken):
     return j - j

@@ -156,7 +156,7 @@ column(EosStrength, "dissipated", dissipated_energy)
 
 
 @initial_state.on(EosStrength)
-def _(law, kin, like):
+def _initial_state_eos_strength(law, kin, like):
     m = Memory(
         initial_energy(law.eos, like),
         initial_viscous_pressure(law.viscosity, like),
@@ -170,7 +170,7 @@ def _(law, kin, like):
 
 
 @advance.on(EosStrength)
-def _(law, kin, state, dl, dt):
+def _advance_eos_strength(law, kin, state, dl, dt):
     m = memory_of(law, kin, state)
     before = state[0]
     j = before * volume_ratio(kin, dl)
@@ -200,14 +200,14 @@ def stress_left(law, kin, m, state):
 
 
 @cauchy_stress.on(EosStrength)
-def _(law, kin, state):
+def _cauchy_stress_eos_strength(law, kin, state):
     m = memory_of(law, kin, state)
     s = stress_left(law, kin, m, state)
     return add_pressure(kin, real(1, state[0]), s, -full_pressure(law, state[0], m))
 
 
 @kirchhoff_stress.on(EosStrength)
-def _(law, kin, state):
+def _kirchhoff_stress_eos_strength(law, kin, state):
     j = state[0]
     m = memory_of(law, kin, state)
     s = stress_left(law, kin, m, state)
@@ -215,12 +215,12 @@ def _(law, kin, state):
 
 
 @jacobian.on(EosStrength)
-def _(law, kin, state):
+def _jacobian_eos_strength(law, kin, state):
     return state[0]
 
 
 @wave_speed_squared.on(EosStrength)
-def _(law, kin, state):
+def _wave_speed_squared_eos_strength(law, kin, state):
     # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower.
     j = state[0]
     m = memory_of(law, kin, state)
@@ -234,7 +234,7 @@ def _(law, kin, state):
 
 
 @energy_density.on(EosStrength)
-def _(law, kin, state):
+def _energy_density_eos_strength(law, kin, state):
     """What unloading gives back at this temperature: plastic work is not stored."""
     j = state[0]
     m = memory_of(law, kin, state)
@@ -250,12 +250,12 @@ def _(law, kin, state):
 
 
 @dissipated_energy.on(EosStrength)
-def _(law, kin, state):
+def _dissipated_energy_eos_strength(law, kin, state):
     return plus(state[0] - state[0], memory_of(law, kin, state).loss)
 
 
 @elastic_strain.on(EosStrength)
-def _(law, kin, state):
+def _elastic_strain_eos_strength(law, kin, state):
     """ln J / 3, the mean of the elastic strain increments, and the elastic shear."""
     m = memory_of(law, kin, state)
     strain = shear_strain(law.strength, kin, leading_symmetric(kin, state[1:]))
@@ -264,17 +264,17 @@ def _(law, kin, state):
 
 
 @plastic_strain.on(EosStrength)
-def _(law, kin, state):
+def _plastic_strain_eos_strength(law, kin, state):
     return equivalent_plastic_strain(law.strength, memory_of(law, kin, state).strength)
 
 
 @shown.on(Remembered)
-def _(what, law, kin, state):
+def _shown_remembered(what, law, kin, state):
     return memory_of(law, kin, state).strength[what.place]
 
 
 @with_stress.on(EosStrength)
-def _(law, kin, state, stress):
+def _with_stress_eos_strength(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
     m = memory_of(law, kin, state)
     elastic = elastic_ratio(law.strength, m.strength, state[0])
@@ -287,28 +287,28 @@ def _(law, kin, state, stress):
 
 
 @specific_volume.on(EosStrength)
-def _(law):
+def _specific_volume_eos_strength(law):
     return specific_volume(law.eos)
 
 
 @damage.on(EosStrength)
-def _(law, kin, state):
+def _damage_eos_strength(law, kin, state):
     one = real(1, state[0])
     return one - borne_share(law.damage, memory_of(law, kin, state).damage, one)
 
 
 @damage_initiation.on(EosStrength)
-def _(law, kin, state):
+def _damage_initiation_eos_strength(law, kin, state):
     return initiation(law.damage, memory_of(law, kin, state).damage)
 
 
 @temperature.on(EosStrength)
-def _(law, kin, state):
+def _temperature_eos_strength(law, kin, state):
     return plus(state[0] - state[0], memory_of(law, kin, state).heat)
 
 
 @with_temperature.on(EosStrength)
-def _(law, kin, state, T):
+def _with_temperature_eos_strength(law, kin, state, T):
     m = memory_of(law, kin, state)
     heat = heat_from(m.heat, (T,))
     now = Memory(m.energy, m.viscous, m.damage, heat, m.loss, m.strength, m.further)
@@ -316,12 +316,12 @@ def _(law, kin, state, T):
 
 
 @heat_capacity.on(EosStrength)
-def _(law, like):
+def _heat_capacity_eos_strength(law, like):
     return heat_capacity(law.temperature, like)
 
 
 @warmed.on(EosStrength)
-def _(law, kin, state, heat):
+def _warmed_eos_strength(law, kin, state, heat):
     m = memory_of(law, kin, state)
     taken = taken_heat(law.eos, m.energy, heat)
     energy = added(m.energy, taken)
@@ -331,5 +331,5 @@ def _(law, kin, state, heat):
 
 
 @conductivity.on(EosStrength)
-def _(law, like):
+def _conductivity_eos_strength(law, like):
     return conductivity(law.temperature, like)

@@ -113,24 +113,24 @@ def turned(law, kin, dl, stress):
 
 
 @turned.on(LinearElastic)
-def _(law, kin, dl, stress):
+def _turned_linear_elastic(law, kin, dl, stress):
     return spin(kin, dl, stress)
 
 
 @turned.on(FixedFrame)
-def _(law, kin, dl, stress):
+def _turned_fixed_frame(law, kin, dl, stress):
     return stress
 
 
 @initial_state.on(LinearElastic)
 @initial_state.on(FixedFrame)
-def _(law, kin, like):
+def _initial_state_fixed_frame(law, kin, like):
     return (real(1, like),) + zero_symmetric(kin, like)
 
 
 @advance.on(LinearElastic)
 @advance.on(FixedFrame)
-def _(law, kin, state, dl, dt):
+def _advance_fixed_frame(law, kin, state, dl, dt):
     strain = symmetric_part(kin, dl)
     old = turned(law, kin, dl, state[1:])
     pressure = law.lam * trace(strain)
@@ -140,32 +140,32 @@ def _(law, kin, state, dl, dt):
 
 @kirchhoff_stress.on(LinearElastic)
 @kirchhoff_stress.on(FixedFrame)
-def _(law, kin, state):
+def _kirchhoff_stress_fixed_frame(law, kin, state):
     return scale(state[0], state[1:])
 
 
 @cauchy_stress.on(LinearElastic)
 @cauchy_stress.on(FixedFrame)
-def _(law, kin, state):
+def _cauchy_stress_fixed_frame(law, kin, state):
     return state[1:]
 
 
 @jacobian.on(LinearElastic)
 @jacobian.on(FixedFrame)
-def _(law, kin, state):
+def _jacobian_fixed_frame(law, kin, state):
     return state[0]
 
 
 @wave_speed_squared.on(LinearElastic)
 @wave_speed_squared.on(FixedFrame)
-def _(law, kin, state):
+def _wave_speed_squared_fixed_frame(law, kin, state):
     # (lam + 2 G) / rho: the moduli are constant, the volume per mass has grown by det F
     return (law.lam + real(2, law.G) * law.G) * law.specific_volume * state[0]
 
 
 @elastic_strain.on(LinearElastic)
 @elastic_strain.on(FixedFrame)
-def _(law, kin, state):
+def _elastic_strain_fixed_frame(law, kin, state):
     # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
     stress = state[1:]
     half = real(0.5, law.G)
@@ -175,12 +175,12 @@ def _(law, kin, state):
 
 @energy_density.on(LinearElastic)
 @energy_density.on(FixedFrame)
-def _(law, kin, state):
+def _energy_density_fixed_frame(law, kin, state):
     strain = elastic_strain(law, kin, state)
     return real(0.5, law.G) * state[0] * contract(kin, state[1:], strain)
 
 
 @with_stress.on(LinearElastic)
 @with_stress.on(FixedFrame)
-def _(law, kin, state, stress):
+def _with_stress_fixed_frame(law, kin, state, stress):
     return (state[0],) + stress

@@ -94,40 +94,40 @@ class NeoHookean(NamedTuple):
 
 
 @initial_state.on(NeoHookean)
-def _(law, kin, like):
+def _initial_state_neo_hookean(law, kin, like):
     return identity(kin, like)
 
 
 @advance.on(NeoHookean)
-def _(law, kin, state, dl, dt):
+def _advance_neo_hookean(law, kin, state, dl, dt):
     return deform(kin, dl, state)
 
 
 @kirchhoff_stress.on(NeoHookean)
-def _(law, kin, state):
+def _kirchhoff_stress_neo_hookean(law, kin, state):
     # P = G (F - F^-T) + lam ln J F^-T, so tau = P F^T = G (b - I) + lam ln J I
     pressure = law.lam * logarithm_near_one(determinant(kin, state)) - law.G
     return add_pressure(kin, law.G, left_cauchy_green(kin, state), pressure)
 
 
 @cauchy_stress.on(NeoHookean)
-def _(law, kin, state):
+def _cauchy_stress_neo_hookean(law, kin, state):
     inverse = real(1, law.G) / determinant(kin, state)
     return scale(inverse, kirchhoff_stress(law, kin, state))
 
 
 @deformation.on(NeoHookean)
-def _(law, kin, state):
+def _deformation_neo_hookean(law, kin, state):
     return state
 
 
 @jacobian.on(NeoHookean)
-def _(law, kin, state):
+def _jacobian_neo_hookean(law, kin, state):
     return determinant(kin, state)
 
 
 @wave_speed_squared.on(NeoHookean)
-def _(law, kin, state):
+def _wave_speed_squared_neo_hookean(law, kin, state):
     # Along a principal direction of stretch a, the tangent of P gives
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
     ln_j = logarithm_near_one(determinant(kin, state))
@@ -135,7 +135,7 @@ def _(law, kin, state):
 
 
 @wave_speed_bound.on(NeoHookean)
-def _(law, kin, state):
+def _wave_speed_bound_neo_hookean(law, kin, state):
     # Without a series: 1 / J is above 1 - ln J (by 2 % at J = 0.8), and J / e^2 above its negative.
     j = determinant(kin, state)
     bulk = max(law.lam / j, -law.lam * j * real(exp(-2), j))
@@ -150,7 +150,7 @@ def _speed_squared(law, kin, state, bulk):
 
 
 @energy_density.on(NeoHookean)
-def _(law, kin, state):
+def _energy_density_neo_hookean(law, kin, state):
     half = real(0.5, law.G)
     ln_j = logarithm_near_one(determinant(kin, state))
     excess = trace(left_cauchy_green(kin, state)) - real(3, law.G)
@@ -158,7 +158,7 @@ def _(law, kin, state):
 
 
 @elastic_strain.on(NeoHookean)
-def _(law, kin, state):
+def _elastic_strain_neo_hookean(law, kin, state):
     """Green-Lagrange strain (F^T F - I) / 2."""
     half = real(0.5, law.G)
     return add_pressure(kin, half, right_cauchy_green(kin, state), -half)

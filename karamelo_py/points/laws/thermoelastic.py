@@ -70,12 +70,12 @@ column(Expansion, "T", temperature)
 
 
 @initial_heat.on(Expansion)
-def _(heat, like):
+def _initial_heat_expansion(heat, like):
     return Warm(heat.initial_temperature)
 
 
 @thermal_pressure.on(Expansion)
-def _(heat, T):
+def _thermal_pressure_expansion(heat, T):
     return (heat.pressure * (T[0] - heat.initial_temperature),)
 
 
@@ -98,51 +98,51 @@ def thermal_pressure_of(law, kin, state):
 
 
 @initial_state.on(Thermoelastic)
-def _(law, kin, like):
+def _initial_state_thermoelastic(law, kin, like):
     return initial_state(law.elastic, kin, like) + (initial_heat(law.heat, like).T,)
 
 
 @advance.on(Thermoelastic)
-def _(law, kin, state, dl, dt):
+def _advance_thermoelastic(law, kin, state, dl, dt):
     new = advance(law.elastic, kin, mechanical(law, kin, state), dl, dt)
     return new + heat_of(law, kin, state)
 
 
 @cauchy_stress.on(Thermoelastic)
-def _(law, kin, state):
+def _cauchy_stress_thermoelastic(law, kin, state):
     elastic = cauchy_stress(law.elastic, kin, mechanical(law, kin, state))
     return add_pressure(kin, real(1, elastic[0]), elastic, -thermal_pressure_of(law, kin, state))
 
 
 @kirchhoff_stress.on(Thermoelastic)
-def _(law, kin, state):
+def _kirchhoff_stress_thermoelastic(law, kin, state):
     elastic = kirchhoff_stress(law.elastic, kin, mechanical(law, kin, state))
     p = jacobian(law, kin, state) * thermal_pressure_of(law, kin, state)
     return add_pressure(kin, real(1, p), elastic, -p)
 
 
 @jacobian.on(Thermoelastic)
-def _(law, kin, state):
+def _jacobian_thermoelastic(law, kin, state):
     return jacobian(law.elastic, kin, mechanical(law, kin, state))
 
 
 @deformation.on(Thermoelastic)
-def _(law, kin, state):
+def _deformation_thermoelastic(law, kin, state):
     return deformation(law.elastic, kin, mechanical(law, kin, state))
 
 
 @wave_speed_squared.on(Thermoelastic)
-def _(law, kin, state):
+def _wave_speed_squared_thermoelastic(law, kin, state):
     return wave_speed_squared(law.elastic, kin, mechanical(law, kin, state))
 
 
 @wave_speed_bound.on(Thermoelastic)
-def _(law, kin, state):
+def _wave_speed_bound_thermoelastic(law, kin, state):
     return wave_speed_bound(law.elastic, kin, mechanical(law, kin, state))
 
 
 @energy_density.on(Thermoelastic)
-def _(law, kin, state):
+def _energy_density_thermoelastic(law, kin, state):
     """What unloading gives back at this temperature."""
     j = jacobian(law, kin, state)
     elastic = energy_density(law.elastic, kin, mechanical(law, kin, state))
@@ -150,14 +150,14 @@ def _(law, kin, state):
 
 
 @elastic_strain.on(Thermoelastic)
-def _(law, kin, state):
+def _elastic_strain_thermoelastic(law, kin, state):
     strain = elastic_strain(law.elastic, kin, mechanical(law, kin, state))
     warmer = heat_of(law, kin, state)[0] - law.heat.initial_temperature
     return add_pressure(kin, real(1, warmer), strain, -law.heat.alpha * warmer)
 
 
 @with_stress.on(Thermoelastic)
-def _(law, kin, state, stress):
+def _with_stress_thermoelastic(law, kin, state, stress):
     p = thermal_pressure_of(law, kin, state)
     elastic = add_pressure(kin, real(1, p), stress, p)
     new = with_stress(law.elastic, kin, mechanical(law, kin, state), elastic)
@@ -165,25 +165,25 @@ def _(law, kin, state, stress):
 
 
 @specific_volume.on(Thermoelastic)
-def _(law):
+def _specific_volume_thermoelastic(law):
     return specific_volume(law.elastic)
 
 
 @temperature.on(Thermoelastic)
-def _(law, kin, state):
+def _temperature_thermoelastic(law, kin, state):
     return heat_of(law, kin, state)[0]
 
 
 @with_temperature.on(Thermoelastic)
-def _(law, kin, state, T):
+def _with_temperature_thermoelastic(law, kin, state, T):
     return mechanical(law, kin, state) + (T,)
 
 
 @heat_capacity.on(Thermoelastic)
-def _(law, like):
+def _heat_capacity_thermoelastic(law, like):
     return law.heat.cp
 
 
 @conductivity.on(Thermoelastic)
-def _(law, like):
+def _conductivity_thermoelastic(law, like):
     return law.heat.kappa

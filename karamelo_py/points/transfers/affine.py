@@ -24,24 +24,28 @@ def register(transfer: type) -> None:
     transfer.keeps_gradient = False
 
     @add_momentum.on(transfer)
-    def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
+    def _add_momentum_transfer(
+        transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total
+    ):
         affine = affine_weight(basis, kin, grid, stencil, k)
         mean = add_scaled(total, weight * mass, v)
         return add_scaled(mean, mass, tensor_dot(planar(kin), moment, affine))
 
     @affine_velocity.on(transfer)
-    def _(transfer, moment, inverse_d):
+    def _affine_velocity_transfer(transfer, moment, inverse_d):
         return scale(inverse_d[0], moment) if len(inverse_d) else ()
 
     @zero_moment.on(transfer)
-    def _(transfer, kin, like):
+    def _zero_moment_transfer(transfer, kin, like):
         return zero_tensor(planar(kin), like)
 
     @by_arms.on(transfer)
-    def _(transfer, inverse_d):
+    def _by_arms_transfer(transfer, inverse_d):
         return (1.0,)
 
     @add_moment.on(transfer)
-    def _(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
+    def _add_moment_transfer(
+        transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment
+    ):
         arm = reach(basis, kin, grid, stencil, k)
         return add_outer(planar(kin), moment, scale(weight, velocity), arm)

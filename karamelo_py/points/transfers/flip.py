@@ -46,12 +46,12 @@ def blended(transfer: type) -> None:
     """Let the velocity of points follow from `transfer` as that of FLIP does, by its `alpha`."""
 
     @updated_velocity.on(transfer)
-    def _(transfer, v, v_pic, dv):
+    def _updated_velocity_transfer(transfer, v, v_pic, dv):
         return blend(transfer.alpha, v, v_pic, dv)
 
     # With P = S S+ from points to points, v becomes alpha v + (1 - alpha) P v + S dv.
     @lost_shares.on(transfer)
-    def _(transfer, like):
+    def _lost_shares_transfer(transfer, like):
         pic = real(1, like) - transfer.alpha
         return pic * (real(1, like) + transfer.alpha), pic * pic
 

@@ -112,12 +112,12 @@ frictional(DruckerPrager)
 
 
 @tension_bound.on(DruckerPrager)
-def _(strength, lowest):
+def _tension_bound_drucker_prager(strength, lowest):
     return max(lowest, -strength.tension)
 
 
 @pressure_response.on(DruckerPrager)
-def _(strength, kin, s, p, K, strain):
+def _pressure_response_drucker_prager(strength, kin, s, p, K, strain):
     cohesion, friction, dilation = surface(strength, strain)
     zero = real(0, p)
     trial = sqrt(real(0.5, p) * contract(kin, s, s))

@@ -44,5 +44,5 @@ def elastic_trial(kin, G, s, strain):
 
 
 @shear_response.on(Elastic)
-def _(strength, kin, s, strain, memory, heat, dt):
+def _shear_response_elastic(strength, kin, s, strain, memory, heat, dt):
     return elastic_trial(kin, strength.G, s, strain), memory, real(0, strength.G)
