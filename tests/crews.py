@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.run.crew import Crew
-from karamelo_py.run.work import Work
+from karamelo_py.run.mpi.crew import Crew
+from karamelo_py.run.mpi.load import Work
 
 PATIENCE = 60  # seconds that one waits for the others
 

@@ -42,7 +42,7 @@ from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import locate
 from karamelo_py.points.transfers.xpic import XPIC
-from karamelo_py.run.lowering import lower
+from karamelo_py.run.lower.build import lower
 from karamelo_py.scene.hub import Hub
 
 CAPABILITY = (9, 0)  # of an H100 or H200

@@ -10,7 +10,7 @@ from crews import together
 from karamelo_py.app.together import share
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.crew import Crew
+from karamelo_py.run.mpi.crew import Crew
 from karamelo_py.scene.hub import Hub
 
 

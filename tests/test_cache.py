@@ -19,7 +19,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
-from karamelo_py.run.spending import Spent, _about
+from karamelo_py.run.timings import Spent, _about
 from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

@@ -12,8 +12,8 @@ from scenes import block
 from test_mpi import by_ranks, needs_mpi
 from test_ranks import HALVED, TOUCHING
 
-from karamelo_py.run.restart import Restart, is_restart
-from karamelo_py.run.state import InFile, opened
+from karamelo_py.run.checkpoint.arrays import InFile, opened
+from karamelo_py.run.checkpoint.restart_file import Restart, is_restart
 from karamelo_py.script.errors import ScriptError
 
 SCENE = block(1, "set_dt(0.001)", "restart(2, r.*.h5)", "run(4)")

@@ -8,8 +8,8 @@ from scenes import block
 
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.foresight import warn
-from karamelo_py.run.watch import cause_of_gain
+from karamelo_py.run.advice.known_failures import warn
+from karamelo_py.run.diagnosis.energy import cause_of_gain
 from karamelo_py.scene.hub import Hub
 
 SCENE = """

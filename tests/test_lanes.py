@@ -74,7 +74,7 @@ from karamelo_py.points.laws.strengths.plastic import LinearHardening
 from karamelo_py.points.laws.strengths.zerilli_armstrong import ZerilliArmstrong
 from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
 from karamelo_py.points.laws.viscosity.artificial import ArtificialViscosity
-from karamelo_py.run.lowering import lower
+from karamelo_py.run.lower.build import lower
 from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.xdist_group("lanes")

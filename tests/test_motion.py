@@ -12,7 +12,7 @@ import pytest
 from scenes import LAWS, SCHEMES, TRANSFERS, block
 from selection import covering, parameters
 
-from karamelo_py.run.motion import Motion
+from karamelo_py.run.body_motion import Motion
 from karamelo_py.schemes.usl import USL
 
 VELOCITY = (0.7, -0.4, 0.3)

@@ -98,7 +98,7 @@ def test_compiled_in_the_plane(tmp_path, further):
 
 # Few points are shared out, too, in tiles of few cells.
 SMALL_TILES = """
-from karamelo_py.run import tiles
+from karamelo_py.run.tiles import tiles
 tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 4, 3: 2}
 """
 # Every method: contact, heat, mesh, damage, axisymmetry, one to three dimensions.
@@ -147,7 +147,8 @@ def test_bench(tmp_path):
 
 
 NOBODY = """
-from karamelo_py.run import ranks, tiles
+from karamelo_py.run.mpi import ranks
+from karamelo_py.run.tiles import tiles
 tiles.DIRECT_UP_TO = 0
 def gathers(*_, **__):
     raise MemoryError("of the whole scene")
@@ -334,7 +335,7 @@ import os
 import signal
 import time
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
-    from karamelo_py.run import crew
+    from karamelo_py.run.mpi import crew
     def meet(self, word, patience=crew.inf, *, before=crew.Crew.meet):
         if word == crew.WELL:
             time.sleep(2)  # the first has done all
@@ -372,7 +373,9 @@ BREAKS = """
 import json
 import os
 import re
-from karamelo_py.run import ranks, shares, tiles
+from karamelo_py.run.mpi import ranks
+from karamelo_py.run.mpi import partition as shares
+from karamelo_py.run.tiles import tiles
 from karamelo_py.styles.computes import linear_momentum
 tiles.DIRECT_UP_TO = 0
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
@@ -404,7 +407,7 @@ def test_only_one_fails(tmp_path, function):
 READ_ONLY = """
 import errno
 import os
-from karamelo_py.run import tiles
+from karamelo_py.run.tiles import tiles
 tiles.DIRECT_UP_TO = 0
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "0":
     from karamelo_py.output import files
@@ -555,8 +558,8 @@ def test_one_rank_is_no_other_run(tmp_path, run_interpreted):
 # --- check ----------------------------------------------------------------------------------------
 
 COUNTS = """
-from karamelo_py.run import tiles
-from karamelo_py.run.crew import Crew
+from karamelo_py.run.tiles import tiles
+from karamelo_py.run.mpi.crew import Crew
 tiles.DIRECT_UP_TO, tiles.TILES = 0, {2: 2}
 linked, start = Crew.linked, Crew.start
 def counting(self, given, taken):

@@ -21,7 +21,7 @@ from going_on import CURVE, FLY, OUTPUTS, SCENES, arrays, goes_on, same_files, w
 from scenes import block
 
 from karamelo_py.language import registry
-from karamelo_py.run.memory import memory_of, remember
+from karamelo_py.run.checkpoint.memory import memory_of, remember
 
 # --- every way to compute -----------------------------------------------------------------------
 
@@ -446,7 +446,7 @@ import numpy as np
 from going_on import CURVE, OUTPUTS, SCENES, block
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.memory import remembered
+from karamelo_py.run.checkpoint.memory import remembered
 from karamelo_py.scene.hub import Hub
 
 PLAIN = (int, float, str, bool, list, dict, np.ndarray, type(None))

@@ -19,8 +19,8 @@ from karamelo_py import Simulation
 from karamelo_py.app.cli import main
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.room import check_room, least_bytes
-from karamelo_py.run.sizes import memory_of, point_fields
+from karamelo_py.run.lower.memory import check_room, least_bytes
+from karamelo_py.run.lower.sizes import memory_of, point_fields
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.room import SLACK, MachineMemory, machine_memory
 from karamelo_py.script.errors import Quit, ScriptError
@@ -129,9 +129,9 @@ def small(monkeypatch):
 
     def set_to(free: float, whole: float | None = None) -> None:
         there = MachineMemory(free, free if whole is None else whole)
-        for module in ("run.room", "scene.room"):
+        for module in ("run.lower.memory", "scene.room"):
             monkeypatch.setattr(f"karamelo_py.{module}.machine_memory", lambda *_: there)
-        for module in ("run.room", "scene.placement"):
+        for module in ("run.lower.memory", "scene.placement"):
             monkeypatch.setattr(f"karamelo_py.{module}.FEW", 0)
 
     return set_to
@@ -146,7 +146,7 @@ def least(monkeypatch):
         found.append(least_bytes(*of))
         return found[-1]
 
-    monkeypatch.setattr("karamelo_py.run.room.least_bytes", noted)
+    monkeypatch.setattr("karamelo_py.run.lower.memory.least_bytes", noted)
     return found
 
 
@@ -154,7 +154,7 @@ def test_scenes_of_few_points_do_not_ask(tmp_path, monkeypatch):
     """Of the system, which takes a millisecond for each solid."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "in.script").write_text(block(2, "run(1)"), encoding="utf-8")
-    for module in ("run.room", "scene.room"):
+    for module in ("run.lower.memory", "scene.room"):
         monkeypatch.setattr(f"karamelo_py.{module}.machine_memory", None)
     assert main(["in.script"]) == 0
 
@@ -165,7 +165,7 @@ def test_it_is_never_more_than_check_says_and_most_of_it(run_interpreted, monkey
     hub = Hub(Console(quiet=True))
     hub.checking = True
     monkeypatch.setattr("karamelo_py.run.runner.report", lambda *_: None)
-    monkeypatch.setattr("karamelo_py.run.runner.foresight.warn", lambda *_: None)
+    monkeypatch.setattr("karamelo_py.run.runner.known_failures.warn", lambda *_: None)
     monkeypatch.setattr("karamelo_py.run.runner.warn_about_length", lambda *_: None)
     hub.interpreter = Interpreter(hub)
     with suppress(Quit):
@@ -235,14 +235,14 @@ def test_what_is_not_free_but_there_is_warned_of(small, tmp_path, capsys, monkey
 def test_scenes_of_before_that_nobody_holds_are_let_go(tmp_path, capsys, monkeypatch):
     """They point to themselves, and Python's collector comes seldom."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("karamelo_py.run.room.FEW", 0)
+    monkeypatch.setattr("karamelo_py.run.lower.memory.FEW", 0)
     held = []
 
     def there(*_) -> MachineMemory:
         free = 1e3 if any(hub() is not None for hub in held) else 1e9
         return MachineMemory(free, 1e3 if held else 1e9)
 
-    monkeypatch.setattr("karamelo_py.run.room.machine_memory", there)
+    monkeypatch.setattr("karamelo_py.run.lower.memory.machine_memory", there)
     gc.disable()
     try:
         for _ in range(2):
@@ -318,7 +318,7 @@ def test_a_grid_that_no_machine_has_room_for(tmp_path, capsys, monkeypatch):
     def refuse(*_):
         raise MemoryError("Unable to allocate 95.4 GiB")
 
-    monkeypatch.setattr("karamelo_py.run.lowering.fields.records", refuse)
+    monkeypatch.setattr("karamelo_py.run.lower.build.fields.records", refuse)
     assert main(["in.script"]) == 1
     said = capsys.readouterr().err
     assert said.startswith("in.script:3:1: error: dimension: the arrays of 1600080001 nodes and 2")

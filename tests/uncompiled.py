@@ -22,7 +22,14 @@ def save_state(request: dict) -> int:
     from crews import learn_at_random, together
     from states import final_columns, final_hub, final_state
 
-    from karamelo_py.run import by_id, by_number, part, ranks, shares, storing, tiles, work
+    from karamelo_py.run.access import nodes_by_number as by_number
+    from karamelo_py.run.access import points_by_id as by_id
+    from karamelo_py.run.checkpoint import part_state as storing
+    from karamelo_py.run.mpi import load as work
+    from karamelo_py.run.mpi import partition as shares
+    from karamelo_py.run.mpi import ranks
+    from karamelo_py.run.mpi import subdomain as part
+    from karamelo_py.run.tiles import tiles
     from karamelo_py.script.errors import ScriptError
     from karamelo_py.styles.dumps import hdf5, look
 

@@ -25,7 +25,7 @@ from karamelo_py.app.options import (
 )
 from karamelo_py.app.starting import begun
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
-from karamelo_py.run.crew import Crew, launched
+from karamelo_py.run.mpi.crew import Crew, launched
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
 
 if TYPE_CHECKING:  # which takes most of the time that the program needs to begin
@@ -327,7 +327,7 @@ def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = Non
     direct(hub, options)
     presets = dict(options.var)
     if getattr(options, "restart", None) is not None:
-        from karamelo_py.run.restart import Restart
+        from karamelo_py.run.checkpoint.restart_file import Restart
 
         hub.restart = Restart(options.restart)
         given, presets = presets, hub.restart.presets(presets)
@@ -359,7 +359,7 @@ def _tell_of_no_run(hub: Hub, script: str) -> None:
     message = f"{script} runs nothing: there is no run command in it"
     if hub.checking:
         if hub.solids:
-            from karamelo_py.run.report import report
+            from karamelo_py.run.advice.report import report
 
             report(hub)
         hub.console.say(render_message("note", message, hint=RUN_COMMANDS))

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from karamelo_py.app.leaving import SIGNALLED
-from karamelo_py.run.crew import ENDING, INSTALL, heeding
+from karamelo_py.run.mpi.crew import ENDING, INSTALL, heeding
 from karamelo_py.script.errors import ScriptError, render_message
 
 # Where the launcher of this program waits for the processes to report.

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from karamelo_py.app.launch import SOCKET
 from karamelo_py.app.leaving import INTERRUPTED
-from karamelo_py.run.crew import FAILED, WELL, Crew, launched
+from karamelo_py.run.mpi.crew import FAILED, WELL, Crew, launched
 from karamelo_py.script.errors import ScriptError
 
 if TYPE_CHECKING:

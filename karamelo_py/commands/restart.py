@@ -5,7 +5,7 @@ from pathlib import Path
 from karamelo_py.language.signature import Argument, OutputFile
 from karamelo_py.output.rhythm import ByTime, Every
 from karamelo_py.output.schedule import RESTART
-from karamelo_py.run import restart as files
+from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -71,7 +71,7 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     hub.output.last.clear()
     if every == 0:
         return
-    new = files.Restarts(hub, every, Path(file))
+    new = restart_file.Restarts(hub, every, Path(file))
     new.place = hub.place
     hub.output.check_file(new.file)
     hub.output.claim(new.file, RESTART)
@@ -107,7 +107,7 @@ def write_restart(hub: Hub, file: OutputFile) -> None:
     hub.answered = True
     replay = hub.interpreter.replay
     if replay is None:
-        files.write(hub, Path(file), within=False)
+        restart_file.write(hub, Path(file), within=False)
     elif replay.at_end:
         hub.restart.take(hub, outputs=True)
         hub.restart = hub.interpreter.replay = None
@@ -145,7 +145,7 @@ def read_restart(hub: Hub, file: str) -> None:
         raise ScriptError(
             "there is no scene yet", expected="domain, method and solids before read_restart"
         )
-    files.Restart(Path(file).expanduser()).take(hub, outputs=False)
+    restart_file.Restart(Path(file).expanduser()).take(hub, outputs=False)
 
 
 restart.may_differ = True

@@ -21,11 +21,9 @@ from karamelo_py.kernels.rows import SUMS
 from karamelo_py.kernels.sweep import Visit, sweep_nodes
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
-from karamelo_py.run.by_id import ById
-from karamelo_py.run.by_number import ByNumber
-from karamelo_py.run.lowering import State, chosen, lower, thread_count, warms_by_friction
-from karamelo_py.run.room import check_room, no_room
-from karamelo_py.run.state import (
+from karamelo_py.run.access.nodes_by_number import ByNumber
+from karamelo_py.run.access.points_by_id import ById
+from karamelo_py.run.checkpoint.arrays import (
     Stored,
     changing,
     copied,
@@ -35,8 +33,10 @@ from karamelo_py.run.state import (
     stored_copies,
     take_arrays,
 )
-from karamelo_py.run.tiles import Tiles
-from karamelo_py.run.trial import try_parts
+from karamelo_py.run.lower.build import State, chosen, lower, thread_count, warms_by_friction
+from karamelo_py.run.lower.check_plugins import try_parts
+from karamelo_py.run.lower.memory import check_room, no_room
+from karamelo_py.run.tiles.tiles import Tiles
 from karamelo_py.scene.hub import Hub
 
 

@@ -9,21 +9,13 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.step import DONE, STOPPED
-from karamelo_py.run import diagnosis, foresight, large_steps, restart
-from karamelo_py.run.crew import heeding
-from karamelo_py.run.idle import warn_about_length
-from karamelo_py.run.lowering import check_scene
-from karamelo_py.run.marks import Marks
-from karamelo_py.run.report import bytes_per_point, report
-from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.spending import Spent
-from karamelo_py.run.stable import (
-    own_step_instead,
-    ruling_limit,
-    words_of_own_step,
-    words_of_share,
-)
-from karamelo_py.run.watch import (
+from karamelo_py.run.advice import known_failures, steps
+from karamelo_py.run.advice.report import bytes_per_point, report
+from karamelo_py.run.advice.resting import warn_about_length
+from karamelo_py.run.checkpoint import restart_file
+from karamelo_py.run.checkpoint.rollback import Marks
+from karamelo_py.run.diagnosis import explain
+from karamelo_py.run.diagnosis.energy import (
     change_of_energy,
     forget_growth,
     grown_little,
@@ -31,6 +23,16 @@ from karamelo_py.run.watch import (
     not_watched,
     unknown_work,
 )
+from karamelo_py.run.lower.build import check_scene
+from karamelo_py.run.mpi.crew import heeding
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.timestep import (
+    own_step_instead,
+    ruling_limit,
+    words_of_own_step,
+    words_of_share,
+)
+from karamelo_py.run.timings import Spent
 from karamelo_py.scene import boundary
 from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
@@ -70,7 +72,7 @@ class Runner:
         self.halvings = 0
         self.returns = 0  # to the last good state, since energy grew from there on
         self.marks = Marks(hub)  # of that state and of later ones
-        self.memories: restart.Memories | None = None  # of that state, from a file
+        self.memories: restart_file.Memories | None = None  # of that state, from a file
         self.snapshot: dict[str, np.ndarray] = {}  # of the last good state
         self.kept = -1  # its step
         self.begun_at = -1  # the step of the start of this run, where its state is at hand
@@ -87,7 +89,7 @@ class Runner:
         if hub.rehearsing:
             steps = inf if self.steps is None else self.steps
             span = self.end_time - hub.update.time, steps
-            hub.later.append(large_steps.step_of(hub, self.halve, span))
+            hub.later.append(steps.step_of(hub, self.halve, span))
             hub.in_runs += hub.lasting()
             return
         if hub.pausing:
@@ -96,7 +98,7 @@ class Runner:
         hub.rehearse()
         if hub.checking:
             report(hub, self.end_time)
-            foresight.warn(hub, hub.simulation, self.duration, self.halve)
+            known_failures.warn(hub, hub.simulation, self.duration, self.halve)
             warn_about_length(hub, hub.simulation, self.end_time)
             raise Quit
         replay = hub.interpreter.replay
@@ -126,15 +128,15 @@ class Runner:
         self.hub.runs.append(after)
 
     @property
-    def good(self) -> tuple[int, restart.Memories] | None:
+    def good(self) -> tuple[int, restart_file.Memories] | None:
         """The last good state, for files that hold its snapshot, too: a run may go back to it."""
         if not (self.halve and self.snapshot):
             return None
         with self.marks.at(self.kept):
-            return self.kept, restart.memories(self.hub)
+            return self.kept, restart_file.memories(self.hub)
 
     @good.setter
-    def good(self, state: tuple[int, restart.Memories] | None) -> None:
+    def good(self, state: tuple[int, restart_file.Memories] | None) -> None:
         if state is not None:
             self.kept, self.memories = state
 
@@ -172,12 +174,12 @@ class Runner:
             ruined = not simulation.control.clock[0].watch_limit and simulation.step > first_step
             simulation.go_on(self.end_time, self.halvings)
             if not self.halvings:  # else the step is not that of the script
-                large_steps.warn_about_steps(hub, simulation, self.halve, again=True)
+                steps.warn_about_steps(hub, simulation, self.halve, again=True)
             self._tell_of_no_step_left(file, simulation, first_step)
         else:
             ruined = False
             simulation.begin(self.end_time)
-            foresight.warn(hub, simulation, self.duration, self.halve)
+            known_failures.warn(hub, simulation, self.duration, self.halve)
             warn_about_length(hub, simulation, self.end_time)
         if not simulation.control.clock[0].watch_limit:
             # Said of the first state: a later one is ruined, and its limit with it.
@@ -273,9 +275,9 @@ class Runner:
                 elif not self._try_half(simulation, status=status):
                     start = None
                     if self.smaller and not simulation.control.clock[0].watch_limit:
-                        start = diagnosis.TooLarge(self.smaller, self.kept == self.begun_at)
-                    good = diagnosis.Good(self.snapshot, self.kept, self.marks, start)
-                    diagnosis.stop(hub, simulation, status, good, self.place)
+                        start = explain.TooLarge(self.smaller, self.kept == self.begun_at)
+                    good = explain.Good(self.snapshot, self.kept, self.marks, start)
+                    explain.stop(hub, simulation, status, good, self.place)
                 chunk = 1
                 continue
             found = None if simulation.told_of_growth else growth(hub, simulation)
@@ -313,9 +315,9 @@ class Runner:
         """Go back to the last good state with half the step, where the script asks for that."""
         if not self.halve or self.halvings == HALVINGS:
             return False
-        if status == STOPPED and diagnosis.only_leave(self.hub, simulation, self.snapshot):
+        if status == STOPPED and explain.only_leave(self.hub, simulation, self.snapshot):
             return False
-        message = message or diagnosis.trouble(self.hub, simulation, status)[0]
+        message = message or explain.trouble(self.hub, simulation, status)[0]
         self.halvings += 1
         simulation.restore(self.snapshot)
         # Rows of log and dumps that have been written since go with what they show.

@@ -15,10 +15,12 @@ from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
+from karamelo_py.run.body_motion import Motion, motions
+from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
+from karamelo_py.run.lower.python_hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.lowered import Lowered
-from karamelo_py.run.motion import Motion, motions
-from karamelo_py.run.python_hooks import PythonHooks, sets_initial_state, views_of
-from karamelo_py.run.stable import (
+from karamelo_py.run.tiles.tiles import in_tiles
+from karamelo_py.run.timestep import (
     common_velocity,
     moves_already,
     ruling_limit,
@@ -26,8 +28,6 @@ from karamelo_py.run.stable import (
     step_of_waves,
     weight_of_drift,
 )
-from karamelo_py.run.tiles import in_tiles
-from karamelo_py.run.watch import unknown_heat, unknown_work
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 

@@ -25,7 +25,7 @@ from karamelo_py.app.launch import launch
 from karamelo_py.app.together import keep_to_oneself, share, together
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.crew import Crew
+from karamelo_py.run.mpi.crew import Crew
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 

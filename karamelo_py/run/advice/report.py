@@ -1,0 +1,119 @@
+"""karamelo-py check: what a scene needs, before it runs."""
+
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.step import Fused, Staged, rows_of
+from karamelo_py.kernels.table import says
+from karamelo_py.points.laws import law_kind
+from karamelo_py.points.laws.plastic_rate import without_rate
+from karamelo_py.run.advice.known_failures import refuse_endless_speeds
+from karamelo_py.run.advice.savings import savings
+from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
+from karamelo_py.run.lower.sizes import memory_of, node_fields, nodes_in_use, point_fields
+from karamelo_py.run.mpi.plan import told
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.timestep import ruling_limit, words_of_share
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.material import Material
+from karamelo_py.scene.room import free_bytes
+
+
+def report(hub: Hub, end_time: float = inf) -> None:
+    """Print fields with bytes, stages, tiles, memory and the first dt of a run to `end_time`."""
+    simulation = hub.simulation
+    simulation.begin(end_time)
+    refuse_endless_speeds(hub, simulation)
+    simulation.sort_if_due()
+    say = hub.console.say
+    s = simulation.setup
+    say(f"dimension      {s.kin.dimension} ({s.kin.word})")
+    say(f"method         {hub.update.words}")
+    say(f"precision      {hub.settings.precision}")
+    say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")
+    lattices = hub.lattices
+    shapes = ", ".join(" x ".join(map(str, lattice.shape)) for lattice in lattices[:8])
+    more = ", ..." if len(lattices) > 8 else ""
+    say(f"nodes          {hub.fields.node_count} ({shapes}{more})")
+    tiles = simulation.tiles
+    nodes = nodes_in_use(s)
+    say(f"tiles          {tiles.occupied} of {tiles.count} hold points, {nodes} nodes are in use")
+    say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
+    say(f"               {words_of_share(hub)}")
+    say(f"limited by     {ruling_limit(simulation)}")
+    say(f"energy         {'is watched' if not (why := unknown_work(hub)) else not_watched(why)}")
+    say(f"threads        {simulation.threads}")
+    say("")
+    say(f"{'':<34}numbers     bytes")
+    for block in s.blocks:
+        say(f"fields of a point of {', '.join(m.words for m in materials(hub, block))}")
+        of_one = 0
+        for name, shape, size in point_fields(block):
+            say(f"  {name:<30}  {shape:<10} {size:>6}")
+            of_one += size
+        say(f"  {'together':<30}  {'':<10} {of_one:>6}")
+    say("fields of a node")
+    for name, array in node_fields(s):
+        say(f"  {name:<30}  {array.shape[1]!s:<10} {array.itemsize * array.shape[1]:>6}")
+    say(f"boxes of tiles {_size(tiles.box_bytes(s))}")
+    memory = memory_of(simulation, s, tiles.box_bytes(s))
+    say(f"memory         {_size(sum(memory))} in a run, of which")
+    say(f"               {_size(memory.copied)} are a copy of the last good state")
+    if (free := free_bytes()) is not None:
+        say(f"               {_size(free)} are free on this machine, beside what check has taken")
+    if hub.settings.ranks > 1:
+        say("")
+        for line in told(simulation, hub.settings.ranks):
+            say(line)
+    say("")
+    say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")
+    for stage in stages(hub, simulation):
+        say(f"  {stage}")
+    found = savings(hub, simulation)
+    if found:
+        say("")
+        say("could be left out")
+    for saving in found:
+        say(f"  {saving.cost}")
+        say(f"    instead: {saving.instead}")
+
+
+def _size(count: float) -> str:
+    """So many bytes, in words."""
+    mib = count / 2**20
+    return f"{mib:.0f} MiB" if mib > 100 else f"{mib:.3g} MiB"
+
+
+def bytes_per_point(simulation: Simulation) -> int:
+    """Bytes of all fields of a point, the mean over the points of all kinds."""
+    counts = simulation.counts()
+    of_one = [sum(size for *_, size in point_fields(block)) for block in simulation.blocks]
+    return round(np.dot(counts, of_one) / max(1, sum(counts)))
+
+
+def materials(hub: Hub, block: Any) -> list[Material]:
+    """The materials of the points of this block: those in use whose laws are of its kind."""
+    used = dict.fromkeys(solid.material for solid in hub.solids.values())
+    return [
+        material
+        for material in used
+        if law_kind(material.law) == without_rate(law_kind(block.laws))
+    ]
+
+
+def stages(hub: Hub, simulation: Simulation) -> list[str]:
+    """The stages of a step with the fixes that act in them."""
+    visits = Staged if simulation.staged else Fused
+    acting: dict[str, list[str]] = {}
+    for fix in hub.fixes.values():
+        for name in fix.hooks():
+            once = " (first step only)" if fix.first_step_only else ""
+            acting.setdefault(name, []).append(fix.id + once)
+    lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
+    rows = rows_of(type(hub.update.scheme), visits)
+    first = [text for row in rows if (text := says(row, simulation.setup)) is not None]
+    if not lines:
+        lines = ["no fix acts between them"]
+    return [*first, *lines]

@@ -1,0 +1,370 @@
+"""Files to go on from: the whole scene at one moment, in HDF5.
+
+Everything in them follows from what the parts of a scene declare: the arrays from their fields, the
+rest from what they remember (:mod:`karamelo_py.run.checkpoint.memory`). The set-up is not in
+them: the script makes it once more, and a file knows which statements had been carried out.
+"""
+
+import json
+import re
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from karamelo_py import __version__
+from karamelo_py.language.replay import Record, Replay
+from karamelo_py.output.files import whole
+from karamelo_py.output.rhythm import ByTime, Rhythmic
+from karamelo_py.run.checkpoint.arrays import Stored, reading
+from karamelo_py.run.checkpoint.memory import carried, memory_of, remember, remembered
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+
+FORMAT, VERSION = "karamelo-py restart", 6
+OURS = "a file that restart or write_restart of karamelo-py has written"
+CONTENT = (
+    "within", "statements", "values of statements", "presets", "variables", "runs", "scene",
+    "values", "begun", "parts",
+)  # fmt: skip
+FLAT = {"track_times": False}
+
+
+class Restarts(Rhythmic):
+    """Writes a file to go on from, again and again while the scene runs.
+
+    Parameters
+    ----------
+    every
+        How often.
+    file
+        File name. The first ``*`` becomes the step number; without ``*`` each file takes the place
+        of the one before.
+    """
+
+    place: Any = None
+    style = ""
+
+    def __init__(self, hub: Hub, every: int | ByTime, file: Path):
+        self.hub = hub
+        self.every = every
+        self.file = file
+        # What a run begins with can be had from the script.
+        self.last_step = hub.update.step
+
+    def write(self) -> None:
+        """Write the present state."""
+        self.last_step = self.hub.update.step  # goes into the file
+        write(self.hub, self.file, within=True)
+
+
+def path_of(hub: Hub, file: Path) -> Path:
+    """The file of the present state."""
+    return hub.folder / str(file).replace("*", str(hub.update.step), 1)
+
+
+def write(hub: Hub, file: Path, *, within: bool) -> Path:
+    """Write the present state of a scene; `within` a run or between two.
+
+    The file appears under its name when all of it is written.
+    """
+    path, simulation = path_of(hub, file), hub.simulation
+    if hub.settings.crew is None or within:
+        _write(hub, path, within)
+    elif simulation.apart and simulation.follows:
+        simulation.follow()
+    elif simulation.apart:
+        with simulation.leading():
+            _write(hub, path, within)
+    else:
+        _ = simulation.setup  # of all processes together
+        if not simulation.follows:
+            _write(hub, path, within)
+    return path
+
+
+def _write(hub: Hub, path: Path, within: bool) -> None:
+    import h5py
+
+    arrays: list[np.ndarray] = []
+    interpreter = hub.interpreter
+    content = {
+        "within": within,
+        "statements": interpreter.record.statements,
+        "values of statements": list(interpreter.record.values.items()),
+        "presets": interpreter.presets,
+        "variables": {name: str(value) for name, value in interpreter.variables.items()},
+        "runs": hub.runs,
+        "scene": described(hub),
+        "values": {name: hub.values.get(name) for name in hub.values.names()},
+        "begun": hub.simulation.begun,
+        "parts": [[*key, memory_of(part, arrays)] for key, part in parts(hub)],
+    }
+    with whole(path) as out, h5py.File(out, "w") as root:
+        root.attrs["format"], root.attrs["version"] = FORMAT, VERSION
+        root.attrs["program"] = __version__
+        root.attrs["step"], root.attrs["time"] = hub.update.step, hub.update.time
+        text = np.frombuffer(json.dumps(content).encode(), np.uint8)
+        root.create_dataset("content", data=text, **FLAT)
+        for k, array in enumerate(arrays):
+            root.create_dataset(f"memory/{k}", data=array, **FLAT)
+        _put(root.create_group("state"), hub.simulation.stored())
+        if hub.running is not None and hub.running.good is not None:
+            _put(root.create_group("good"), hub.simulation.stored_snapshot(hub.running.snapshot))
+
+
+def _put(group: Any, found: Iterator[Stored]) -> None:
+    begun: dict[str, Any] = {}
+    for name, shape, where, array in found:
+        if array.shape == shape and array.size and name not in begun:
+            group.create_dataset(name, data=array, **FLAT)  # in half the time
+            continue
+        if name not in begun:
+            begun[name] = group.create_dataset(name, shape, array.dtype, **FLAT)
+        if array.size:
+            begun[name][where] = array
+
+
+def is_restart(path: Path) -> bool:
+    """Whether a file is one to go on from."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r", locking=False) as root:
+            return root.attrs.get("format") == FORMAT
+    except (OSError, KeyError, TypeError):  # what HDF5 says of one that is damaged
+        return False
+
+
+class Restart:
+    """The content of a file.
+
+    Parameters
+    ----------
+    path
+        Its name. With a ``*`` it is the one with the largest number in that place.
+
+    Raises
+    ------
+    ScriptError
+        If there is none, or it is no file to go on from.
+    """
+
+    def __init__(self, path: Path):
+        import h5py
+
+        self.path = path = _latest(path)
+        if not path.is_file():
+            raise _no_file(path)
+        what = f"{path} is no file that this program can go on from"
+        try:
+            with h5py.File(path, "r", locking=False) as root:
+                if root.attrs.get("format") != FORMAT:
+                    raise ScriptError(what, argument="file", expected=OURS)
+                version = int(root.attrs["version"])
+                if version != VERSION:
+                    age = "an older" if version < VERSION else "a newer"
+                    raise ScriptError(
+                        f"{path} has format {version}, of {age} karamelo-py "
+                        f"({root.attrs['program']}), and this one ({__version__}) reads format "
+                        f"{VERSION} alone",
+                        argument="file",
+                        hint="run the script from its beginning, without this file, or go on with "
+                        f"the {age.split()[1]} karamelo-py that wrote it",
+                    )
+                self.content = json.loads(root["content"][()].tobytes())
+                _ = root["state"], *(self.content[name] for name in CONTENT)
+        except (OSError, KeyError, ValueError, TypeError) as error:
+            why = "" if "signature" in str(error) else f": {error}"
+            raise ScriptError(f"{what}{why}", argument="file", expected=OURS) from None
+
+    @property
+    def runs(self) -> list[dict[str, float]]:
+        """The values at the end of each run that was over."""
+        return self.content["runs"]
+
+    def presets(self, given: dict[str, str]) -> dict[str, str]:
+        """Variables from the command line of the run that wrote the file; `given` ones are those.
+
+        Raises
+        ------
+        ScriptError
+            If one that is given is another.
+        """
+        before = self.content["presets"]
+        for name, text in given.items():
+            if before.get(name) != text:
+                was = f"-var {name} {before[name]}" if name in before else f"no -var {name}"
+                raise ScriptError(
+                    f"{self.path} was written with {was}; now it is -var {name} {text}",
+                    expected="the same variables; those of the file are taken where none are given",
+                    hint="leave it out; how long the last run is may be changed in its own line, "
+                    "as a number",
+                )
+        return before
+
+    def replay(self) -> Replay:
+        """What the script has to be, up to the state of the file."""
+        values = {int(k): found for k, found in self.content["values of statements"]}
+        record = Record(self.content["statements"], values)
+        return Replay(record, self.content["within"], str(self.path))
+
+    def take(self, hub: Hub, *, outputs: bool) -> None:
+        """Put the scene into the state of the file; with `outputs` they go on in their files.
+
+        Raises
+        ------
+        ScriptError
+            If the file was written by another scene.
+        """
+        import h5py
+
+        check(hub, self)
+        simulation = hub.simulation
+        try:
+            simulation.take_stored(self.path)
+            with reading(), h5py.File(self.path, "r", locking=False) as root:
+                arrays = root.get("memory", ())
+                arrays = [arrays[str(k)][()] for k in range(len(arrays))]
+                good = "good" in root
+        except ScriptError as error:
+            error.message = f"{self.path}: {error.message}"
+            raise
+        for name, value in self.content["values"].items():
+            if name in hub.values:
+                hub.values.set(name, value)
+        simulation.begun = self.content["begun"]
+        kept = {tuple(key): memory for *key, memory in self.content["parts"]}
+        for key, part in parts(hub):
+            if key not in kept:
+                continue
+            if outputs or key[0] not in OUTPUTS:
+                remember(part, kept[key], arrays)
+                if hasattr(part, "resumed"):
+                    part.resumed()
+            else:
+                memory = kept[key]
+                remember(part, {k: memory[k] for k in carried(part) if k in memory}, arrays)
+        if good and hub.running is not None and hub.running.halve:
+            hub.running.snapshot = simulation.take_snapshot(self.path)
+
+
+Memories = tuple[list, list[np.ndarray]]
+
+
+def memories(hub: Hub) -> Memories:
+    """What all parts of a scene but its run remember now, for `give_back`, as files take it."""
+    arrays: list[np.ndarray] = []
+    found = [
+        [list(key), memory_of(part, arrays)] for key, part in parts(hub) if part is not hub.running
+    ]
+    return found, [array.copy() for array in arrays]
+
+
+def give_back(hub: Hub, kept: Memories) -> None:
+    """Let all parts remember what they did then; files of outputs stay as they are."""
+    there = {tuple(key): memory for key, memory in kept[0]}
+    for key, part in parts(hub):
+        if key in there:
+            remember(part, there[key], kept[1])
+
+
+OUTPUTS = ("dump", "log", "curve", "restart")
+
+
+def parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
+    """All that remembers something: family, ID and style of each, and the part."""
+    return ((key, part) for key, part in _all_parts(hub) if remembered(part))
+
+
+def _all_parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
+    yield ("update", "", ""), hub.update
+    yield ("method", "", ""), hub.update.method
+    if hub.running is not None:
+        yield ("run", "", ""), hub.running
+    for catalogue in hub.catalogues:
+        for ID, part in catalogue.items():
+            kind = getattr(part, "style", "") or type(part).__name__
+            yield (catalogue.kind, ID, kind), part
+    for curve in hub.output.plots:
+        yield ("curve", curve.id, ""), curve
+    for item in hub.output.last:
+        yield ("restart", str(item.file), ""), item
+    # The last one: what it shows is what the others remember.
+    yield ("log", "", ""), hub.output.log
+
+
+def _latest(path: Path) -> Path:
+    if "*" not in path.name or path.exists():
+        return path
+    pattern = re.compile(re.escape(path.name).replace(r"\*", r"(\d+)", 1))
+    there = path.parent.iterdir() if path.parent.is_dir() else ()
+    found = [(int(match[1]), one) for one in there if (match := pattern.fullmatch(one.name))]
+    if not found:
+        raise _no_file(path)
+    return max(found)[1]
+
+
+def _no_file(path: Path) -> ScriptError:
+    """What is said of a file that is not there: -out has put its like a folder below, perhaps."""
+    below = sorted(path.parent.glob(f"*/{path.name}")) if path.parent.is_dir() else ()
+    return ScriptError(
+        f"there is no file {path}",
+        argument="file",
+        expected=None if below else OURS,
+        hint=f"there is {below[-1]}" if below else None,
+    )
+
+
+# ---- whether a scene is the one that wrote a file ----------------------------------------------
+
+
+def described(hub: Hub) -> dict[str, str]:
+    """What has to be the same for a state to fit, in words."""
+    update, domain = hub.update, hub.domain
+    box = zip(domain.lo, domain.hi, strict=True)
+    words = {
+        "method": update.words,
+        "domain": f"{domain.dimension}, {', '.join(f'{a!r}, {b!r}' for a, b in box)}, {domain.h!r}",
+        "axisymmetric": str(domain.axisymmetric),
+        "precision": hub.settings.precision,
+        "anti_volumetric_locking": str(update.anti_locking),
+        "boundary": update.boundary,
+    }
+    for solid in hub.solids.values():
+        where = 0
+        for _, x in solid.pieces():
+            where = zlib.crc32(np.ascontiguousarray(x).tobytes(), where)
+        kind = "-".join(type(part).__name__ for part in _parts_of(solid.material.law))
+        words[f"solid '{solid.id}'"] = f"{solid.count} points of {kind}, {where:08x}"
+    return words
+
+
+def _parts_of(law: Any) -> Iterator[Any]:
+    yield law
+    if isinstance(law, tuple):
+        for part in law:
+            if isinstance(part, tuple) and hasattr(part, "_fields"):
+                yield part
+
+
+def check(hub: Hub, restart: Restart) -> None:
+    """Refuse a state of another scene, with the first difference."""
+    here, there = described(hub), restart.content["scene"]
+    for name in dict.fromkeys([*there, *here]):
+        mine, theirs = here.get(name), there.get(name)
+        if mine == theirs:
+            continue
+        if mine is None or theirs is None:
+            what = f"{name}, which {'is not here' if mine is None else 'it does not have'}"
+        elif name.startswith("solid") and mine.rsplit(",")[0] == theirs.rsplit(",")[0]:
+            what = f"other points in {name}"
+        else:
+            what = f"{name} {theirs}; here it is {mine}"
+        raise ScriptError(
+            f"{restart.path} was written by another scene: {what}",
+            argument="file",
+            expected="the same domain, method and solids as in the script that wrote it",
+        )

@@ -1,0 +1,218 @@
+"""Whether a scene's energy can be watched, and what a gain of energy comes from."""
+
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
+from karamelo_py.kernels.watch import BORNE, FEW, unit_of
+from karamelo_py.language import registry
+from karamelo_py.output.fields import Fields
+from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
+from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.run.advice.facts import Foreseen
+from karamelo_py.run.advice.noise import noises
+from karamelo_py.run.lower.build import warms_by_friction
+from karamelo_py.run.timestep import (
+    USUAL,
+    fastest_wave,
+    keeping_share,
+    lone_point,
+    own_step_of_waves,
+    sparse,
+)
+from karamelo_py.scene.hub import Hub
+from karamelo_py.styles.fixes.pairs import PairContact
+from karamelo_py.styles.fixes.velocity_particles import VelocityParticles
+
+TOLD = 2  # windows of growth one after another, of which a run tells
+WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
+IN_ALL = 0.1  # of the largest energy: growth since the start that it tells of, too
+
+
+def not_watched(why: str) -> str:
+    """How to say that energy is not watched."""
+    return f"is not watched: nobody adds up the work of {why}"
+
+
+def unknown_work(hub: Hub) -> str:
+    """What does work that nobody adds up; empty where energy can be watched.
+
+    Compiled hooks on nodes and points have their work added up by the loops. Fixes in Python say
+    by `Fix.conserves` that they bring none.
+    """
+    for fix in hub.fixes.values():
+        acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
+        # What leads points against their forces does work that no sum at nodes knows.
+        leads = isinstance(fix, VelocityParticles)
+        if leads or (acts and not fix.first_step_only and not fix.conserves):
+            return f"fix {fix.style} '{fix.id}'"
+    for solid in hub.solids.values():
+        if can(solid.material.law, constrained_velocity):
+            return f"rigid solid '{solid.id}'"
+        if hub.update.thermal and can(solid.material.law, initial_heat):
+            return "heat"
+    return ""
+
+
+def unknown_heat(hub: Hub) -> bool:
+    """Whether a fix in Python may bring heat, or friction does."""
+    return warms_by_friction(hub) or any(
+        name in HEAT_STAGES and not isinstance(hook, CompiledHook)
+        for fix in hub.fixes.values()
+        for name, hook in fix.hooks().items()
+    )
+
+
+def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
+    """What is known to feed energy in such a scene, the most likely first, and its cure."""
+    update, method = hub.update, hub.update.method
+    transfer = registry.name_of("transfer", type(update.transfer))
+    scheme = registry.name_of("scheme", type(update.scheme))
+    functions = f"{method.basis_name} functions"
+    moves, jumps = method.frame.moves, getattr(method.basis, "gradient_jumps", False)
+    share = simulation.dt / simulation.limit
+    keeping = keeping_share(hub)
+    smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
+    if share > 1 + 1e-9:
+        return (
+            f"the step is {share:.3g} times the stable one",
+            "leave set_dt and dt_factor out, or make them smaller",
+        )
+    courant, _ = own_step_of_waves(hub, still=False)
+    borne = courant * _time_across(simulation)
+    if update.fixed_dt is not None and simulation.dt > borne * (1 + 1e-9):
+        alone = " of a point that has its nodes for itself" * (courant == lone_point(hub))
+        return (
+            f"the step is {simulation.dt / borne:.3g} times the stable one{alone} when nothing has "
+            f"moved yet, {borne:.4g}",
+            f"set_dt({USUAL * borne:.3g}) or less, or leave set_dt out",
+        )
+    if moves and jumps and update.transfer.inverts_spread:
+        return f"{transfer} with {functions} in the updated frame", f"FLIP, or {smooth}"
+    if moves and jumps and transfer == "TPIC":
+        return "TPIC with linear functions grows where a body moves through the grid", smooth
+    if update.anti_locking and moves:
+        return "averaged volumes (F-bar) in the updated frame", "leave anti_volumetric_locking out"
+    if keeping < USUAL and share > keeping * (1 + 1e-9):
+        points = " with one point a cell" if sparse(hub) else ""
+        return (
+            f"points that go from cell to cell: {transfer}, {functions} and {scheme}{points} at "
+            f"{share:.2g} of the stable step",
+            f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
+        )
+    if moves and simulation.largest(swelling)[0] > 1.5:  # what a cell cannot hold
+        return (
+            "points that are further apart than a cell (numerical fracture)",
+            WHOLE,
+        )
+    if hub.fixes and any(isinstance(fix, PairContact) for fix in hub.fixes.values()):
+        return "contact between points", "a smaller step, or method ulmpm/contacts"
+    if _strained_by_rates(simulation):
+        return (
+            "material linear at large strain: it adds up stress by rates, and gives back another "
+            "work than it took",
+            "material neo-hookean, which stores what it is given",
+        )
+    told = noises(Foreseen(hub, simulation, simulation.time))
+    fed = max(told, key=lambda noise: noise.share, default=None)
+    if fed is not None and fed.share > 0:
+        return fed.cause, fed.words[2]
+    if moves and jumps:
+        return f"points that go from cell to cell: the gradients of {functions} jump", smooth
+    if share > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
+        return "a step that is too large", f"{_step_of(hub, simulation, 0.3)} or less"
+    return "no cause that is known to do that", "another basis, transfer or scheme to compare with"
+
+
+def _time_across(simulation: Any) -> float:
+    """What waves take across a cell in bodies that nothing has deformed: later they may be softer.
+
+    Infinite where all are rigid.
+    """
+    fastest = fastest_wave(simulation)
+    return float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
+
+
+def _step_of(hub: Hub, simulation: Any, share: float) -> str:
+    """The words that make the step this share of the stable one."""
+    if hub.update.fixed_dt is not None:
+        return f"set_dt({share * simulation.limit:.3g})"
+    return f"dt_factor({share:g})"
+
+
+def _strained_by_rates(simulation: Any) -> bool:
+    """Whether a law in rate form bears stresses of a quarter of its shear modulus."""
+    rates = LinearElastic | FixedFrame
+    softest = min(
+        (float(np.min(b.laws.G)) for b in simulation.blocks if isinstance(b.laws, rates)),
+        default=np.inf,
+    )
+    return simulation.largest(_stress)[0] > 0.25 * softest
+
+
+def _stress(points: Fields) -> np.ndarray:
+    return points.particle("seq")
+
+
+def swelling(points: Fields) -> np.ndarray:
+    """(n,) volumes over those before the first step."""
+    return points.particle("volume") / points.reference_volume
+
+
+def has_grown(simulation: Any) -> bool:
+    """Whether energy has come from nowhere, as far as looks at it tell."""
+    clock = simulation.control.clock[0]
+    return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > IN_ALL))
+
+
+def growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
+    """What to say where energy comes from nowhere, and its cure."""
+    clock = simulation.control.clock[0]
+    if not has_grown(simulation):
+        return None
+    fast = clock.windows >= TOLD
+    cause, cure = cause_of_gain(hub, simulation)
+    much = (
+        f"{100 * clock.growth:.2g} % of the largest so far in the last hundred steps"
+        if fast
+        else f"{100 * clock.grown:.2g} % of the largest so far since the start"
+    )
+    message = (
+        f"step {simulation.step}, time {simulation.time:.6g}: energy comes from nowhere, "
+        f"{much} (kinetic + stored + dissipated - work). Known to do that here: {cause}"
+    )
+    return message, cure
+
+
+def grown_little(simulation: Any) -> bool:
+    """Whether the present state is a good one, as far as its energy and its last step tell."""
+    clock = simulation.control.clock[0]
+    swings = clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit
+    if swings or has_grown(simulation):
+        return False
+    if not clock.watch_energy:
+        return True
+    # The last look, too: noise that grows by half in a hundred steps is there in the state already.
+    before = clock.first_mean if clock.looks >= FEW else clock.first_balance
+    return bool(clock.balance - before < IN_ALL * unit_of(clock))
+
+
+def change_of_energy(simulation: Any) -> dict[str, str]:
+    """What the end of a run says of its energy, which the columns of a log have at two times."""
+    clock = simulation.control.clock[0]
+    if not clock.watch_energy or clock.looks <= FEW:
+        return {}
+    mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
+    # Not from `first_few`, which `forget_growth` changes.
+    share = 100 * (mean - clock.first_balance) / unit_of(clock)
+    words = "since the start (kinetic + stored + dissipated - work, at one time)"
+    return {"energy": f"{share:+.2f} % {words}"}
+
+
+def forget_growth(simulation: Any) -> None:
+    """Count from the present state on what energy grows by: that it has grown was told."""
+    clock = simulation.control.clock[0]
+    clock.first_few = clock.first_mean = clock.largest_mean
+    clock.windows, clock.grown = 0, 0.0

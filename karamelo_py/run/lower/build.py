@@ -1,0 +1,403 @@
+"""Lowering: the scene becomes the smallest set of arrays and tags that can run it.
+
+Read once at the start of every run: kinematics, basis, transfer, scheme, laws and fixes decide
+which fields exist (`karamelo-py check` prints them) and, by their types, what is compiled.
+"""
+
+import copy
+import os
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler import fields
+from karamelo_py.kernels.arrays import (
+    SUMS_WIDTH,
+    UPDATE_WIDTH,
+    VELOCITY_WIDTH,
+    Block,
+    Nodes,
+    Points,
+    Setup,
+    arrays_of,
+    made_of,
+    new_control,
+)
+from karamelo_py.kernels.averaging import NodalMean
+from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
+from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.rows import Insulated
+from karamelo_py.language.scene import Scene
+from karamelo_py.points.basis import carried, deformed
+from karamelo_py.points.boundary import ReflectingGrid
+from karamelo_py.points.kinematics import Line
+from karamelo_py.points.laws import (
+    can,
+    conductivity,
+    constrained_velocity,
+    heat_capacity,
+    initial_state,
+    law_kind,
+    specific_volume,
+    with_temperature,
+)
+from karamelo_py.points.laws.eos import taken_heat
+from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
+from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.points.transfers import Moment, lost_shares
+from karamelo_py.run.tiles.buffers import no_nodes
+from karamelo_py.run.tiles.tiles import Tiles
+from karamelo_py.run.timestep import sparse
+from karamelo_py.scene import boundary
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.lattice import table
+from karamelo_py.scene.solid import Solid
+from karamelo_py.script.errors import ScriptError, render_message
+
+PRECISIONS = {"double": np.float64, "single": np.float32}
+SERIAL_UP_TO = 20_000  # points; below, waking threads costs more than they save
+
+
+class State(NamedTuple):
+    """What outlives a run, of all points in the order of their ids; arrays (components, N)."""
+
+    count: int  # number of points, N
+    present: np.ndarray  # (N,) bool, False for points that were deleted
+    places: np.ndarray
+    v: np.ndarray
+    laws: dict[tuple, np.ndarray]  # state for each kind of law
+    fields: dict[type, np.ndarray]  # declared fields that are kept
+    contact: NamedTuple  # how solids touch, with what it remembers
+    last_dt: float  # the step that the velocities belong to the middle of
+    path: float  # how far points have gone
+
+
+def check_scene(hub: Hub) -> None:
+    """A scene without domain, method or solids cannot run: say what is missing."""
+    if hub.domain is None:
+        raise ScriptError(
+            "no domain is defined", hint="put dimension(2, xmin, xmax, ymin, ymax, h) before run"
+        )
+    if hub.update.method is None:
+        raise ScriptError(
+            "no method is defined", hint="put method(ulmpm, FLIP, linear, 0.99) before run"
+        )
+    if not hub.solids:
+        raise ScriptError(
+            "there is no solid to move",
+            hint="put solid(ID, region, regionID, points per cell, material, h, T0) before run",
+        )
+    method = hub.update.method
+    try:
+        method.check(hub)
+        check_heat(hub)
+    except ScriptError as error:
+        if error.place is None:
+            error.place, error.command = method.place, "method"
+        raise
+    boundary.check(hub)
+    check_rigid(hub)
+
+
+def check_rigid(hub: Hub) -> None:
+    """Refuse rigid bodies whose points would have domains that deform."""
+    method = hub.update.method
+    basis = type(method.basis)
+    if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
+        return
+    for solid in hub.solids.values():
+        if can(solid.material.law, constrained_velocity):
+            raise ScriptError(
+                f"solid '{solid.id}' is rigid, and the domains of its points would deform",
+                place=solid.place,
+                hint="a basis without domains that deform: linear, a spline, or ugimp",
+            )
+
+
+def thread_count(hub: Hub, points: int) -> int:
+    """Threads to use: as asked by --threads, else all cores for scenes that are worth it."""
+    from numba import config
+
+    available = int(config.NUMBA_NUM_THREADS)
+    if hub.settings.threads is not None:
+        if hub.settings.threads > available:
+            asked = hub.settings.threads
+            said = f"--threads {asked}: only {available} threads can be had here"
+            hub.console.warn(render_message("warning", said))
+        return max(1, min(hub.settings.threads, available))
+    usable = min(available, os.cpu_count() or 1)
+    if (crew := hub.settings.crew) is not None:
+        usable, points = max(1, usable // crew.beside), points // crew.size
+    return usable if points > SERIAL_UP_TO else 1
+
+
+def stable_conduction(hub: Hub) -> float:
+    """The stable step of conduction in undeformed bodies, of the worst.
+
+    h^2 / (4 d) times capacity over conductivity: half of the bound of lumped finite elements, since
+    points stand anywhere in a cell.
+    """
+    if not hub.update.thermal:
+        return np.inf
+    limits = [np.inf]
+    per_cell = hub.update.method.basis.nodes_per_cell
+    for solid in hub.solids.values():
+        law = solid.material.law
+        kappa = conductivity(law, 1.0)
+        if kappa > 0:
+            capacity = heat_capacity(law, 1.0) / specific_volume(law)
+            limits.append((solid.h / per_cell) ** 2 / (4 * hub.domain.dimension) * capacity / kappa)
+    return min(limits)
+
+
+def check_heat(hub: Hub) -> None:
+    """Heat needs a body that it can flow in."""
+    if hub.update.thermal and not any(
+        can(solid.material.law, initial_heat) for solid in hub.solids.values()
+    ):
+        raise ScriptError(
+            "the method is thermo-mechanical, and no solid has a temperature",
+            hint="give a material one: material(ID, linear, rho, E, nu, cp, kappa), or "
+            "temperature(...) with eos-strength",
+        )
+
+
+def lower(
+    hub: Hub, previous: State | None = None, *, ids: tuple[int, int] | None = None
+) -> tuple[Setup, Tiles]:
+    """Make the arrays of a run from the scene, taking over the state of points that exist.
+
+    With `ids`, from and to before, only with those points.
+    """
+    check_scene(hub)
+    method = hub.update.method
+    real = PRECISIONS[hub.settings.precision]
+    kin = method.kinematics(hub)
+    lattices = method.lattices(hub)
+    transfer = hub.update.transfer_tag(real)
+    basis = type(method.basis)(*(real(x) for x in method.basis))
+    count = sum(solid.count for solid in hub.solids.values())
+    tiles = Tiles(lattices, basis, count, sparse(hub))
+    contact = method.contact_between(hub, lattices)
+    if previous is not None:
+        method.resume(contact, previous.contact)
+    firsts = [solid.first_id for solid in hub.solids.values()]
+    control = new_control(hub.values.array, firsts, kin.dimension)
+    clock = control.clock[0]
+    clock.last_dt, clock.path = (previous.last_dt, previous.path) if previous else (0.0, 0.0)
+    clock.spacing = min(lattice.h for lattice in lattices)
+    clock.heat_limit = clock.heat_reference = stable_conduction(hub)
+    clock.kept = getattr(transfer, "alpha", 0)
+    clock.drift = np.inf  # the points are not sorted yet
+    grids = table(lattices, real)
+    if hub.update.boundary == "reflect":
+        grids = ReflectingGrid(*grids)
+    count = sum(lattice.node_count for lattice in lattices)
+    averaging = method.averaging(hub)
+    heat = Insulated()
+    if hub.update.thermal:
+        at_nodes = lower_nodes((NodalMean,), Line(), count, real)
+        heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes, len(hub.solids)))
+    owners = [method.frame, transfer, averaging, contact, heat, grids]
+    owners += [*hub.fixes.values(), hub.update.scheme, basis, method]
+    kinds = [
+        kind
+        for kind in fields.declared(owners, "node_fields")
+        if getattr(kind, "needed", lambda basis: True)(basis)
+    ]
+    if returns_loss(hub):
+        kinds.append(Lost)
+    if warms_by_friction(hub):
+        kinds.append(Rubbed)
+    at_nodes = lower_nodes(kinds, kin, count, real)
+    setup = Setup(
+        frame=method.frame,
+        kin=kin,
+        basis=basis,
+        transfer=transfer,
+        averaging=averaging,
+        contact=contact,
+        heat=heat,
+        grids=grids,
+        nodes=at_nodes,
+        buffers=tiles.empty_buffers(at_nodes, len(hub.solids)),
+        blocks=lower_blocks(
+            hub,
+            [solid if ids is None else part_of(solid, *ids) for solid in hub.solids.values()],
+            kin,
+            fields.declared(owners, "point_fields"),
+            tiles,
+            real,
+            previous,
+        ),
+        **no_nodes(),
+        control=control,
+    )
+    return setup, tiles
+
+
+def returns_loss(hub: Hub) -> bool:
+    """Whether kinetic energy that the transfer takes heats points of the scene.
+
+    FLIP with a share of 1 takes none that does not vanish with the step, unless it keeps moments.
+    XPIC has its own way (`kernels.loss.reflect`).
+    """
+    transfer = hub.update.transfer
+    keeps_all = getattr(transfer, "alpha", 0) == 1 and Moment not in getattr(
+        transfer, "point_fields", ()
+    )
+    if not lost_shares.defined(type(transfer)) or keeps_all:
+        return False
+    return any(can(solid.material.law, taken_heat) for solid in hub.solids.values())
+
+
+def warms_by_friction(hub: Hub) -> bool:
+    """Whether friction on the grid heats points of the scene."""
+    on_grid = hub.update.method.fields_per_solid
+    rubs = any(
+        fix.wall_friction is not None or (on_grid and fix.friction) for fix in hub.fixes.values()
+    )
+    return rubs and any(heat_capacity(s.material.law, 1.0) > 0 for s in hub.solids.values())
+
+
+def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> Nodes:
+    """Fields of `count` nodes, zero."""
+    d = kin.dimension
+    return Nodes(
+        sums=fields.records(count, SUMS_WIDTH[d], real),
+        update=fields.records(count, UPDATE_WIDTH[d], real),
+        velocity=fields.records(count, VELOCITY_WIDTH[d], real),
+        fields=tuple(fields.at_nodes(kind, kin, count, real) for kind in kinds),
+    )
+
+
+def part_of(solid: Solid, first: int, end: int) -> Solid:
+    """A solid like this one, with its points whose ids are from `first` to before `end`."""
+    begin, end = (min(max(i - solid.first_id, 0), solid.count) for i in (first, end))
+    other = copy.copy(solid)
+    for name, value in vars(solid).items():
+        if isinstance(value, np.ndarray) and len(value) == solid.count:
+            setattr(other, name, value[begin:end])
+    other.places = solid.places[begin:end]
+    other.first_id += begin
+    return other
+
+
+def lower_blocks(
+    hub, solids: Iterable[Solid], kin, kinds: tuple, tiles: Tiles, real: type,
+    previous: State | None,
+) -> tuple:  # fmt: skip
+    """One block for each kind of law, in the order in which the solids use them."""
+    alike: dict[tuple, list] = {}
+    for solid in solids:
+        alike.setdefault(law_kind(solid.material.law), []).append(solid)
+    return tuple(
+        lower_block(hub, members, kin, kinds, tiles, real, previous) for members in alike.values()
+    )
+
+
+def start(law, T0: float | None, kin, real: type) -> np.ndarray:
+    """The state (s,) of a point at rest."""
+    state = initial_state(law, kin, real(1))
+    return np.array(state if T0 is None else with_temperature(law, kin, state, real(T0)), real)
+
+
+def point_kinds(hub: Hub, real: type) -> tuple[type, ...]:
+    """The declared fields of the points, as far as no array of nodes has to be made for that."""
+    method, thermal = hub.update.method, hub.update.thermal
+    owners = [method.frame, hub.update.transfer_tag(real), method.averaging(hub)]
+    owners += [Conducting] if thermal else []
+    owners += [ReflectingGrid] if hub.update.boundary == "reflect" else []
+    owners += [*hub.fixes.values(), hub.update.scheme, method.basis, method]
+    return fields.declared(owners, "point_fields")
+
+
+def lower_block(
+    hub: Scene,
+    solids: list,
+    kin: NamedTuple,
+    kinds: tuple[type, ...],
+    tiles: Tiles,
+    real: type,
+    previous: State | None,
+) -> Block:
+    """The points of all solids whose law is of one kind."""
+    block = Block(*lower_points(hub, solids, kin, kinds, real), tiles.empty_tiling())
+    return block if previous is None else resumed(block, previous)
+
+
+def lower_points(
+    hub: Scene, solids: list, kin: NamedTuple, kinds: tuple[type, ...], real: type
+) -> tuple[Points, NamedTuple]:
+    """The points of solids whose laws are of one kind, and these laws."""
+    method = hub.update.method
+    known = [law_on(s.material.law, s.h, s.T0) for s in solids]
+    if hub.fields.rate_is_asked_for():
+        known = [with_rate(law, kin, s.h) for law, s in zip(known, solids, strict=True)]
+    laws_of_solids = list(dict.fromkeys(known))
+    laws = law_table(laws_of_solids, real)
+    ends = np.cumsum([s.count for s in solids])
+    count = int(ends[-1])
+
+    def joined(values: Iterable, dtype: type) -> np.ndarray:
+        """(n,) or (k, n): of the values of each solid, a number or column, or one for each point.
+
+        Nothing of the length of all points is made beside it.
+        """
+        array = np.empty(0)
+        for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):
+            if not array.size:
+                array = fields.rows_of_points((*value.shape[:-1], count), dtype)
+            array[..., end - s.count : end] = value
+        return array
+
+    states = (start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True))
+    places = joined((method.places(kin, s, real).T for s in solids), real)
+    here = places if method.frame.moves else places[: kin.dimension]
+    x = fields.rows_of_points((2, *here.shape), real)
+    x[:] = here
+    elastic = elastic_law(laws)
+    own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
+    points = Points(
+        x=x,
+        home=None if method.frame.moves else places,
+        v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),
+        mass=joined((s.mass for s in solids), real),
+        state=joined((state[:, None] for state in states), real),
+        material=joined((laws_of_solids.index(law) for law in known), np.int32),
+        grid=joined((method.lattice_of(hub, s) for s in solids), np.int32),
+        id=joined((np.arange(s.first_id, s.first_id + s.count) for s in solids), np.int64),
+        fields=tuple(fields.at_points(kind, kin, count, real) for kind in own),
+    )
+    return points, laws
+
+
+def resumed(block: Block, previous: State) -> Block:
+    """The block with what its points had before, as far as they were there."""
+    points = block.points
+    old = points.id < previous.count
+    ids = points.id[old]
+
+    def take(array: np.ndarray, before: np.ndarray | None) -> None:
+        if before is not None:
+            rows = min(array.shape[-2], len(before))
+            array[..., :rows, old] = before[:rows, ids]
+
+    take(points.x, previous.places)
+    take(points.v, previous.v)
+    take(points.state, previous.laws.get(without_rate(law_kind(block.laws))))
+    for one in points.fields:
+        take(one.array, previous.fields.get(type(one)))
+    present = np.ones(len(points.id), np.bool_)
+    present[old] = previous.present[ids]
+    return block if present.all() else chosen(block, np.flatnonzero(present))
+
+
+def chosen(block: Block, rows: np.ndarray) -> Block:
+    """The block with the points in these rows, in this order; they are to be sorted anew."""
+    points = block.points
+    arrays = (fields.some_points(array, rows) for _, array in arrays_of(points))
+    found = map(fields.as_rows_of_points, arrays)
+    return block._replace(points=made_of(points, found))

@@ -1,0 +1,107 @@
+"""Scenes that no memory of the machine holds are refused before their arrays are made.
+
+What is compared is the least that a run has to hold: of what would run nothing is refused.
+"""
+
+import gc
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import SUMS_WIDTH, UPDATE_WIDTH, VELOCITY_WIDTH, Block
+from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, part_of, point_kinds
+from karamelo_py.run.lower.sizes import point_fields
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.room import TooLarge, machine_memory, on_machine, share_of_machine
+from karamelo_py.scene.solid import Solid, own_grids
+from karamelo_py.script.errors import ScriptError, plural
+
+FEW = 100_000  # points; so many have room everywhere
+
+
+def check_room(hub: Hub, *, copied: bool) -> None:
+    """Refuse a scene that needs more memory than this machine has, and warn of what is not free.
+
+    Parameters
+    ----------
+    hub
+        The scene.
+    copied
+        Whether there will be a copy of the last good state, as in a run.
+
+    Raises
+    ------
+    ScriptError
+        At the line of the largest solid.
+    """
+    count = sum(solid.count for solid in hub.solids.values())
+    if count <= FEW or (there := machine_memory(on_machine(hub))) is None:
+        return
+    check_scene(hub)
+    crew, share = hub.settings.crew, share_of_machine(hub)
+    need = share * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
+    if need > there.free:
+        # Scenes of before, which point to themselves, stay until someone looks.
+        gc.collect()
+        there = machine_memory(on_machine(hub)) or there
+    if need <= there.free:
+        return
+    found = TooLarge(
+        plural(count, "point"),
+        need,
+        hub.domain.dimension,
+        _largest(hub).place,
+        f" for {crew.on_machine} of {crew.size} processes" if share < 1 else "",
+        share * least_bytes(hub, np.float32, copied) if hub.settings.precision == "double" else 0.0,
+    )
+    if need > there.whole:
+        raise found.error(there)
+    hub.warn(found.warning(there), place=found.place, hint=found.ways(there.free))
+
+
+def least_bytes(hub: Hub, real: type, copied: bool) -> float:
+    """The least that points, their copy, and the nodes of the cells that they fill take together.
+
+    Boxes of tiles, groups and what the program itself takes come on top.
+    """
+    kin = hub.update.method.kinematics(hub)
+    kinds = point_kinds(hub, real)
+    points, cells = 0, [0.0]
+    for solid in hub.solids.values():
+        if not solid.count:
+            continue
+        one = part_of(solid, solid.first_id, solid.first_id + 1)
+        block = Block(*lower_points(hub, [one], kin, kinds, real), None)
+        sizes = {name: size for name, _, size in point_fields(block)}
+        of_one = sum(sizes.values())
+        points += solid.count * (of_one + (of_one - sizes["x moved"] if copied else 0))
+        cells.append(_cells(solid))
+    d, per_cell = kin.dimension, hub.update.method.basis.nodes_per_cell**kin.dimension
+    of_node = np.dtype(real).itemsize * (SUMS_WIDTH[d] + UPDATE_WIDTH[d] + VELOCITY_WIDTH[d])
+    nodes = sum(cells) if own_grids(hub) else max(cells)
+    return points + nodes * per_cell * of_node
+
+
+def _largest(hub: Hub) -> Solid:
+    """The solid with most points."""
+    return max(hub.solids.values(), key=lambda solid: solid.count)
+
+
+def _cells(solid: Solid) -> float:
+    """How many cells a solid fills at least."""
+    ppc = getattr(solid, "ppc", 0)
+    return solid.count / ppc**solid.domain.dimension if ppc else 0.0
+
+
+def no_room(hub: Hub, error: MemoryError) -> ScriptError:
+    """The error for a scene whose arrays the system does not give, whoever would use them."""
+    nodes = sum(lattice.node_count for lattice in hub.lattices)
+    count = sum(solid.count for solid in hub.solids.values())
+    of_grid = nodes > count
+    found = ScriptError(
+        f"the arrays of {plural(nodes, 'node')} and {plural(count, 'point')} do not fit into "
+        f"memory: {str(error) or 'the system gives no more'}",
+        place=hub.domain.place if of_grid else _largest(hub).place,
+        hint="larger cells, or a smaller domain" if of_grid else "larger cells, or fewer points",
+    )
+    found.command = "dimension" if of_grid else "solid"
+    return found

@@ -1,0 +1,413 @@
+"""The tiles of a scene shared out among processes: who has which, and what they pass on.
+
+Each process has the points of tiles that lie beside each other. Nodes that several reach are summed
+by each of them, from the same boxes in the same order.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.fields import length_of_rows, rows_of_points
+from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, made_of
+from karamelo_py.run.mpi.bisection import bisected
+from karamelo_py.run.mpi.crew import Crew
+from karamelo_py.run.tiles.boxes import Boxes, Reached, between, extents, ragged, rows_of, steps_of
+from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, give_up
+from karamelo_py.run.tiles.distinct import distinct
+from karamelo_py.run.tiles.tiles import SHARES, Tiles, one_after_another, shares_of
+from karamelo_py.scene.lattice import Lattice
+
+IMBALANCE = 1.1  # largest share of the work over that after a new cut: above it tiles are cut anew
+# Times longer than across, from which on bodies are cut along long tiles: to go through rows of
+# nodes with gaps between them takes twice as long, and longer than to pass on more nodes.
+ROWS = 4
+FINE = 1000  # parts of the unit of costs, in which work is added up as whole numbers
+
+
+class Needs(NamedTuple):
+    """Nodes in use of a process: at each of k places of tiles of nodes, a box of them."""
+
+    place: np.ndarray  # (k,) ascending
+    lo: np.ndarray  # (k, d)
+    hi: np.ndarray  # (k, d)
+
+    def among(self, place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
+        """Of nodes (m, d) at places (m,): which have some of these; the first and last such."""
+        at = np.minimum(np.searchsorted(self.place, place), len(self.place) - 1)
+        low, high = np.maximum(begin, self.lo[at]), np.minimum(end, self.hi[at])
+        which = np.flatnonzero((self.place[at] == place) & (low <= high).all(axis=1))
+        return which, low[which], high[which]
+
+
+class SharedTiles(Tiles):
+    """Tiles of a process among others.
+
+    Parameters
+    ----------
+    crew
+        The processes.
+    one_place
+        Whether a node has others at its place, in grids that are alike: bodies in contact.
+    """
+
+    def __init__(
+        self,
+        crew: Crew,
+        lattices: Sequence[Lattice],
+        basis: Any,
+        points: int,
+        sparse: bool,
+        *,
+        one_place: bool,
+    ):
+        super().__init__(lattices, basis, points, sparse)
+        self.crew = crew
+        self.one_place = one_place
+        self._places = np.concatenate(
+            [
+                one.lo[: self.dimension] + one.h * self.size * np.argwhere(np.ones(shape, bool))
+                for one, shape in zip(lattices, self.shapes, strict=True)
+            ]
+        )
+        self.owner = np.zeros(self.count, np.int64)
+        # Memory of the points by block and field, and what is free by shape and type.
+        self._rooms: dict[tuple[int, str], np.ndarray] = {}
+        self._spare: dict[tuple, np.ndarray] = {}
+        self.foreign = np.zeros(int(self._first_node[-1] + self._nodes[-1].prod()), np.uint8)
+        self._marked = np.empty(0, np.int64)
+        self.given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
+        self._taken: dict[int, slice] = {}
+        self._links: dict[tuple[int, int], tuple[list, Any]] = {}  # by number of buffers, arrays
+        self._from = np.empty(0, np.int64)  # whose the boxes of others are
+
+    # --- points -----------------------------------------------------------------------------------
+
+    def share_out(self, work: np.ndarray) -> None:
+        """Cut the tiles into parts of nearly as much work each."""
+        if not self.direct:
+            rows = ROWS if self.long else 1
+            self.owner = bisected(self._places, work, self.crew.size, rows)
+
+    def balance(self, work: np.ndarray) -> bool:
+        """Cut the tiles anew where that is worth it; `work` (tiles,) is of the own points."""
+        before, work = self.owner, self.crew.added(work)
+
+        def largest() -> float:
+            return np.bincount(self.owner, work, self.crew.size).max()
+
+        now = largest()
+        self.share_out(work)
+        if now <= IMBALANCE * largest():
+            self.owner = before
+        return self.owner is not before
+
+    def loads(self, blocks: Sequence[Block]) -> np.ndarray:
+        """(blocks + 1, tiles) points of each sorted block, and nodes that all may reach."""
+        found = np.zeros((len(blocks) + 1, self.count), np.int64)
+        for row, block in zip(found, blocks, strict=False):
+            tiles, points = occupied(block.tiling)
+            row[tiles] = points
+            found[-1, tiles] += nodes_of(block.tiling)
+        return found
+
+    def partners(self, going: np.ndarray) -> list[int]:
+        """Others that this process has something for, or that have for it; how much, by rank."""
+        going[self.crew.rank] = 0
+        return np.flatnonzero(going + self.crew.swapped(going)).tolist()
+
+    def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
+        """Hand over the points that have gone to the tiles of others."""
+        tiles = [self.tiles_of(s, block.points) for block in s.blocks]
+        # Of nodes it is known what tiles reached from where their points were.
+        loads = self.loads(s.blocks)
+        loads[:-1] = [np.bincount(of, minlength=self.count) for of in tiles]
+        self.balance(work_of(loads, costs))
+        own, me = [self.owner[of] for of in tiles], self.crew.rank
+        others = self.partners(sum(np.bincount(to, minlength=self.crew.size) for to in own))
+
+        def parts(rank: int) -> list[list[np.ndarray]]:
+            return [
+                # Contiguous, unlike what a mask gives.
+                [np.compress(to == rank, array, axis=-1) for _, array in arrays_of(block.points)]
+                for block, to in zip(s.blocks, own, strict=True)
+            ]
+
+        come = list(self.crew.traded({rank: parts(rank) for rank in others}).values())
+        if not come:
+            return s
+        found = zip(s.blocks, own, *come, strict=True)
+        blocks = tuple(
+            block._replace(points=self._with(k, block.points, np.flatnonzero(to == me), parts))
+            for k, (block, to, *parts) in enumerate(found)
+        )
+        return s._replace(blocks=blocks)
+
+    def _with(
+        self, k: int, points: Points, stay: np.ndarray, come: list[list[np.ndarray]]
+    ) -> Points:
+        """Those of the points of block `k` that stay, and what has come.
+
+        They take the place of what was there at the sort before: fresh memory for all of them would
+        cost more than all else that a sort does.
+        """
+        count = len(stay) + sum(parts[0].shape[-1] for parts in come)
+        arrays = []
+        for i, (name, old) in enumerate(arrays_of(points)):
+            new = [parts[i] for parts in come]
+            shape = (*old.shape[:-1], count)
+            kind, size = (shape[:-1], old.dtype), length_of_rows(shape, old.dtype)
+            room = self._spare.pop(kind, np.empty(0, old.dtype))
+            if room.size < size:
+                room = np.empty(size + size // 8, old.dtype)
+            array = rows_of_points(shape, old.dtype, room)
+            for c in np.ndindex(shape[:-1]):
+                np.take(old[c], stay, out=array[c][: len(stay)], mode="clip")
+                array[c][len(stay) :] = np.concatenate([part[c] for part in new])
+            if (k, name) in self._rooms:
+                self._spare[kind] = self._rooms[k, name]
+            self._rooms[k, name] = room
+            arrays.append(array)
+            give_up(old)  # no two of the fields are there twice at a time
+            for parts in come:
+                parts[i] = None
+        return made_of(points, arrays)
+
+    def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
+        return float(self.crew.largest(np.array([super()._reach(s, block, x)]))[0])
+
+    # --- nodes ------------------------------------------------------------------------------------
+
+    def _boxes(self, s: Setup) -> Boxes:
+        own = self.own_boxes(s)
+        found = self.crew.traded(self.near(own, self.crew.everyone(self.hull(own))))
+        of_all = {self.crew.rank: own, **dict(sorted(found.items()))}
+        self._of = np.repeat(list(of_all), [len(boxes.grid) for boxes in of_all.values()])
+        return Boxes(*(np.concatenate(same) for same in zip(*of_all.values(), strict=True)))
+
+    def empty_tiling(self) -> Tiling:
+        return super().empty_tiling()._replace(share=np.zeros(2 * SHARES + 1, np.int64))
+
+    def lay_out(self, s: Setup) -> None:
+        for _, link in self._links.values():
+            self.crew.unlink(link)
+        self._links.clear()
+        super().lay_out(s)
+
+    def _shares(self, s: Setup) -> np.ndarray:
+        self._border_first(s)
+        return super()._shares(s)
+
+    def _border_first(self, s: Setup) -> None:
+        """Let the tiles that others wait for be visited first."""
+        awaited = np.zeros(len(self._of), bool)
+        for box, _, _ in self._passed.values():
+            awaited[box] = True
+        begin = 0
+        for block in s.blocks:
+            tiling = block.tiling
+            own = awaited[begin : begin + tiling.count[0]]
+            begin += tiling.count[0]
+            border = np.count_nonzero(own)
+            order = np.argsort(~own, kind="stable")
+            tiling.order[: len(order)] = order
+            tiling.count[1:] = 2 * SHARES, SHARES
+            for k, tiles in enumerate((order[:border], order[border:])):
+                ranges = one_after_another(tiling.range[tiles])
+                share = k * border + shares_of(ranges, SHARES, SHARES + 1)
+                tiling.share[k * SHARES : (k + 1) * SHARES + 1] = share
+
+    def own_boxes(self, s: Setup) -> Boxes:
+        """The boxes of the own tiles, with their place in the order of one process."""
+        order = [k * self.count + occupied(block.tiling)[0] for k, block in enumerate(s.blocks)]
+        return super()._boxes(s)._replace(order=np.concatenate(order))
+
+    def hull(self, boxes: Boxes) -> np.ndarray:
+        """(grids, 2 d) the least of the first tiles of nodes, and of the last times -1."""
+        grid, low, high = self._around(boxes)
+        found = np.full((len(self._nodes), 2 * self.dimension), self._nodes.max() + 1)
+        np.minimum.at(found, grid, np.concatenate([low, -high], axis=1))
+        return found
+
+    def near(self, boxes: Boxes, hulls: list[np.ndarray]) -> dict[int, Boxes]:
+        """Those of own boxes that may reach tiles of nodes of others with these hulls, by rank."""
+        grid, low, high = self._around(boxes)
+        d, of_all = self.dimension, np.array(hulls)
+        own = of_all[self.crew.rank]
+        # Both or neither of two see that they meet.
+        meet = _meet(own[:, :d], -own[:, d:], of_all).any(axis=1)
+        meet[self.crew.rank] = False
+        found = {}
+        for rank in np.flatnonzero(meet).tolist():
+            chosen = _meet(low, high, of_all[rank][grid])
+            found[rank] = Boxes(*(array[chosen] for array in boxes))
+        return found
+
+    def _around(self, boxes: Boxes) -> tuple[np.ndarray, ...]:
+        """The grids of boxes, or one for all at a place; the first and last tiles of nodes."""
+        grid = np.zeros_like(boxes.grid) if self.one_place else boxes.grid
+        return grid, boxes.lo // self.node_size, boxes.hi // self.node_size
+
+    def _place(self, tile: np.ndarray) -> np.ndarray:
+        """The number of the place of a tile of nodes."""
+        return tile % int(self._first_of_nodes[1]) if self.one_place else tile
+
+    def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
+        """What own boxes reach, and what of others' is at nodes in use here, as more boxes."""
+        _, reached = super()._reached(boxes)
+        of, place = self._of[reached.box], self._place(reached.tile)
+        me = self.crew.rank
+        self._needs = {
+            int(rank): _needs(place[here], reached.begin[here], reached.end[here])
+            for rank in distinct(of)
+            for here in [of == rank]
+        }
+        own, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
+        self._passed, self._from = {}, of[:0]
+        if not len(own):
+            return Boxes(*(array[:0] for array in boxes)), Reached(*(a[own] for a in reached))
+        for rank, needs in self._needs.items():
+            if rank != me:
+                which, low, high = needs.among(place[own], reached.begin[own], reached.end[own])
+                self._passed[rank] = reached.box[own][which], low, high
+        which, low, high = self._needs[me].among(
+            place[others], reached.begin[others], reached.end[others]
+        )
+        pieces = others[which]
+        self._from, box = of[pieces], reached.box[pieces]
+        # What they are of their rows is known already.
+        more = Boxes(boxes.order[box], boxes.grid[box], low, high, boxes.rows[box])
+        count = np.count_nonzero(self._of == me)
+        found = Reached(*(array[np.append(own, pieces)] for array in reached))
+        found.box[len(own) :] = count + np.arange(len(pieces))
+        found.begin[len(own) :], found.end[len(own) :] = low, high
+        return Boxes(
+            *(np.append(a[:count], b, axis=0) for a, b in zip(boxes, more, strict=True))
+        ), found
+
+    def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
+        first, steps = super()._number(s, boxes)
+        self.given = {
+            rank: _rows(low, high, first[which], steps[which])
+            for rank, (which, low, high) in self._passed.items()
+            if len(which)  # where hulls meet there need not be a node of both
+        }
+        ends = np.append(0, np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1)))
+        own = len(ends) - 1 - len(self._from)
+        self._taken = {}
+        for rank in distinct(self._from):
+            begin, end = np.searchsorted(self._from, [rank, rank + 1])
+            self._taken[int(rank)] = slice(int(ends[own + begin]), int(ends[own + end]))
+        return first, steps
+
+    def _see_nodes(
+        self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
+    ) -> None:
+        self.reached = tiles, begin, end
+        # Of those that have a node in use the first counts it.
+        self.foreign[self._marked] = 0
+        found = [self._marked[:0]]
+        for rank, needs in self._needs.items():
+            if rank < self.crew.rank:
+                which, low, high = needs.among(self._place(tiles), begin, end)
+                found.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
+        self._marked = np.concatenate(found)
+        self.foreign[self._marked] = 1
+
+    def reached_by(self, s: Setup) -> tuple[np.ndarray, ...]:
+        """Of the nodes in use here what `spans_of_all` asks for."""
+        return (s.spans[1 : 1 + s.spans[0, 0]],) if self.direct else self.reached
+
+    def spans_of_all(self, reached: Iterable[tuple[np.ndarray, ...]]) -> np.ndarray:
+        """(k, 2) spans of the nodes in use, from what all processes reach.
+
+        Where points give straight to the nodes one process has them all.
+        """
+        found = [np.concatenate(of) for of in zip(*reached, strict=True)]
+        return found[0] if self.direct else self.spans_of(*found)
+
+    def give(self, s: Setup, number: int, what: int) -> None:
+        """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
+        link = self._links.get((number, what))
+        if link is None:
+            link = self._link(chosen_of(buffers_of(s)[number].nodes, what))
+            self._links[number, what] = link
+        packed, self._under_way = link
+        for array, rows, room in packed:
+            np.take(array, rows, axis=0, out=room, mode="clip")
+        self.crew.start(self._under_way)
+
+    def take(self) -> None:
+        """Wait for what others give."""
+        self.crew.finish(self._under_way)
+
+    def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:
+        """What is packed of these arrays of the buffers, and the requests that pass it on."""
+        packed, given, taken = [], [], []
+        for array in arrays:
+            for rank, rows in self.given.items():
+                room = np.empty((len(rows), array.shape[1]), array.dtype)
+                packed.append((array, rows, room))
+                given.append((rank, room))
+            taken += [(rank, array[rows]) for rank, rows in self._taken.items()]
+        return packed, self.crew.linked(given, taken)
+
+
+def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:
+    """(tiles,) cost of points and nodes in whole numbers, from so many (k, tiles) of each kind."""
+    return np.rint(FINE * (costs @ loads)).astype(np.int64)
+
+
+def nodes_of(tiling: Tiling) -> np.ndarray:
+    """How many nodes the points of each occupied tile may reach."""
+    count = tiling.count[0]
+    if tiling.rows.shape[1]:
+        return np.maximum(np.diff(tiling.rows[:count]) + 1, 0).sum(axis=(1, 2), dtype=np.int64)
+    lo, hi = np.split(tiling.box[:count], 2, axis=1)
+    return np.prod(hi - lo + 1, axis=1)
+
+
+def occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the occupied tiles of a block, and how many points they have."""
+    count = tiling.count[0]
+    return tiling.number[:count], np.diff(tiling.range[:count], axis=1)[:, 0]
+
+
+def sized(points: Points, count: int, *, anew: bool = False) -> Points:
+    """Points of the kind of `points`, so many: these, where they are as many, if not `anew`."""
+    if points.mass.size == count and not anew:
+        return points
+    shapes = [((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
+    empty = [rows_of_points(*shape) for shape in shapes]
+    return made_of(points, empty)
+
+
+def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
+    """Points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
+    made = sized(points, sum(part[0].shape[-1] for part in parts), anew=True)
+    for (_, array), same in zip(arrays_of(made), zip(*parts, strict=True), strict=True):
+        np.concatenate(same, axis=-1, out=array)
+    return made
+
+
+def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
+    """The least and largest nodes of boxes (m, d) at each place (m,)."""
+    order = np.argsort(place, kind="stable")
+    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
+    return Needs(place[order][starts], *extents(starts, begin[order], end[order]))
+
+
+def _meet(low: np.ndarray, high: np.ndarray, hulls: np.ndarray) -> np.ndarray:
+    """(..., k) whether boxes (k, d) have something in common with hulls (..., k, 2 d)."""
+    d = low.shape[1]
+    return ((low <= -hulls[..., d:]) & (hulls[..., :d] <= high)).all(axis=-1)
+
+
+def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Rows of the buffers of all nodes from `lo` to `hi` (k, d), box after box."""
+    shape = hi - lo + 1
+    box, left = ragged(np.prod(shape, axis=1))
+    inner = steps_of(shape)[box]
+    places = lo[box] + left[:, None] // inner % shape[box]
+    return first[box] + (places * steps[box]).sum(axis=1)

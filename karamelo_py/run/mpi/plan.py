@@ -1,0 +1,190 @@
+"""What several processes would have of a scene, and pass on in a step: their plan, made by one."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
+from karamelo_py.kernels.step import Fused, Staged, step
+from karamelo_py.kernels.sums import given
+from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
+from karamelo_py.run.lower.sizes import memory_of
+from karamelo_py.run.mpi.crew import Crew
+from karamelo_py.run.mpi.partition import SharedTiles, occupied
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.tiles.boxes import Boxes, numbers
+from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, no_nodes, summed
+from karamelo_py.run.tiles.tiles import SHARES
+from karamelo_py.run.timestep import sparse
+from karamelo_py.styles.fixes.pairs import SENT, PairContact
+
+MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
+
+
+class Share(NamedTuple):
+    """What one process has.
+
+    Attributes
+    ----------
+    points, tiles, nodes
+        Points, occupied tiles of them, nodes in use.
+    others
+        Processes that it passes something on to.
+    given
+        Bytes that it passes on in a step.
+    memory, known
+        Bytes that it touches in steps, and of a copy of its last good state; those of them of what
+        each process knows of the whole scene.
+    """
+
+    points: int
+    tiles: int
+    nodes: int
+    others: int
+    given: int
+    memory: int
+    known: int
+
+
+class _Sums(NamedTuple):
+    """Sweeps nothing, and notes which arrays of the nodes are given to in a step."""
+
+    found: list
+
+
+@sweep_points.on(_Sums)
+def _sweep_points_sums(mode, visit, s, block, then, gathers, scatters, dt):
+    return None
+
+
+@sweep_nodes.on(_Sums)
+def _sweep_nodes_sums(mode, task, kin, nodes, ranges, dt):
+    return None
+
+
+@sum_buffers.on(_Sums)
+def _sum_buffers_sums(mode, quantities, s, due):
+    if due:
+        mode.found.append((given(quantities, s.kin), s.nodes))
+
+
+class _Pretended(Crew):
+    """One of several processes that are not there."""
+
+    def __init__(self, rank: int, size: int, others: list[tuple[SharedTiles, Boxes]] | None = None):
+        self.rank, self.size, self.others = rank, size, others
+
+    def everyone(self, hull: Any) -> list:
+        self.hulls = [tiles.hull(boxes) for tiles, boxes in self.others]
+        return self.hulls
+
+    def traded(self, things: dict[int, Any]) -> dict[int, Any]:
+        parts = {rank: self.others[rank] for rank in things}
+        return {r: tiles.near(own, self.hulls)[self.rank] for r, (tiles, own) in parts.items()}
+
+
+def bytes_of_node(simulation: Simulation) -> int:
+    """Bytes that are passed on in a step of each node that tiles of another process reach."""
+    s, sums = simulation.setup, _Sums([])
+    control = s.control
+    kept = control.values.copy(), control.clock.copy(), control.totals.copy()
+    visits = Staged() if simulation.staged else Fused()
+    step(simulation.hub.update.scheme, visits, sums, s, NoHooks(), True)
+    control.values[:], control.clock[:], control.totals[:] = kept
+    total = 0
+    for what, nodes in sums.found:
+        total += sum(array.itemsize * array.shape[1] for array in chosen_of(nodes, what))
+    return total
+
+
+def plan(simulation: Simulation, ranks: int) -> list[Share]:
+    """The shares of so many processes in a scene whose points are sorted."""
+    s, hub = simulation.setup, simulation.hub
+    method = hub.update.method
+    lattices, one_place = method.lattices(hub), method.fields_per_solid
+    per_node = bytes_of_node(simulation)
+
+    def tiles_of(crew: Crew) -> SharedTiles:
+        return SharedTiles(
+            crew, lattices, s.basis, simulation.count, sparse(simulation.hub), one_place=one_place
+        )
+
+    of_all = [tiles_of(_Pretended(rank, ranks)) for rank in range(ranks)]
+    of_all[0].share_out(of_all[0].loads(s.blocks)[:-1].sum(axis=0))
+    parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
+    boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
+    for tiles in of_all:
+        tiles.crew.others = boxes
+    return [
+        _share(simulation, part, tiles, per_node) for part, tiles in zip(parts, of_all, strict=True)
+    ]
+
+
+def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) -> Share:
+    none = s.nodes._replace(
+        sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
+    )  # boxes of nothing: only their places matter
+    tiles.lay_out(s._replace(buffers=tiles.empty_buffers(none, len(s.blocks))))
+    given = [array for one in buffers_of(simulation.setup) for array in summed(one.nodes)]
+    row = sum(array.itemsize * array.shape[1] for array in given)
+    boxes = 0 if tiles.direct else row * tiles.rows
+    tilings = [block.tiling for block in s.blocks]
+    points = sum(int(occupied(one)[1].sum()) for one in tilings)
+    rows = sum(map(len, tiles.given.values()))
+    count = sum(int(one.count[0]) for one in tilings)
+    nodes = len(numbers(s.spans))
+    memory = memory_of(simulation, s, boxes)
+    given = rows * per_node
+    return Share(points, count, nodes, len(tiles.given), given, sum(memory), memory.known)
+
+
+def _part(s: Setup, own: np.ndarray) -> Setup:
+    """Those tiles of which `own` says so."""
+    blocks = []
+    for block in s.blocks:
+        tiling = block.tiling
+        which = np.flatnonzero(own[occupied(tiling)[0]])
+        rows = {name: getattr(tiling, name)[which] for name in Tiling._fields[2:]}
+        rows |= {
+            "count": np.array([len(which), *tiling.count[1:]]),
+            "share": np.zeros(2 * SHARES + 1, np.int64),
+        }
+        blocks.append(block._replace(tiling=tiling._replace(**rows)))
+    return s._replace(blocks=tuple(blocks), **no_nodes(), heat=None)
+
+
+def told(simulation: Simulation, ranks: int) -> list[str]:
+    """Lines that say what so many processes would have, and pass on."""
+    shares = plan(simulation, ranks)
+    columns = np.array(shares)
+    mean = columns[:, 0].mean()
+    lines = [f"shared out among {ranks} processes{'':<6}least     largest"]
+    columns[:, -2:] >>= 20
+    words = (
+        "points", "tiles", "nodes in use", "others to talk to", "bytes given in a step",
+        "memory, in MiB", "known to each, in MiB",
+    )  # fmt: skip
+    lines += [
+        f"  {word:<30}{low:>8} {high:>11}"
+        for word, low, high in zip(words, columns.min(axis=0), columns.max(axis=0), strict=True)
+    ]
+    over = columns[:, 0].max() / mean if mean else 1.0
+    lines.append(f"  {'largest share over the mean':<30}{'':>8} {over:>11.2f}")
+    if simulation.tiles.direct:
+        lines.append("  so few points are not shared out: the first process has them all")
+    elif over > MAY_CHANGE:
+        lines.append("  tiles are not cut: fewer processes would wait less for the largest share")
+    if acting := simulation.acting_from_python:
+        blocks = simulation.setup.blocks
+        moved = sum(array.nbytes for block in blocks for _, array in arrays_of(block.points))
+        lines.append(
+            f"  {acting[0]} acts on the whole scene: in each step the first process takes in and "
+            f"gives back {moved >> 20} MiB, and has the memory of a single one"
+        )
+    for fix in simulation.hub.fixes.values():
+        if isinstance(fix, PairContact):
+            lines.append(
+                f"  fix {fix.style} '{fix.id}' has the first process look at all points that may "
+                f"touch ({fix.sent(simulation)} now), and needs {SENT} bytes there for each"
+            )
+    return lines

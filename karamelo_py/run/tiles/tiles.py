@@ -1,0 +1,509 @@
+"""The grids cut into tiles: which points lie in which, which nodes they give to or are in use."""
+
+from collections.abc import Sequence
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.compiler.items import addresses_of_rows
+from karamelo_py.compiler.lanes import lanes_for
+from karamelo_py.compiler.threads import Serial, Threaded
+from karamelo_py.kernels.arrays import (
+    ADD,
+    CLEAR,
+    TAKE,
+    Block,
+    Buffers,
+    Nodes,
+    Points,
+    Setup,
+    Tiling,
+    arrays_of,
+)
+from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.sorting import (
+    Cut,
+    Order,
+    Sight,
+    find_rows,
+    find_tiles,
+    sort_points,
+    widest,
+)
+from karamelo_py.kernels.sweep import ROUNDING
+from karamelo_py.points.basis import first_node, shape_size
+from karamelo_py.points.kinematics import planar
+from karamelo_py.run.tiles.boxes import (
+    Boxes,
+    Reached,
+    extents,
+    joined_spans,
+    numbered,
+    ragged,
+    ranges_of_shares,
+    rows_of,
+    steps_of,
+    used,
+    without,
+)
+from karamelo_py.run.tiles.buffers import buffers_of, grow, room_of, summed
+from karamelo_py.scene.lattice import MAX_NODES, Lattice
+
+# By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
+# stay in caches, large ones share less of their nodes with others.
+TILES = {1: 64, 2: 24, 3: 8}
+NODES = {1: 64, 2: 8, 3: 8}
+LONGER = 16  # times, along the rows of nodes in space, where cells have one point: boxes have more
+#             nodes than points then, and few tiles would have few points
+SHARES = 64  # of the points of a block, nearly equal: threads share them out
+# Times the nodes: boxes that can have no more rows are made at once, on whole lines of the caches;
+# pages that none touches cost no memory. Larger ones grow.
+AT_ONCE = 8
+DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
+PART = 2000  # points that are worth a part of their own where threads sort
+DRIFT = 1.0  # cells that points may go at most before they are sorted again
+# By dimension, the least they may go: boxes are smaller then, and more points beside each other see
+# the same nodes; in the plane that brings less than it costs to sort.
+LEAST_DRIFT = {1: DRIFT, 2: DRIFT, 3: 0.25}
+STEPS = 32  # that are to be between two sorts where points may go further for that
+# The same where points give straight to the nodes: it costs only that more nodes are in use.
+DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
+
+
+class Tiles:
+    """Sorts the points of a setup by tile; says what nodes the points of a tile may reach.
+
+    Attributes
+    ----------
+    size
+        (d,) cells of a tile.
+    count
+        Number of tiles, of all grids.
+    occupied
+        How many of them hold points.
+    direct
+        Whether points give straight to the nodes, tile after tile: scenes of few points.
+    sorts
+        How often points were sorted.
+    rows
+        How many rows of the buffers the boxes of all tiles take.
+    threads, mode
+        How many sum at nodes and sort, and how.
+    """
+
+    threads = 1
+    mode: Serial | Threaded = Serial()
+
+    def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int, sparse: bool):
+        self.direct = points <= DIRECT_UP_TO
+        self.dimension = d = lattices[0].dimension
+        self.size, self.node_size = np.full(d, TILES[d]), np.full(d, NODES[d])
+        self.long = sparse and d == 3
+        if self.long:
+            self.size[-1] *= LONGER
+            self.node_size[:] = 1, 1, self.size[-1]
+        self.per_cell = type(basis).nodes_per_cell
+        self.least_nodes = type(basis).least_nodes
+        self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
+        self.sorts = self.sets = self.rows = 0
+        self.occupied = 0
+        # By grid and direction: nodes, cells, and so on.
+        self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
+        self._cells = np.array([x.cells[:d] for x in lattices], np.int64)
+        self._first_node = np.array([x.first for x in lattices], np.int64)
+        self._steps = steps_of(self._nodes)
+        self.shapes = -(-self._cells // self.size)
+        self.first = numbered(self.shapes)
+        # Points without a domain reach no further than two cells from those of their tile.
+        widest = np.minimum((self.size + 4) * self.per_cell + 1 + 2 * self.beyond, self._nodes)
+        most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
+        shaped = shape_size(type(basis), d) > 0
+        self._most_rows = inf if shaped else most
+        rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
+        self._most_in_box = int(rows) if self._by_rows(shaped) else 0  # rows of a box, at most
+        self.count = int(self.first[-1])
+        self._cut = Cut(self.size, self.shapes, self.first)
+        tiles = -(-self._nodes // self.node_size)
+        self._tile_steps = steps_of(tiles)
+        self._first_of_nodes = numbered(tiles)
+        # Of all buffers of a scene: count, first and parts.
+        self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
+
+    def _by_rows(self, shaped: bool) -> bool:
+        """Whether it is known of each row of a box what of it points may reach.
+
+        Rows of nodes are tiles of nodes then. Of the boxes around a bar that has spread at one end
+        points reach little at the other.
+        """
+        return self.long and not shaped and not self.direct
+
+    def empty_tiling(self) -> Tiling:
+        """Room for the tiles of a block."""
+        return Tiling(
+            count=np.array([0, 1, 0]),
+            share=np.zeros(SHARES + 1, np.int64),
+            order=np.arange(self.count + 1),
+            range=np.zeros((self.count + 1, 2), np.int64),
+            grid=np.zeros(self.count + 1, np.int64),
+            number=np.zeros(self.count + 1, np.int64),
+            box=np.zeros((self.count + 1, 2 * self.dimension), np.int64),
+            rows=np.zeros((self.count + 1, self._most_in_box, 2), np.int16),
+            buffer=np.zeros((self.count + 1, 5), np.int64),
+            report=np.zeros((self.count + 1, 10)),
+        )
+
+    def empty_buffers(self, nodes: Nodes, blocks: int) -> Buffers:
+        """Buffers for what points of so many blocks give to `nodes`."""
+        most = blocks * self._most_rows
+        rows = int(most) if most <= AT_ONCE * len(nodes.sums) else 0
+        given = tuple(one for one in nodes.fields if getattr(type(one), "summed", False))
+        of = nodes._replace(fields=given)
+        if not self.direct:
+            of = Nodes(
+                *(room_of(rows, array) for array in of[:-1]),
+                tuple(type(one)(room_of(rows, one.array)) for one in given),
+            )
+        self.sets += 1
+        return Buffers(of, *self._layout, self.sets - 1)
+
+    def in_use(self, s: Setup) -> list[tuple[str, np.ndarray, int]]:
+        """The arrays that a sort changes beside the points, and how many rows of them are in use.
+
+        All others follow from them (`lay_out`).
+        """
+        return [
+            (f"tiling/{k}/{name}", getattr(block.tiling, name), rows)
+            for k, block in enumerate(s.blocks)
+            for name, rows in in_use(block.tiling)
+        ]
+
+    def empty_nodes(self, s: Setup) -> None:
+        """What points gave to the nodes in use becomes zero."""
+        _empty(s, used(s.spans)[1:])
+        if not self.direct:
+            for one in buffers_of(s):
+                for array in summed(one.nodes):
+                    array[: self.rows] = 0
+
+    def sort(self, s: Setup) -> None:
+        """Sort all points by tile and find the nodes in use; sums at others become zero.
+
+        Those of nodes in use begin anew in the next step, and boxes are zero between two steps.
+        """
+        before = used(s.spans)[1:].copy()
+        clock = s.control.clock[0]
+        most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (DRIFT, STEPS)
+        limit = min(max(LEAST_DRIFT[self.dimension], steps * clock.pace), most)
+        clock.drift_limit = limit if s.frame.moves else np.inf
+        clock.drift = clock.pace = 0.0
+        occupied = [self._sort_block(s, block) for block in s.blocks]
+        self.occupied = len(set().union(*(tiles.tolist() for tiles in occupied)))
+        self.lay_out(s)
+        _empty(s, without(before, used(s.spans)[1:]))
+        self.sorts += 1
+
+    def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
+        """How many cells from where points lie now what gives to nodes may lie."""
+        far = 0.0
+        if len(x) > self.dimension:
+            far = widest(s.kin, s.basis, s.grids, x, block.points.grid)
+        cells = float(self._cells.max())
+        rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
+        drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
+        return far + drift if far < cells else cells  # also where it is not a number
+
+    def _where(self, s: Setup, points: Points) -> np.ndarray:
+        """The places (w, n) that weights belong to."""
+        return points.x[s.control.clock[0].now] if points.home is None else points.home
+
+    def tiles_of(self, s: Setup, points: Points) -> np.ndarray:
+        """(n,) the tile of each point."""
+        x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
+        tile = np.empty(x.shape[1], np.int64)
+        find_tiles(self.mode, planar(s.kin), s.grids, self._cut, x, points.grid, ends, tile)
+        return tile
+
+    def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
+        """Sort the points of a block; the numbers of the tiles that they are in."""
+        points, tiling = block.points, block.tiling
+        x = self._where(s, points)
+        reach = self._reach(s, block, x)
+        # Some parts for each thread: tiles are not of like size, and others may need a core. Of few
+        # points, or fewer than tiles, one thread has sorted all before several have met.
+        parts = min(4 * self.threads, x.shape[1] // PART, 4 * x.shape[1] // self.count)
+        if self.threads == 1 or parts < 2:
+            parts, mode = 1, Serial()
+        else:
+            mode = self.mode
+        scratch = np.empty((4, x.shape[1]), np.int64)
+        found = Order(
+            lanes_for(8 * x.itemsize).width,
+            np.empty((parts, self.count), np.int64),
+            np.empty(parts + 1, np.int64),
+            np.empty((2, self.count, self.dimension), np.int64),
+            np.empty((parts, 2, self.size.prod()), np.int32),
+            *scratch[:2],
+            scratch[2:],
+        )
+        top, least = self._nodes - 1, self.least_nodes - 1
+        offset = first_node(s.basis, s.grids.h[0])
+        sight = Sight(top, self.per_cell, self.beyond, least, reach, offset)
+        kin, of, ids = planar(s.kin), points.grid, points.id
+        rows = addresses_of_rows(array for _, array in arrays_of(points))
+        sort_points(mode, kin, s.grids, sight, self._cut, x, of, ids, found, rows)
+        ends = found.ends[-1]
+        begins = np.append(0, ends[:-1])
+        occupied = np.flatnonzero(ends > begins)
+        count = len(occupied)
+        shares = 1 if self.direct else SHARES
+        tiling.count[:2] = count, shares
+        tiling.number[:count] = occupied
+        tiling.range[:count] = np.stack([begins[occupied], ends[occupied]], axis=1)
+        tiling.share[:] = shares_of(tiling.range[:count], shares, len(tiling.share))
+        grid = np.searchsorted(self.first, occupied, side="right") - 1
+        tiling.grid[:count] = grid
+        tiling.box[:count] = np.concatenate(found.boxes[:, occupied], axis=1)
+        if self._most_in_box:
+            find_rows(mode, s.kin, s.grids, sight, x, tiling, parts)
+        return occupied
+
+    def box_bytes(self, s: Setup) -> int:
+        """Bytes of the boxes of all tiles."""
+        if self.direct:
+            return 0
+        given = [array for one in buffers_of(s) for array in summed(one.nodes)]
+        return self.rows * sum(array.itemsize * array.shape[1] for array in given)
+
+    def lay_out(self, s: Setup) -> None:
+        """Lay the boxes of all blocks one after another; find the tiles of nodes that they reach.
+
+        Everything follows from the boxes of the tiles.
+        """
+        spans, *found = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
+        s.buffers.count[:] = len(found[1]) - 1, self.direct
+        spans = np.concatenate([[[len(spans), 0]], spans])
+        rooms = s.spans, s.ranges, *s.buffers[2:4]
+        for room, rows in zip(rooms, (spans, *found), strict=True):
+            grow(room, len(rows))
+            room[: len(rows)] = rows
+
+    def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
+        """The same as `_parts_to_sum` where points are few: one share, a part for each span.
+
+        Boxes have the numbers of the grids.
+        """
+        boxes = Tiles._boxes(self, s)
+        steps = self._steps[boxes.grid]
+        self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
+        spans = joined_spans(self._parts(boxes.grid, boxes.lo, boxes.hi, 0, steps))
+        parts = np.ones((len(spans), 10), np.int64)
+        parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
+        parts[:, 9] = CLEAR
+        return (
+            spans,
+            ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1),
+            [0, len(spans)],
+            parts,
+        )
+
+    def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
+        """Spans and ranges of the nodes in tiles that boxes reach; first of each share, and parts.
+
+        Nodes are in the order of the shares of points that have most of them: what a thread has
+        given to is in its caches, and to get it from those of another takes longer than to sum it.
+        """
+        boxes, reached = self._reached(self._boxes(s))
+        first, steps = self._number(s, boxes)
+        # The largest part first: mostly it has all the nodes that others reach.
+        order = np.lexsort((boxes.order[reached.box], -reached.size, reached.tile))
+        shares = self._shares(s)
+        own = order[reached.box[order] < len(shares)][::-1]  # the largest last
+        beside = self._beside(reached.tile, boxes.grid[reached.box])
+        owner = np.zeros(self._first_of_nodes[-1], np.int64)
+        owner[beside[own]] = shares[reached.box[own]]
+        owner = owner[beside]
+        order = order[np.argsort(owner[order], kind="stable")]
+        box, tile, begin, end, _ = (array[order] for array in reached)
+        starts = np.flatnonzero(np.diff(tile, prepend=-1))
+        grid = boxes.grid[box]
+        own_begin, own_end = extents(starts, begin, end)
+        more = ((begin[starts] != own_begin) | (end[starts] != own_end)).any(axis=1)
+        parts = self._parts(grid, begin, end, first[box], steps[box])
+        parts[:, 9] = ADD
+        parts[starts[~more], 9] = TAKE
+        own = self._parts(grid[starts], own_begin, own_end, 0, 0)
+        parts = np.insert(parts, starts[more], own[more], axis=0)
+        self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
+        owner = _evenly(own, beside[order][starts])
+        firsts = np.append(starts + np.cumsum(more) - more, len(parts))
+        rows = np.stack(rows_of(own), axis=1)
+        ranges = ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
+        return (
+            joined_spans(own),
+            ranges,
+            firsts[np.searchsorted(owner, np.arange(SHARES + 1))],
+            parts,
+        )
+
+    def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
+        """The first of the tiles of nodes (n,) that are of one share with each.
+
+        To go through memory with gaps of some thousand bytes takes twice as long. So, one thread
+        has one share, and long tiles are of one share with those in the same rows of nodes.
+        """
+        if self.threads == 1:
+            return np.zeros_like(tile)
+        if not self.long:
+            return tile
+        first, along = self._first_of_nodes[grid], self._tile_steps[grid, -2]
+        return tile - (tile - first) % along
+
+    def spans_of(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """(k, 2) spans of nodes in use, from boxes of them (n, d) in tiles of nodes (n,)."""
+        order = np.argsort(tile, kind="stable")
+        starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
+        grid = np.searchsorted(self._first_of_nodes, tile[order][starts], side="right") - 1
+        return joined_spans(self._parts(grid, *extents(starts, begin[order], end[order]), 0, 0))
+
+    def _shares(self, s: Setup) -> np.ndarray:
+        """The share of the points of its block that each own tile is in."""
+        found = []
+        for block in s.blocks:
+            tiles, shares, _ = block.tiling.count
+            share = np.empty(tiles, np.int64)
+            sizes = np.diff(block.tiling.share[: shares + 1])
+            share[block.tiling.order[:tiles]] = np.repeat(np.arange(shares) % SHARES, sizes)
+            found.append(share)
+        return np.concatenate(found)
+
+    def _boxes(self, s: Setup) -> Boxes:
+        """The boxes of the tiles of all blocks."""
+        d, tilings = self.dimension, [block.tiling for block in s.blocks]
+        grid = np.concatenate([one.grid[: one.count[0]] for one in tilings])
+        box = np.concatenate([one.box[: one.count[0]] for one in tilings])
+        rows = np.concatenate([one.rows[: one.count[0]] for one in tilings])
+        return Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:], rows)
+
+    def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
+        """What the boxes reach."""
+        size = self.node_size
+        low = boxes.lo // size
+        across = boxes.hi // size - low + 1
+        box, left = ragged(np.prod(across, axis=1))
+        places = low[box] + left[:, None] // steps_of(across)[box] % across[box]
+        grid = boxes.grid[box]
+        tile = self._first_of_nodes[grid] + (places * self._tile_steps[grid]).sum(axis=1)
+        begin = np.maximum(places * size, boxes.lo[box])
+        end = np.minimum(places * size + size - 1, boxes.hi[box])
+        if self._most_in_box:
+            from_corner = places[:, :2] - boxes.lo[box, :2]
+            row = from_corner[:, 0] * (boxes.hi - boxes.lo + 1)[box, 1] + from_corner[:, 1]
+            first, last = (boxes.lo[box, 2:] + boxes.rows[box, row]).T
+            begin[:, 2] = np.maximum(begin[:, 2], first)
+            end[:, 2] = np.minimum(end[:, 2], last)
+            some = begin[:, 2] <= end[:, 2]
+            box, tile, begin, end = box[some], tile[some], begin[some], end[some]
+        return boxes, Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
+
+    def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
+        """Give each box its rows of the buffers: its number of node 0, and steps (k, d)."""
+        steps = steps_of(boxes.hi - boxes.lo + 1)
+        ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
+        begins = np.concatenate([[0], ends])[:-1]
+        first = begins - (boxes.lo * steps).sum(axis=1)
+        self._tell_buffers(s, begins, ends, first, steps)
+        self._make_room(s, int(ends[-1]) if len(ends) else 0)
+        return first, steps
+
+    def _tell_buffers(self, s: Setup, begins, ends, first, steps) -> None:
+        """Tell the tiles of all blocks where in the buffers their boxes are; see `Tiling`."""
+        columns = np.zeros((len(first), 5), np.int64)
+        columns[:, 0], columns[:, 1], columns[:, 2] = begins, ends, first
+        columns[:, 3 : 2 + self.dimension] = steps[:, :-1]
+        done = 0
+        for block in s.blocks:
+            count = block.tiling.count[0]
+            block.tiling.buffer[:count] = columns[done : done + count]
+            done += count
+
+    def _make_room(self, s: Setup, rows: int) -> None:
+        """Make the buffers as large as the boxes of all tiles need."""
+        if rows > MAX_NODES:
+            raise MemoryError(f"tiles of points would need {rows} records of nodes")
+        self.rows = rows
+        for one in buffers_of(s):
+            for array in summed(one.nodes):
+                grow(array, rows)
+
+    def _see_nodes(
+        self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
+    ) -> None:
+        """Take note of the tiles of nodes in use, and of the nodes from `begin` to `end` there."""
+
+    def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
+        """`Buffers.parts` of nodes (k, d) from `begin` to `end` of the grids.
+
+        In boxes they have the numbers `first` + sum of `steps` (k, d) times places.
+        """
+        d = self.dimension
+        parts = np.ones((len(grid), 10), np.int64)
+        parts[:, 9] = CLEAR
+        parts[:, 0] = self._first_node[grid] + (begin * self._steps[grid]).sum(axis=1)
+        parts[:, 1] = first + (begin * steps).sum(axis=1)
+        parts[:, 5 - d : 5] = end - begin + 1
+        parts[:, 8 - d : 7] = self._steps[grid][:, :-1]
+        parts[:, 10 - d : 9] = np.broadcast_to(steps, begin.shape)[:, :-1]
+        return parts
+
+
+def _empty(s: Setup, spans: np.ndarray) -> None:
+    """What points gave to the nodes of spans (k, 2) becomes zero."""
+    of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
+    arrays = [array for nodes in of for array in summed(nodes)]
+    for begin, end in spans.tolist():
+        for array in arrays:
+            array[begin:end] = 0
+
+
+def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """(n,) of which share each of n tiles of nodes is, from 0 to SHARES - 1: they do not decrease.
+
+    `parts` (n, 10) are those of all nodes of a tile in use (see `Buffers`). A share gets the tiles
+    whose middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the same
+    number in `beside` (n,) are of one share, that of the first of them.
+    """
+    size = np.prod(parts[:, 2:5], axis=1)
+    middle = np.cumsum(size) - size / 2
+    firsts = np.diff(beside, prepend=-1) != 0
+    share = (middle[firsts] * (SHARES / max(size.sum(), 1))).astype(np.int64)
+    return share[np.cumsum(firsts) - 1]
+
+
+def in_use(tiling: Tiling) -> list[tuple[str, int]]:
+    """Names of the arrays of a tiling that a sort changes, and how many rows are in use."""
+    tiles = tiling.count[0]
+    whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
+    return [*whole, *((name, tiles) for name in ("range", "grid", "number", "box", "rows"))]
+
+
+def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
+    """(size,) where shares of tiles with these points (T, 2) begin, nearly equal, and the end."""
+    out = np.zeros(size, np.int64)
+    out[shares] = len(ranges)
+    if shares > 1:
+        # Where the sum of the points is nearest to equal parts.
+        parts = np.arange(1, shares) * ranges[:, 1].max(initial=0) / shares
+        out[1:shares] = np.searchsorted(ranges.sum(axis=1) / 2, parts)
+    return out
+
+
+def one_after_another(ranges: np.ndarray) -> np.ndarray:
+    """Ranges (k, 2) as long as these, each from the end of the one before."""
+    ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
+    return np.stack([np.append(0, ends)[:-1], ends], axis=1)
+
+
+def in_tiles(tiling: Tiling) -> int:
+    """Number of the points in the tiles."""
+    return int(tiling.range[: tiling.count[0], 1].max(initial=0))
