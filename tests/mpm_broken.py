@@ -265,12 +265,12 @@ cauchy_stress.on(Short)(lambda law, kin, state: (state[0], state[0]))
 
 
 @advance.on(Raising)
-def _(law, kin, state, dl, dt):
+def _advance_raising(law, kin, state, dl, dt):
     return unknown  # noqa
 
 
 @wave_speed_squared.on(Uncompiled)
-def _(law, kin, state):
+def _wave_speed_squared_uncompiled(law, kin, state):
     return law.E * len(f"{law.E:.3e}")
 
 

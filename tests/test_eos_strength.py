@@ -378,17 +378,17 @@ class Swelling(NamedTuple):
 
 
 @initial_part.on(Swelling)
-def _(part, like):
+def _initial_part_swelling(part, like):
     return (real(0, like),)
 
 
 @part_after.on(Swelling)
-def _(part, memory, law, kin, j, s, memories, dt):
+def _part_after_swelling(part, memory, law, kin, j, s, memories, dt):
     return (memory[0] + dt,)
 
 
 @part_pressure.on(Swelling)
-def _(part, memory):
+def _part_pressure_swelling(part, memory):
     return (part.rate * memory[0],)
 
 

@@ -20,7 +20,7 @@ def applied(tag, x): ...
 
 
 @applied.on(Doubling)
-def _(tag, x):
+def _applied_doubling(tag, x):
     return real(2, x) * x
 
 

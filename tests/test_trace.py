@@ -45,12 +45,12 @@ def value_of(tag, x):
 
 
 @value_of.on(Square)
-def _(tag, x):
+def _value_of_square(tag, x):
     return real(tag.factor, x) * x * x
 
 
 @value_of.on(Root)
-def _(tag, x):
+def _value_of_root(tag, x):
     if x > 0:  # only a run knows
         return tag.factor * math.sqrt(x)
     return 0.0
@@ -391,7 +391,7 @@ def size_of(tag):
 
 
 @size_of.on(Empty)
-def _(tag):
+def _size_of_empty(tag):
     return 3
 
 

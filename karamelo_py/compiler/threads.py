@@ -258,7 +258,7 @@ def shared_out(function: Callable, parameters: str) -> Callable:
             function(*arguments, k)
 
     @by_type(loop)
-    def _(mode, count, *arguments):
+    def _loop_by_type(mode, count, *arguments):
         names = f"mode, count, {parameters}"
         if mode.instance_class is not Threaded:
             lines = "for k in range(count):", f"    function({parameters}, k)"
@@ -287,7 +287,7 @@ def by_team(function: Callable, parameters: str) -> Callable:
     inner = subkernel(function)
 
     @by_type(run)
-    def _(mode, *arguments):
+    def _run_by_type(mode, *arguments):
         names = f"mode, {parameters}"
         if mode.instance_class is not Threaded:
             return define(names, f"return function({names})", function=inner)

@@ -68,7 +68,7 @@ def _momentum(w, stencil, mass, v, moment):
 
 
 @affine_part.on(MassMomentum)
-def _(quantity, w, stencil, load):
+def _affine_part_mass_momentum(quantity, w, stencil, load):
     mass, v, moment, _, _ = load
     given = _momentum(w, stencil, mass, v, moment)
     if not (len(given) and _lacks(w, (Lost, Led, Centre, Normal, SeenMass))):
@@ -78,13 +78,13 @@ def _(quantity, w, stencil, load):
 
 
 @affine_part.on(MomentumAgain)
-def _(quantity, w, stencil, load):
+def _affine_part_momentum_again(quantity, w, stencil, load):
     given = _momentum(w, stencil, *load)
     return (w.nodes.velocity, 0, *given) if len(given) else ()
 
 
 @affine_part.on(InternalForce)
-def _(quantity, w, stencil, load):
+def _affine_part_internal_force(quantity, w, stencil, load):
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin) and _lacks(w, (NodalStress,))):
         return ()
@@ -108,7 +108,7 @@ def joined(width, kin, parts):
 
 @joined.on(Fours)
 @joined.on(Eights)
-def _(width, kin, parts):
+def _joined_eights(width, kin, parts):
     if len(parts) != 2 or of_force(kin) != 4:
         return parts
     array, first, a, to_a = parts[0]
@@ -142,7 +142,7 @@ def gathered_at_once(task, w, stencil, total):
 
 
 @gathered_at_once.on(Move)
-def _(task, w, stencil, total):
+def _gathered_at_once_move(task, w, stencil, total):
     factor = gathered_by_arms(w)
     if not len(factor):
         return ()

@@ -62,7 +62,7 @@ def no_ratio(averaging, like):
 
 
 @no_ratio.on(FBar)
-def _(averaging, like):
+def _no_ratio_f_bar(averaging, like):
     return (real(0, like),)
 
 
@@ -73,7 +73,7 @@ def gathered_ratio(averaging, w, stencil, k, total):
 
 
 @gathered_ratio.on(FBar)
-def _(averaging, w, stencil, k, total):
+def _gathered_ratio_f_bar(averaging, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     return add_scaled(total, weight, row(field(w.nodes.fields, NodalMean), i, 0, total))
 
@@ -85,7 +85,7 @@ def averaged(averaging, w, p, dl, ratio):
 
 
 @averaged.on(FBar)
-def _(averaging, w, p, dl, ratio):
+def _averaged_f_bar(averaging, w, p, dl, ratio):
     # The ratio of volumes of the increment is replaced by its average over the points nearby,
     # weighted with their volumes (after Coombs et al. 2018, "Overcoming volumetric locking in
     # material point methods", eq. 23; there over the points of a cell). In the total frame, `dl`
@@ -104,7 +104,7 @@ def kept_out(averaging, w, gradient):
 
 
 @kept_out.on(FBar)
-def _(averaging, w, gradient):
+def _kept_out_f_bar(averaging, w, gradient):
     return gradient
 
 
@@ -115,5 +115,5 @@ def known_gradient(averaging, w, moment, gradient):
 
 
 @known_gradient.on(FBar)
-def _(averaging, w, moment, gradient):
+def _known_gradient_f_bar(averaging, w, moment, gradient):
     return gradient

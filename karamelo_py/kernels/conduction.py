@@ -56,7 +56,7 @@ def at_heat_nodes(hooks, stage, target, s):
 
 
 @at_heat_nodes.on(Hooks)
-def _(hooks, stage, target, s):
+def _at_heat_nodes_hooks(hooks, stage, target, s):
     # Temperatures are always kept: FLIP, whatever the transfer of velocity.
     clock = s.control.clock[0]
     clock.set_low, clock.set_high = np.inf, -np.inf
@@ -90,7 +90,7 @@ def at_heated_points(hooks, s):
 
 
 @at_heated_points.on(Hooks)
-def _(hooks, s):
+def _at_heated_points_hooks(hooks, s):
     clock = s.control.clock[0]
     clock.rise = clock.fall = 0.0
     clear_totals(SUPPLY_HEAT, hooks, s.control)
@@ -122,13 +122,13 @@ def show_heat(heat, s, mode):
 
 
 @show_heat.on(Conducting)
-def _(heat, s, mode):
+def _show_heat_conducting(heat, s, mode):
     map_heat(heat, s, mode, False, True)
     sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.ranges, step_size(s))
 
 
 @conduct.on(Conducting)
-def _(heat, s, mode, hooks):
+def _conduct_conducting(heat, s, mode, hooks):
     dt = step_size(s)
     nodes = heat.nodes
     kin = Line()

@@ -143,12 +143,12 @@ def _belongs(which, contact, d, nodes, n, m, b):
 
 
 @_belongs.on(Approaching)
-def _(which, contact, d, nodes, n, m, b):
+def _belongs_approaching(which, contact, d, nodes, n, m, b):
     return excess_of(contact, d, nodes, pair_of(contact, d, nodes, n, m), which.where) > 0
 
 
 @_belongs.on(Touched)
-def _(which, contact, d, nodes, n, m, b):
+def _belongs_touched(which, contact, d, nodes, n, m, b):
     return abs(contact.touched[n, b]) == which.step
 
 
@@ -349,12 +349,12 @@ def _stay_nodes(contact, kin, nodes, spans, step):
 
 
 @touch.on(SeparateFields)
-def _(contact, s):
+def _touch_separate_fields(contact, s):
     _keep_rigid(contact, s.kin, s.nodes, s.spans)
     _touch_nodes(contact, s.kin, s.grids, s.nodes, s.spans, s.control)
 
 
 @touch_velocity.on(SeparateFields)
-def _(contact, s, steps):
+def _touch_velocity_separate_fields(contact, s, steps):
     step = int(s.control.values[TIMESTEP]) + steps
     _stay_nodes(contact, s.kin, s.nodes, s.spans, step)

@@ -61,7 +61,7 @@ for _part in (
 
 
 @by_corners.on(MassMomentum)
-def _(part, w):
+def _by_corners_mass_momentum(part, w):
     return _without_moments(part, w) and field(w.nodes.fields, Lost) is None
 
 

@@ -166,7 +166,7 @@ def empty(task, w, x):
 
 
 @empty.on(Move)
-def _(task, w, x):
+def _empty_move(task, w, x):
     zero = subtract(x, x)
     return zero, zero, zero_moment(w.transfer, w.kin, x[0])
 
@@ -174,40 +174,40 @@ def _(task, w, x):
 @empty.on(Strain)
 @empty.on(StrainOfLastStep)
 @empty.on(SecondStrain)
-def _(task, w, x):
+def _empty_second_strain(task, w, x):
     return zero_tensor(w.kin, x[0]), no_ratio(w.averaging, x[0])
 
 
 @empty.on(StrainInMove)
-def _(task, w, x):
+def _empty_strain_in_move(task, w, x):
     gradient = zero_tensor(w.kin, x[0])
     return kept_out(w.averaging, w, gradient), no_ratio(w.averaging, x[0])
 
 
 @empty.on(TrialStrain)
 @empty.on(TrialStrainOfLastStep)
-def _(task, w, x):
+def _empty_trial_strain_of_last_step(task, w, x):
     return zero_tensor(w.kin, x[0])
 
 
 @empty.on(AverageStress)
-def _(task, w, x):
+def _empty_average_stress(task, w, x):
     return real(0, x[0])
 
 
 @empty.on(SeriesTerm)
-def _(task, w, x):
+def _empty_series_term(task, w, x):
     return subtract(x, x)
 
 
 @records_of.on(Move)
-def _(task, nodes):
+def _records_of_move(task, nodes):
     return nodes.update
 
 
 @records_of.on(Strain)
 @records_of.on(StrainOfLastStep)
-def _(task, nodes):
+def _records_of_strain_of_last_step(task, nodes):
     return nodes.velocity
 
 
@@ -217,7 +217,7 @@ def gathered(task, w, stencil, k, total):
 
 
 @gathered.on(Move)
-def _(task, w, stencil, k, total):
+def _gathered_move(task, w, stencil, k, total):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
     v, dv = update_at(w.kin, w.nodes, i, total[0])
@@ -269,7 +269,7 @@ def add_gradient(w, stencil, k, total):
 @gathered.on(StrainOfLastStep)
 @gathered.on(SecondStrain)
 @gathered.on(StrainInMove)
-def _(task, w, stencil, k, total):
+def _gathered_strain_in_move(task, w, stencil, k, total):
     return (
         add_gradient(w, stencil, k, total[0]),
         gathered_ratio(w.averaging, w, stencil, k, total[1]),
@@ -278,18 +278,18 @@ def _(task, w, stencil, k, total):
 
 @gathered.on(TrialStrain)
 @gathered.on(TrialStrainOfLastStep)
-def _(task, w, stencil, k, total):
+def _gathered_trial_strain_of_last_step(task, w, stencil, k, total):
     return _gradient(w, stencil, k, total)
 
 
 @gathered.on(AverageStress)
-def _(task, w, stencil, k, total):
+def _gathered_average_stress(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     return fma(weight, row(field(w.nodes.fields, NodalStress), i, 0, (total,))[0], total)
 
 
 @gathered.on(SeriesTerm)
-def _(task, w, stencil, k, total):
+def _gathered_series_term(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     return add_scaled(total, weight, row(field(w.nodes.fields, Series), i, 0, total))
 
@@ -308,35 +308,35 @@ def settled(task, w, stencil, p, dt, total, totals, fastest):
 
 
 @settled.on(Strain)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     return _strain(w, w.places.x, p, dt, scale(dt, total[0]), total[1], fastest)
 
 
 @settled.on(StrainOfLastStep)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
     dl = of_places_before(w.frame, w.kin, scale(dt, total[0]))
     return _strain(w, w.places.x, p, dt, dl, total[1], fastest)
 
 
 @settled.on(SecondStrain)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_second_strain(task, w, stencil, p, dt, total, totals, fastest):
     return _strain(w, w.places.y, p, dt, scale(dt, total[0]), total[1], fastest)
 
 
 @settled.on(StrainInMove)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_strain_in_move(task, w, stencil, p, dt, total, totals, fastest):
     gradient = known_gradient(w.averaging, w, totals[0][2], total[0])
     return _strain(w, w.places.x, p, dt, scale(dt, gradient), total[1], fastest)
 
 
 @settled.on(TrialStrain)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
     _keep_ratio(w, p, dt, scale(dt, total))
     return real(0, dt), fastest
 
 
 @settled.on(TrialStrainOfLastStep)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_trial_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
     _keep_ratio(w, p, dt, of_places_before(w.frame, w.kin, scale(dt, total)))
     return real(0, dt), fastest
 
@@ -351,13 +351,13 @@ def _keep_ratio(w, p, dt, dl):
 
 
 @settled.on(AverageStress)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_average_stress(task, w, stencil, p, dt, total, totals, fastest):
     field(w.points.fields, AveragedStress)[0, p] = total
     return real(0, dt), fastest
 
 
 @settled.on(SeriesTerm)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_series_term(task, w, stencil, p, dt, total, totals, fastest):
     store(field(w.points.fields, TermOfSeries), p, total)
     reflect(field(w.points.fields, Reflected), w, stencil, p, total, task.k)
     return real(0, dt), fastest
@@ -371,7 +371,7 @@ def further_reach(basis, kin, grid, before, after):
 
 
 @settled.on(Move)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
     return _move(w, stencil, p, dt, total), fastest
 
 

@@ -143,7 +143,7 @@ def at_least_round_off(weight):
 
 
 @load_of.on(HeatContent)
-def _(quantity, w, p, like):
+def _load_of_heat_content(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     mass = w.points.mass[p]
@@ -169,7 +169,7 @@ def _gradient(w, p):
 
 
 @scattered.on(HeatContent)
-def _(quantity, w, stencil, k, load):
+def _scattered_heat_content(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     capacity, conductance, T, gradient = load
     weight = at_least_round_off(weight)
@@ -183,7 +183,7 @@ def _(quantity, w, stencil, k, load):
 
 
 @load_of.on(HeatFlow)
-def _(quantity, w, p, like):
+def _load_of_heat_flow(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
@@ -194,7 +194,7 @@ def _(quantity, w, p, like):
 
 
 @scattered.on(HeatFlow)
-def _(quantity, w, stencil, k, load):
+def _scattered_heat_flow(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     flow, supply = load
     total = at_least_round_off(weight) * supply
@@ -207,38 +207,38 @@ def _(quantity, w, stencil, k, load):
 
 
 @empty.on(TemperatureGradient)
-def _(task, w, x):
+def _empty_temperature_gradient(task, w, x):
     return subtract(x, x)
 
 
 @gathered.on(TemperatureGradient)
-def _(task, w, stencil, k, total):
+def _gathered_temperature_gradient(task, w, stencil, k, total):
     i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     # An axisymmetric gradient has the part around the axis behind; a scalar has none there.
     return add_scaled(total, w.nodes.velocity[i, 0], leading(gradient, total))
 
 
 @settled.on(TemperatureGradient)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_temperature_gradient(task, w, stencil, p, dt, total, totals, fastest):
     store(field(w.points.fields, HeatGradient), p, total)
     return real(0, dt), fastest
 
 
 @empty.on(Warming)
-def _(task, w, x):
+def _empty_warming(task, w, x):
     zero = x[0] - x[0]
     return zero, zero
 
 
 @gathered.on(Warming)
-def _(task, w, stencil, k, total):
+def _gathered_warming(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     shown = w.nodes.update[i, 1], field(w.nodes.fields, NodalMean)[i, 0]
     return add_scaled(total, at_least_round_off(weight), shown)
 
 
 @settled.on(Warming)
-def _(task, w, stencil, p, dt, total, totals, fastest):
+def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
     law = law_of(w, p)
     state = state_of(w, law, p, dt)
     fields = w.points.fields

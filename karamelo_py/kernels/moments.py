@@ -16,7 +16,7 @@ def at_nodes(hooks, stage, target, s):
 
 
 @at_nodes.on(Hooks)
-def _(hooks, stage, target, s):
+def _at_nodes_hooks(hooks, stage, target, s):
     clock = s.control.clock[0]
     node_hooks(
         stage, target, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), clock.kept
@@ -30,7 +30,7 @@ def add_work(hooks, s):
 
 
 @add_work.on(Hooks)
-def _(hooks, s):
+def _add_work_hooks(hooks, s):
     kept = s.control.clock[0].kept
     node_hooks(DONE, ON_SUMS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), kept)
 
@@ -54,7 +54,7 @@ def at_points(hooks, stage, then, s):
 
 
 @at_points.on(Hooks)
-def _(hooks, stage, then, s):
+def _at_points_hooks(hooks, stage, then, s):
     clear_totals(stage, hooks, s.control)
     now = s.control.clock[0].now
     hook_points(s, hooks, stage, now, 1 - now if then else now)

@@ -313,7 +313,9 @@ def go_through(mode, task, target, kin, grids, nodes, ranges, hooks, control, dt
 
 
 @go_through.on(Serial)
-def _(mode, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share):
+def _go_through_serial(
+    mode, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share
+):
     _go_through(
         task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share,
         NONE, ranges[0, 0],
@@ -321,7 +323,9 @@ def _(mode, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h
 
 
 @go_through.on(Threaded)
-def _(mode, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share):
+def _go_through_threaded(
+    mode, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share
+):
     parts = hooks.apart.chosen.shape[0]
     _go_through_parts(
         mode, parts, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share

@@ -97,17 +97,17 @@ def per_mass(nodes, n, like):
 
 
 @at_node.on(KeepLoss)
-def _(task, kin, nodes, n, dt):
+def _at_node_keep_loss(task, kin, nodes, n, dt):
     keep_loss(field(nodes.fields, Lost), kin, nodes.sums, n)
 
 
 @at_node.on(ClearRubbed)
-def _(task, kin, nodes, n, dt):
+def _at_node_clear_rubbed(task, kin, nodes, n, dt):
     clear_first(field(nodes.fields, Rubbed), n)
 
 
 @at_node.on(Update)
-def _(task, kin, nodes, n, dt):
+def _at_node_update(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
     for k in range(dimension(kin)):
         dv = dt * nodes.sums[n, of_force(kin) + k] * factor
@@ -116,14 +116,14 @@ def _(task, kin, nodes, n, dt):
 
 
 @at_node.on(MomentumToVelocity)
-def _(task, kin, nodes, n, dt):
+def _at_node_momentum_to_velocity(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
     for k in range(dimension(kin)):
         nodes.velocity[n, k] *= factor
 
 
 @at_node.on(SumsToVelocity)
-def _(task, kin, nodes, n, dt):
+def _at_node_sums_to_velocity(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
     for k in range(dimension(kin)):
         nodes.velocity[n, k] = nodes.sums[n, of_momentum(kin) + k] * factor
@@ -140,7 +140,7 @@ def unlimited(seen, n, mass, light):
 
 
 @at_node.on(UpdateToVelocity)
-def _(task, kin, nodes, n, dt):
+def _at_node_update_to_velocity(task, kin, nodes, n, dt):
     # See UpdateToVelocity.light: the change of a light node's velocity enters the gradient by the
     # share of its mass. Points take the whole change: momentum is kept.
     one = real(1, dt)
@@ -151,12 +151,12 @@ def _(task, kin, nodes, n, dt):
 
 
 @at_node.on(TakeMean)
-def _(task, kin, nodes, n, dt):
+def _at_node_take_mean(task, kin, nodes, n, dt):
     _take_mean(field(nodes.fields, NodalMean), n)
 
 
 @at_node.on(TakeMeanStress)
-def _(task, kin, nodes, n, dt):
+def _at_node_take_mean_stress(task, kin, nodes, n, dt):
     _take_mean(field(nodes.fields, NodalStress), n)
 
 
@@ -167,7 +167,7 @@ def _take_mean(sums, n):
 
 
 @at_node.on(StartSeries)
-def _(task, kin, nodes, n, dt):
+def _at_node_start_series(task, kin, nodes, n, dt):
     d = dimension(kin)
     series = field(nodes.fields, Series)
     factor = per_mass(nodes, n, dt)
@@ -178,7 +178,7 @@ def _(task, kin, nodes, n, dt):
 
 
 @at_node.on(ExtendSeries)
-def _(task, kin, nodes, n, dt):
+def _at_node_extend_series(task, kin, nodes, n, dt):
     d = dimension(kin)
     series = field(nodes.fields, Series)
     factor = per_mass(nodes, n, dt)

@@ -153,12 +153,12 @@ def load_of(quantity, w, p, like):
 
 
 @records_of.on(MassMomentum)
-def _(quantity, nodes):
+def _records_of_mass_momentum(quantity, nodes):
     return nodes.sums
 
 
 @records_of.on(MomentumAgain)
-def _(quantity, nodes):
+def _records_of_momentum_again(quantity, nodes):
     return nodes.velocity
 
 
@@ -202,7 +202,7 @@ def _mass(w, p):
 
 
 @load_of.on(MassMomentum)
-def _(quantity, w, p, like):
+def _load_of_mass_momentum(quantity, w, p, like):
     v = load_vector(w.kin, w.points.v, p)
     led = led_mass(field(w.nodes.fields, Led), law_of(w, p), _own_mass(w, p))
     x = loaded_for(field(w.nodes.fields, Centre), w.kin, w.places.y, p)
@@ -219,7 +219,7 @@ def momentum_part(w, stencil, k, weight, mass, v, moment):
 
 
 @scattered.on(MassMomentum)
-def _(quantity, w, stencil, k, load):
+def _scattered_mass_momentum(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, v, moment, led, x = load
     part = momentum_part(w, stencil, k, weight, mass, v, moment)
@@ -238,13 +238,13 @@ def mean_stress(averaging, kin, law, state, volume):
 
 
 @mean_stress.on(FBar)
-def _(averaging, kin, law, state, volume):
+def _mean_stress_f_bar(averaging, kin, law, state, volume):
     tau = stretching_mean(kin, kirchhoff_stress(law, kin, state))
     return volume * tau, volume * jacobian(law, kin, state)
 
 
 @load_of.on(AveragedForce)
-def _(quantity, w, p, like):
+def _load_of_averaged_force(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
@@ -256,7 +256,7 @@ def _(quantity, w, p, like):
 
 
 @scattered.on(AveragedForce)
-def _(quantity, w, stencil, k, load):
+def _scattered_averaged_force(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
     part = add_force(w.frame, w.kin, zero_vector(w.kin, weight), load, g)
@@ -264,7 +264,7 @@ def _(quantity, w, stencil, k, load):
 
 
 @load_of.on(InternalForce)
-def _(quantity, w, p, like):
+def _load_of_internal_force(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
@@ -277,7 +277,7 @@ def _(quantity, w, p, like):
 
 
 @scattered.on(InternalForce)
-def _(quantity, w, stencil, k, load):
+def _scattered_internal_force(quantity, w, stencil, k, load):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
     stress, outer, mean = load
@@ -294,25 +294,25 @@ def mapped_again_in(frame, basis, grid, moment):
 
 
 @mapped_again_in.on(Total)
-def _(frame, basis, grid, moment):
+def _mapped_again_in_total(frame, basis, grid, moment):
     return moment
 
 
 @load_of.on(MomentumAgain)
-def _(quantity, w, p, like):
+def _load_of_momentum_again(quantity, w, p, like):
     moment = mapped_again_in(w.frame, w.basis, w.grid, _moment(w, p, like))
     return _mass(w, p), load_vector(w.kin, w.points.v, p), moment
 
 
 @scattered.on(MomentumAgain)
-def _(quantity, w, stencil, k, load):
+def _scattered_momentum_again(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, v, moment = load
     accumulate(w.nodes.velocity, i, 0, momentum_part(w, stencil, k, weight, mass, v, moment))
 
 
 @load_of.on(Volumes)
-def _(quantity, w, p, like):
+def _load_of_volumes(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     volume = _mass(w, p) * specific_volume(law) * jacobian(law, w.kin, state)
@@ -320,20 +320,20 @@ def _(quantity, w, p, like):
 
 
 @scattered.on(Volumes)
-def _(quantity, w, stencil, k, load):
+def _scattered_volumes(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     part = (weight * load[0], weight * load[1])
     accumulate(field(w.nodes.fields, NodalMean), i, 0, part)
 
 
 @load_of.on(SeriesBack)
-def _(quantity, w, p, like):
+def _load_of_series_back(quantity, w, p, like):
     u = load(field(w.points.fields, TermOfSeries), p, load_vector(w.kin, w.points.v, p))
     return _mass(w, p), u
 
 
 @scattered.on(SeriesBack)
-def _(quantity, w, stencil, k, load):
+def _scattered_series_back(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, u = load
     accumulate(field(w.nodes.fields, Series), i, len(u), scale(weight * mass, u))

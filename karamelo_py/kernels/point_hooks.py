@@ -62,7 +62,7 @@ def act_on_points(what, kin, hooks, control, dt, h, count):
 
 
 @act_on_points.on(Motion)
-def _(what, kin, hooks, control, dt, h, count):
+def _act_on_points_motion(what, kin, hooks, control, dt, h, count):
     v, y = what.v, what.y
     step_back = min(control.clock[0].last_dt, control.values[TIME])
     d = directions(hooks)
@@ -99,7 +99,7 @@ def _(what, kin, hooks, control, dt, h, count):
 
 
 @act_on_points.on(Warmth)
-def _(what, kin, hooks, control, dt, h, count):
+def _act_on_points_warmth(what, kin, hooks, control, dt, h, count):
     evaluate(hooks, h, 0, count, control, np.int64(VALUE), 0.0)
     if hooks.programs[h, 1].begin >= 0:
         evaluate(hooks, h, 1, count, control, np.int64(BEFORE), 0.0)
@@ -197,12 +197,12 @@ def act_on_all(mode, what, kin, ids, hooks, control, dt, h):
 
 
 @act_on_all.on(Serial)
-def _(mode, what, kin, ids, hooks, control, dt, h):
+def _act_on_all_serial(mode, what, kin, ids, hooks, control, dt, h):
     _act_on_range(what, kin, ids, hooks, control, dt, h, NONE, ids.size)
 
 
 @act_on_all.on(Threaded)
-def _(mode, what, kin, ids, hooks, control, dt, h):
+def _act_on_all_threaded(mode, what, kin, ids, hooks, control, dt, h):
     parts = hooks.apart.chosen.shape[0]
     _act_on_parts(mode, parts, what, kin, ids, hooks, control, dt, h)
     clock = control.clock[0]

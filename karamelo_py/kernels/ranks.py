@@ -56,17 +56,17 @@ def _ask(address, what, a, b):
 
 
 @collect.on(Linked)
-def _(ranks, control, first, count):
+def _collect_linked(ranks, control, first, count):
     _ask(ranks.address, TOTALS, first, count)
 
 
 @counts.on(Linked)
-def _(ranks, n):
+def _counts_linked(ranks, n):
     return ranks.foreign[n] == 0
 
 
 @number_of_all.on(Linked)
-def _(ranks, control, number):
+def _number_of_all_linked(ranks, control, number):
     return _ask(ranks.address, NUMBER, number, 0)
 
 
@@ -81,7 +81,7 @@ def _agree_on_reports(address, control):
 
 
 @agree_on_reports.on(Linked)
-def _(ranks, control):
+def _agree_on_reports_linked(ranks, control):
     _agree_on_reports(ranks.address, control)
 
 
@@ -100,7 +100,7 @@ def _agree_on_heat(address, control):
 
 
 @agree_on_heat.on(Linked)
-def _(ranks, control):
+def _agree_on_heat_linked(ranks, control):
     _agree_on_heat(ranks.address, control)
 
 
@@ -111,12 +111,12 @@ def _ask_if(due, address, what, a, b):
 
 
 @take_over.on(Linked)
-def _(ranks, due):
+def _take_over_linked(ranks, due):
     _ask_if(due, ranks.address, TAKE, 0, 0)
 
 
 @sweep_all.on(Linked)
-def _(ranks, s, mode, visit, then, gathers, scatters, dt):
+def _sweep_all_linked(ranks, s, mode, visit, then, gathers, scatters, dt):
     address = ranks.address
     _ask(address, SWEEP, 0, 0)
     sweep_blocks(s, Border(mode, address), visit, then, gathers, scatters, dt)
@@ -127,7 +127,7 @@ def _(ranks, s, mode, visit, then, gathers, scatters, dt):
 
 
 @sweep_points.on(Border)
-def _(mode, visit, s, block, then, gathers, scatters, dt):
+def _sweep_points_border(mode, visit, s, block, then, gathers, scatters, dt):
     border = block.tiling.count[2]
     sweep_shares(mode.mode, visit, s, block, then, gathers, scatters, dt, 0, border)
     if len(s.blocks) > 1:
@@ -135,7 +135,7 @@ def _(mode, visit, s, block, then, gathers, scatters, dt):
 
 
 @sweep_points.on(Inside)
-def _(mode, visit, s, block, then, gathers, scatters, dt):
+def _sweep_points_inside(mode, visit, s, block, then, gathers, scatters, dt):
     border = block.tiling.count[2]
     inside = block.tiling.count[1] - border
     sweep_shares(mode.mode, visit, s, block, then, gathers, scatters, dt, border, inside)

@@ -101,7 +101,7 @@ def _sum_forces(basis, kin, grids, places, points, led, force, torque, totals):
 
 
 @sum_forces.on(Rigid)
-def _(laws, contact, s, points, led):
+def _sum_forces_rigid(laws, contact, s, points, led):
     places = points.x[s.control.clock[0].now]
     _sum_forces(
         s.basis, s.kin, s.grids, places, points, led, contact.force, contact.torque,
@@ -127,7 +127,7 @@ def _publish(slots, control):
 
 
 @touch.on(RigidBodies)
-def _(contact, s):
+def _touch_rigid_bodies(contact, s):
     led = field(s.nodes.fields, Led)
     _lead(s.kin, s.nodes, led, s.spans, kick(s), s.control.clock[0].kept)
     _clear(contact.slots, s.control.totals)
@@ -136,5 +136,5 @@ def _(contact, s):
 
 
 @touch_velocity.on(RigidBodies)
-def _(contact, s, steps):
+def _touch_velocity_rigid_bodies(contact, s, steps):
     _lead_velocity(s.kin, s.nodes, field(s.nodes.fields, Led), s.spans)

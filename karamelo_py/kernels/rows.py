@@ -96,7 +96,7 @@ def hold_axis(kin, s):
 
 
 @hold_axis.on(Axisymmetric)
-def _(kin, s):
+def _hold_axis_axisymmetric(kin, s):
     # v_r = 0 at r = 0: N / r of a node there grows without bound where a point comes near. And a
     # body that touches another on the axis has a normal along it.
     _clear_radial(kin, s.nodes, s.grids)
@@ -108,7 +108,7 @@ def sum_series(transfer, s, mode):
 
 
 @sum_series.on(XPIC)
-def _(transfer, s, mode):
+def _sum_series_xpic(transfer, s, mode):
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
     dt = step_size(s)
     sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.ranges, dt)
@@ -128,7 +128,7 @@ def average_volumes(averaging, s, mode, dt, trial):
 
 
 @average_volumes.on(FBar)
-def _(averaging, s, mode, dt, trial):
+def _average_volumes_f_bar(averaging, s, mode, dt, trial):
     visit_here(s, mode, Visit((trial,), (Volumes(),), OldWeights()), dt, True, True)
     sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.ranges, dt)
 
@@ -139,7 +139,7 @@ def average_stress(averaging, s, mode):
 
 
 @average_stress.on(FBar)
-def _(averaging, s, mode):
+def _average_stress_f_bar(averaging, s, mode):
     dt = step_size(s)
     sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
     visit_here(s, mode, Visit((AverageStress(),), (AveragedForce(),), OldWeights()), dt, True, True)

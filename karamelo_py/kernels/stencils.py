@@ -54,7 +54,7 @@ def gather_nodes(width, stencil, tasks, w, totals):
 
 
 @gather_nodes.on(OneByOne, Stencil)
-def _(width, stencil, tasks, w, totals):
+def _gather_nodes_one_by_one_stencil(width, stencil, tasks, w, totals):
     if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
     return _gather_parts(tasks, w, stencil, totals)
@@ -62,7 +62,7 @@ def _(width, stencil, tasks, w, totals):
 
 @gather_nodes.on(Fours, Stencil)
 @gather_nodes.on(Eights, Stencil)
-def _(width, stencil, tasks, w, totals):
+def _gather_nodes_eights_stencil(width, stencil, tasks, w, totals):
     if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
@@ -73,7 +73,7 @@ def _(width, stencil, tasks, w, totals):
 
 
 @gather_nodes.on(OneByOne, CornerStencil)
-def _(width, stencil, tasks, w, totals):
+def _gather_nodes_one_by_one_corner_stencil(width, stencil, tasks, w, totals):
     if all_by_corners(tasks, w):
         return gather_corners(tasks, w, stencil, totals)
     return _gather(tasks, w, stencil, totals)
@@ -81,7 +81,7 @@ def _(width, stencil, tasks, w, totals):
 
 @gather_nodes.on(Fours, CornerStencil)
 @gather_nodes.on(Eights, CornerStencil)
-def _(width, stencil, tasks, w, totals):
+def _gather_nodes_eights_corner_stencil(width, stencil, tasks, w, totals):
     by_corners = all_by_corners(tasks, w)
     if by_corners and shows_corners(tasks, w):
         return gather_corners(tasks, w, stencil, totals)
@@ -119,7 +119,7 @@ def scatter_nodes(width, stencil, quantities, w, loads):
 
 @scatter_nodes.on(Fours, Stencil)
 @scatter_nodes.on(Eights, Stencil)
-def _(width, stencil, quantities, w, loads):
+def _scatter_nodes_eights_stencil(width, stencil, quantities, w, loads):
     parts = affine_parts(quantities, w, stencil, loads)
     if not _even(w, stencil, any(len(part) and len(part[-1]) for part in parts)):
         _scatter(quantities, w, stencil, loads)
@@ -131,7 +131,7 @@ def _(width, stencil, quantities, w, loads):
 
 
 @scatter_nodes.on(OneByOne, CornerStencil)
-def _(width, stencil, quantities, w, loads):
+def _scatter_nodes_one_by_one_corner_stencil(width, stencil, quantities, w, loads):
     if all_by_corners(quantities, w):
         scatter_corners(quantities, w, stencil, loads)
     else:
@@ -140,7 +140,7 @@ def _(width, stencil, quantities, w, loads):
 
 @scatter_nodes.on(Fours, CornerStencil)
 @scatter_nodes.on(Eights, CornerStencil)
-def _(width, stencil, quantities, w, loads):
+def _scatter_nodes_eights_corner_stencil(width, stencil, quantities, w, loads):
     block = block_of(w.kin, w.grid, stencil)
     if is_one_block(block):
         _scatter_block(width, quantities, w, of_one(block), loads)

@@ -102,12 +102,12 @@ def restencil(weights, w, stencil, p):
 
 
 @restencil.on(OldWeights)
-def _(weights, w, stencil, p):
+def _restencil_old_weights(weights, w, stencil, p):
     return stencil
 
 
 @restencil.on(PresentWeights)
-def _(weights, w, stencil, p):
+def _restencil_present_weights(weights, w, stencil, p):
     return present_stencil(w.frame, w, stencil, p)
 
 
@@ -120,12 +120,12 @@ def fits(weights, room, moved):
 
 
 @fits.on(OldWeights)
-def _(weights, room, moved):
+def _fits_old_weights(weights, room, moved):
     return True
 
 
 @fits.on(PresentWeights)
-def _(weights, room, moved):
+def _fits_present_weights(weights, room, moved):
     return in_all(moved <= room)
 
 
@@ -135,12 +135,12 @@ def places_of(frame, points, now, then):
 
 
 @places_of.on(Updated)
-def _(frame, points, now, then):
+def _places_of_updated(frame, points, now, then):
     return Places(points.x[now], points.x[now], points.x[then])
 
 
 @places_of.on(Total)
-def _(frame, points, now, then):
+def _places_of_total(frame, points, now, then):
     return Places(points.home, points.x[now], points.x[then])
 
 
@@ -275,7 +275,7 @@ def _visit_all(mode, visit, s, block, then, gathers, scatters, dt, first, count)
 
 @sweep_points.on(Serial)
 @sweep_points.on(Threaded)
-def _(mode, visit, s, block, then, gathers, scatters, dt):
+def _sweep_points_threaded(mode, visit, s, block, then, gathers, scatters, dt):
     shares = block.tiling.count[1]
     sweep_shares(mode, visit, s, block, then, gathers, scatters, dt, 0, shares)
 
@@ -306,7 +306,7 @@ def _sum_all(mode, quantities, kin, nodes, buffers, due):
 
 @sum_buffers.on(Serial)
 @sum_buffers.on(Threaded)
-def _(mode, quantities, s, due):
+def _sum_buffers_threaded(mode, quantities, s, due):
     _sum_all(mode, quantities, s.kin, s.nodes, s.buffers, due)
 
 
@@ -322,5 +322,5 @@ def _visit_all_nodes(mode, task, kin, nodes, ranges, dt):
 
 @sweep_nodes.on(Serial)
 @sweep_nodes.on(Threaded)
-def _(mode, task, kin, nodes, ranges, dt):
+def _sweep_nodes_threaded(mode, task, kin, nodes, ranges, dt):
     _visit_all_nodes(mode, task, kin, nodes, ranges, dt)

@@ -112,7 +112,7 @@ def deformation_of(frame, kin, law, state, points, p):
 
 
 @deformation_of.on(Total)
-def _(frame, kin, law, state, points, p):
+def _deformation_of_total(frame, kin, law, state, points, p):
     f = load(field(points.fields, DeformationGradient), p, zero_tensor(kin, points.mass[p]))
     return stored_or_own(f, law, kin, state)
 
@@ -124,7 +124,7 @@ def present_stencil(frame, w, stencil, p):
 
 
 @present_stencil.on(Total)
-def _(frame, w, stencil, p):
+def _present_stencil_total(frame, w, stencil, p):
     return stencil
 
 

@@ -70,13 +70,13 @@ def points_from(width, q, end):
 
 
 @points_from.on(OneByOne)
-def _(width, q, end):
+def _points_from_one_by_one(width, q, end):
     return index(q)
 
 
 @points_from.on(Fours)
 @points_from.on(Eights)
-def _(width, q, end):
+def _points_from_eights(width, q, end):
     return group(width, q, min(width_of(width), end - q))
 
 
@@ -127,11 +127,11 @@ def zero_of(width, like):
 
 
 @zero_of.on(OneByOne)
-def _(width, like):
+def _zero_of_one_by_one(width, like):
     return like - like
 
 
 @zero_of.on(Fours)
 @zero_of.on(Eights)
-def _(width, like):
+def _zero_of_eights(width, like):
     return spread(width, like - like)

@@ -28,7 +28,7 @@ def reflected(grid, kin, y, v, moment):
 
 
 @reflected.on(ReflectingGrid)
-def _(grid, kin, y, v, moment):
+def _reflected_reflecting_grid(grid, kin, y, v, moment):
     signs = turns(grid, y, v)
     return mirrored(grid, y), multiply_each(signs, v), turned(signs, moment), hits(grid, y)
 

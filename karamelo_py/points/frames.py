@@ -65,7 +65,7 @@ def follows(frame):
 
 
 @follows.on(Total)
-def _(frame):
+def _follows_total(frame):
     return False
 
 
@@ -76,7 +76,7 @@ def spatial_increment(frame, kin, dl, f):
 
 
 @spatial_increment.on(Total)
-def _(frame, kin, dl, f):
+def _spatial_increment_total(frame, kin, dl, f):
     # F + dt Fdot = (I + dt Fdot F^-1) F exactly
     return increment_of(kin, dl, f)
 
@@ -90,7 +90,7 @@ def of_places_before(frame, kin, dl):
 
 
 @of_places_before.on(Total)
-def _(frame, kin, dl):
+def _of_places_before_total(frame, kin, dl):
     return dl  # gradients belong to the reference
 
 
@@ -101,7 +101,7 @@ def strained(frame, kin, f, dl):
 
 
 @strained.on(Total)
-def _(frame, kin, f, dl):
+def _strained_total(frame, kin, f, dl):
     return add(f, dl)
 
 
@@ -112,7 +112,7 @@ def force_stress(frame, kin, tau, f):
 
 
 @force_stress.on(Total)
-def _(frame, kin, tau, f):
+def _force_stress_total(frame, kin, tau, f):
     return nominal(kin, tau, f)
 
 
@@ -123,7 +123,7 @@ def add_force(frame, kin, total, stress, gradient):
 
 
 @add_force.on(Total)
-def _(frame, kin, total, stress, gradient):
+def _add_force_total(frame, kin, total, stress, gradient):
     return add_tensor_dot(kin, total, stress, gradient)
 
 
@@ -134,7 +134,7 @@ def force_columns(frame, kin, stress):
 
 
 @force_columns.on(Total)
-def _(frame, kin, stress):
+def _force_columns_total(frame, kin, stress):
     return columns(kin, stress)
 
 
@@ -149,7 +149,7 @@ def pulled_back(frame, kin, g, f):
 
 
 @pulled_back.on(Total)
-def _(frame, kin, g, f):
+def _pulled_back_total(frame, kin, g, f):
     flat = planar(kin)
     inside = inverse(flat, leading(f, zero_tensor(flat, g[0])))
     return add_symmetric_dot(flat, subtract(g, g), left_cauchy_green(flat, inside), g)
@@ -164,7 +164,7 @@ def scaled_increment(frame, kin, dl, f, ratio):
 
 
 @scaled_increment.on(Total)
-def _(frame, kin, dl, f, ratio):
+def _scaled_increment_total(frame, kin, dl, f, ratio):
     # (F + dl) s - F
     s = power(ratio, stretched_share(kin, ratio))
     return add_scaled(scale(s, dl), s - real(1, s), f)
@@ -183,6 +183,6 @@ def inverse_stretch_squared(frame, kin, f, like):
 
 
 @inverse_stretch_squared.on(Total)
-def _(frame, kin, f, like):
+def _inverse_stretch_squared_total(frame, kin, f, like):
     # 1 / (smallest stretch)^2 is the largest eigenvalue of F^-1 F^-T.
     return largest_row_sum(kin, left_cauchy_green(kin, inverse(kin, f)))

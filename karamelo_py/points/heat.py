@@ -16,21 +16,21 @@ def face(kin, volume, x):
 
 
 @face.on(Line)
-def _(kin, volume, x):
+def _face_line(kin, volume, x):
     return real(1, volume)
 
 
 @face.on(PlaneStrain)
-def _(kin, volume, x):
+def _face_plane_strain(kin, volume, x):
     return sqrt(volume)
 
 
 @face.on(Axisymmetric)
-def _(kin, volume, x):
+def _face_axisymmetric(kin, volume, x):
     # r times the side of the square volume / r
     return sqrt(volume * x[0])
 
 
 @face.on(Space)
-def _(kin, volume, x):
+def _face_space(kin, volume, x):
     return power(volume, real(2 / 3, volume))

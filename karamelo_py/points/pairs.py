@@ -26,23 +26,23 @@ def radius(kin, volume, x):
 
 
 @radius.on(Line)
-def _(kin, volume, x):
+def _radius_line(kin, volume, x):
     return 0.5 * volume
 
 
 @radius.on(PlaneStrain)
-def _(kin, volume, x):
+def _radius_plane_strain(kin, volume, x):
     return 0.5 * sqrt(volume)
 
 
 @radius.on(Axisymmetric)
-def _(kin, volume, x):
+def _radius_axisymmetric(kin, volume, x):
     # The volume is that of one radian of a ring.
     return 0.5 * sqrt(volume / x[0]) if x[0] > 0 else 0.0
 
 
 @radius.on(Space)
-def _(kin, volume, x):
+def _radius_space(kin, volume, x):
     return 0.5 * volume ** (1.0 / 3.0)
 
 
@@ -52,7 +52,7 @@ def force_between(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick)
 
 
 @force_between.on(Hertz)
-def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
+def _force_between_hertz(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
     p = radius1 + radius2 - r
     round_ = radius1 * radius2 / (radius1 + radius2)
     stiffness = 4.0 / 3.0 if dimension(kin) == 3 else pi / 4.0
@@ -60,7 +60,9 @@ def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
 
 
 @force_between.on(MinimizePenetration)
-def _(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
+def _force_between_minimize_penetration(
+    law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick
+):
     reduced = mass1 * mass2 / (mass1 + mass2)
     p = radius1 + radius2 - r
     push = reduced * p / (dt * kick)

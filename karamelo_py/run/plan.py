@@ -53,17 +53,17 @@ class _Sums(NamedTuple):
 
 
 @sweep_points.on(_Sums)
-def _(mode, visit, s, block, then, gathers, scatters, dt):
+def _sweep_points_sums(mode, visit, s, block, then, gathers, scatters, dt):
     return None
 
 
 @sweep_nodes.on(_Sums)
-def _(mode, task, kin, nodes, ranges, dt):
+def _sweep_nodes_sums(mode, task, kin, nodes, ranges, dt):
     return None
 
 
 @sum_buffers.on(_Sums)
-def _(mode, quantities, s, due):
+def _sum_buffers_sums(mode, quantities, s, due):
     if due:
         mode.found.append((given(quantities, s.kin), s.nodes))
 

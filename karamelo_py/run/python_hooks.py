@@ -107,14 +107,14 @@ def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:
 
 
 @at_nodes.on(PythonHooks)
-def _(hooks, stage, target, s):
+def _at_nodes_python_hooks(hooks, stage, target, s):
     at_nodes(hooks.compiled, stage, target, s)
     if stage in hooks.by_stage:
         hooks.act(_on_nodes, s, stage, target)
 
 
 @at_points.on(PythonHooks)
-def _(hooks, stage, then, s):
+def _at_points_python_hooks(hooks, stage, then, s):
     if stage == INITIAL_INTEGRATE and hooks.simulation.taken_up:
         hooks.simulation.taken_up = False
         return
@@ -126,14 +126,14 @@ def _(hooks, stage, then, s):
 
 
 @at_heat_nodes.on(PythonHooks)
-def _(hooks, stage, target, s):
+def _at_heat_nodes_python_hooks(hooks, stage, target, s):
     at_heat_nodes(hooks.compiled, stage, target, s)
     if stage in hooks.by_stage:
         hooks.act(_on_heat_nodes, s, stage, target)
 
 
 @at_heated_points.on(PythonHooks)
-def _(hooks, s):
+def _at_heated_points_python_hooks(hooks, s):
     at_heated_points(hooks.compiled, s)
     if SUPPLY_HEAT in hooks.by_stage:
         hooks.act(_on_points, s, SUPPLY_HEAT, 0)

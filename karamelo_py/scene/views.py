@@ -94,7 +94,7 @@ class NodesView(View):
         return self._nodes.sums[self._at_force()]
 
     @force.writer
-    def _(self, value: np.ndarray) -> None:
+    def _write_force(self, value: np.ndarray) -> None:
         self._nodes.sums[self._at_force()] = value
 
     def _at_force(self) -> tuple:
@@ -113,7 +113,7 @@ class NodesView(View):
         return nodes.update[self._part(nodes.update, 0)] - change
 
     @velocity.writer
-    def _(self, value: np.ndarray) -> None:
+    def _write_velocity(self, value: np.ndarray) -> None:
         nodes = self._nodes
         if self._on_velocity:
             nodes.velocity[self._part(nodes.velocity, 0)] = value
@@ -132,7 +132,7 @@ class NodesView(View):
         return self._nodes.update[self._part(self._nodes.update, 0)]
 
     @velocity_update.writer
-    def _(self, value: np.ndarray) -> None:
+    def _write_velocity_update(self, value: np.ndarray) -> None:
         nodes = self._nodes
         if self._on_velocity:
             nodes.velocity[self._part(nodes.velocity, 0)] = value
@@ -226,7 +226,7 @@ class PointsView(View):
         return self._gather(self._place)
 
     @position.writer
-    def _(self, value: np.ndarray) -> None:
+    def _write_position(self, value: np.ndarray) -> None:
         s = self._simulation.setup
         before = self._simulation.by_id(self._place)
         self._scatter(self._place, value)
@@ -244,7 +244,7 @@ class PointsView(View):
         return self._gather(lambda points: points.v)
 
     @velocity.writer
-    def _(self, value: np.ndarray) -> None:
+    def _write_velocity(self, value: np.ndarray) -> None:
         self._scatter(lambda points: points.v, value)
 
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
@@ -302,7 +302,7 @@ class PointsView(View):
         return self._gather(self._of(Force))
 
     @force.writer
-    def _(self, value: np.ndarray) -> None:
+    def _write_force(self, value: np.ndarray) -> None:
         self._scatter(self._of(Force), value)
 
     @Shown
@@ -316,7 +316,7 @@ class PointsView(View):
         return self._gather(self._heat(Supply))[:, 0]
 
     @heat_supply.writer
-    def _(self, value: np.ndarray) -> None:
+    def _write_heat_supply(self, value: np.ndarray) -> None:
         self._scatter(self._heat(Supply), value[:, None])
 
     @staticmethod

@@ -130,7 +130,7 @@ def _name(*tags: Any) -> str:
 
 
 @sweep_points.on(Timed)
-def _(mode, visit, s, block, then, gathers, scatters, dt):
+def _sweep_points_timed(mode, visit, s, block, then, gathers, scatters, dt):
     nothing = block._replace(tiling=block.tiling._replace(count=np.zeros(3, np.int64)))
     name = _name(*visit.tasks, *visit.quantities)
     with _noted(mode.of_points, name):
@@ -140,7 +140,7 @@ def _(mode, visit, s, block, then, gathers, scatters, dt):
 
 
 @sweep_nodes.on(Timed)
-def _(mode, task, kin, nodes, ranges, dt):
+def _sweep_nodes_timed(mode, task, kin, nodes, ranges, dt):
     nothing = np.zeros_like(ranges)
     with _noted(mode.of_nodes, _name(task)):
         sweep_nodes(mode.mode, task, kin, nodes, ranges, dt)
@@ -149,7 +149,7 @@ def _(mode, task, kin, nodes, ranges, dt):
 
 
 @sum_buffers.on(Timed)
-def _(mode, quantities, s, due):
+def _sum_buffers_timed(mode, quantities, s, due):
     for now in (due, False):
         with _noted(mode.of_nodes, "sums of " + _name(*quantities)):
             sum_buffers(mode.mode, quantities, s, now)
@@ -277,7 +277,7 @@ class _Recorder(NamedTuple):
 
 
 @sweep_points.on(_Recorder)
-def _(mode, visit, s, block, then, gathers, scatters, dt):
+def _sweep_points_recorder(mode, visit, s, block, then, gathers, scatters, dt):
     reads = {name for tag in (*visit.tasks, *visit.quantities) for name in tag.reads}
     writes = {name for tag in visit.tasks for name in tag.writes}
     mode.points.extend((*reads, *writes))
@@ -285,13 +285,13 @@ def _(mode, visit, s, block, then, gathers, scatters, dt):
 
 
 @sweep_nodes.on(_Recorder)
-def _(mode, task, kin, nodes, ranges, dt):
+def _sweep_nodes_recorder(mode, task, kin, nodes, ranges, dt):
     mode.nodes.extend(task.goes_through)
     mode.regions.append(1)
 
 
 @sum_buffers.on(_Recorder)
-def _(mode, quantities, s, due):
+def _sum_buffers_recorder(mode, quantities, s, due):
     if due:
         there = {type(one) for one in s.nodes.fields}
         columns = columns_of(quantities, s.kin)

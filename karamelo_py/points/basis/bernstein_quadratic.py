@@ -30,7 +30,7 @@ class BernsteinQuadratic(NamedTuple):
 
 
 @along.on(BernsteinQuadratic)
-def _(basis, kin, grid, place, direction):
+def _along_bernstein_quadratic(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
     s = a - real(i, a)
@@ -43,12 +43,12 @@ def _(basis, kin, grid, place, direction):
 
 
 @spacing.on(BernsteinQuadratic)
-def _(basis, like):
+def _spacing_bernstein_quadratic(basis, like):
     return real(0.5, like)
 
 
 @mapped_again.on(BernsteinQuadratic)
-def _(basis, grid, moment):
+def _mapped_again_bernstein_quadratic(basis, grid, moment):
     # As with linear functions: B D^-1 grows without bound where D vanishes.
     return scale(grid.h - grid.h, moment)
 

@@ -145,7 +145,7 @@ def _along(kin, grid, place, direction):
 @along.on(CPGIMPDet)
 @along.on(CPGIMPDiagonal)
 @along.on(CPGIMPStretch)
-def _(basis, kin, grid, place, direction):
+def _along_cpgimp_stretch(basis, kin, grid, place, direction):
     return _along(kin, grid, place, direction)
 
 
@@ -161,7 +161,7 @@ class AlongWithEnds(NamedTuple):
 
 
 @along.on(CPGIMPCorners)
-def _(basis, kin, grid, place, direction):
+def _along_cpgimp_corners(basis, kin, grid, place, direction):
     line = _along(kin, grid, place, direction)
     _, lo, hi = box(grid, kin, place, direction, LEAST, MOST)
     top = cells_along(grid, direction) - 1 - line.first
@@ -181,7 +181,7 @@ def _end(at, first, top):
 
 
 @mapped_again.on(CPGIMPDiagonal)
-def _(basis, grid, moment):
+def _mapped_again_cpgimp_diagonal(basis, grid, moment):
     # As with linear functions, which these become where the box vanishes.
     return scale(grid.h - grid.h, moment)
 
@@ -214,19 +214,19 @@ def _stretched_box(kin, place: Vector, factors: Vector, f: Tensor):
 
 
 @deformed.on(CPGIMPDet)
-def _(basis, kin, place, dl):
+def _deformed_cpgimp_det(basis, kin, place, dl):
     return _scaled_box(kin, place, power(volume_ratio(kin, dl), stretched_share(kin, dl[0])))
 
 
 @deformed.on(CPGIMPDiagonal)
-def _(basis, kin, place, dl):
+def _deformed_cpgimp_diagonal(basis, kin, place, dl):
     flat = planar(kin)
     f = deform(flat, dl, _deformation(flat, place))
     return _stretched_box(flat, place, diagonal(flat, f), f)
 
 
 @deformed.on(CPGIMPStretch)
-def _(basis, kin, place, dl):
+def _deformed_cpgimp_stretch(basis, kin, place, dl):
     flat = planar(kin)
     f = deform(flat, dl, _deformation(flat, place))
     return _stretched_box(flat, place, stretch(flat, f), f)
@@ -238,7 +238,7 @@ def _(basis, kin, place, dl):
 
 
 @carried.on(CPGIMPCorners)
-def _(basis, kin):
+def _carried_cpgimp_corners(basis, kin):
     return 1 << dimension(kin)
 
 
@@ -263,7 +263,7 @@ def _carrier(kin, grid: Number, stencil: Number, corner: Number):
 
 
 @carrier.on(CPGIMPCorners)
-def _(basis, kin, grid, stencil, corner):
+def _carrier_cpgimp_corners(basis, kin, grid, stencil, corner):
     return _carrier(kin, grid, stencil, corner)
 
 
@@ -280,7 +280,7 @@ def _carry(kin, place: Vector, corner: Number, u: Vector):
 
 
 @carry.on(CPGIMPCorners)
-def _(basis, kin, place, old, corner, displacement):
+def _carry_cpgimp_corners(basis, kin, place, old, corner, displacement):
     return _carry(kin, place, corner, displacement)
 
 

@@ -39,7 +39,7 @@ class CubicSpline(NamedTuple):
 
 
 @along.on(CubicSpline)
-def _(basis, kin, grid, place, direction):
+def _along_cubic_spline(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
     cell = int(a)

@@ -27,7 +27,7 @@ class Linear(NamedTuple):
 
 
 @along.on(Linear)
-def _(basis, kin, grid, place, direction):
+def _along_linear(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
     r = a - real(i, a)
@@ -40,7 +40,7 @@ def _(basis, kin, grid, place, direction):
 
 
 @mapped_again.on(Linear)
-def _(basis, grid, moment):
+def _mapped_again_linear(basis, grid, moment):
     # B D^-1 grows without bound where D vanishes: the velocity that deforms the points leaves it
     # out, and the points keep B, so that nothing is lost.
     return scale(grid.h - grid.h, moment)

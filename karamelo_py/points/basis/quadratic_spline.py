@@ -37,7 +37,7 @@ class QuadraticSpline(NamedTuple):
 
 
 @along.on(QuadraticSpline)
-def _(basis, kin, grid, place, direction):
+def _along_quadratic_spline(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
     nearest = int(a + 0.5)
@@ -73,7 +73,7 @@ def in_bulk(grid, line, direction):
 
 
 @affine_along.on(QuadraticSpline)
-def _(basis, grid, line, direction):
+def _affine_along_quadratic_spline(basis, grid, line, direction):
     # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
     four = 4 * grid.inv_h
     affine = tuple([four * (k - line.r) * weight for k, weight in enumerate(line.weights)])
@@ -81,12 +81,12 @@ def _(basis, grid, line, direction):
 
 
 @inverse_spread.on(QuadraticSpline)
-def _(basis, grid):
+def _inverse_spread_quadratic_spline(basis, grid):
     return (4 * grid.inv_h * grid.inv_h,)
 
 
 @evenly.on(QuadraticSpline)
-def _(basis, grid, stencil):
+def _evenly_quadratic_spline(basis, grid, stencil):
     first, *rest = (in_bulk(grid, line, d) for d, line in enumerate(stencil.lines))
     for bulk in rest:
         first = first & bulk
@@ -94,7 +94,7 @@ def _(basis, grid, stencil):
 
 
 @first_node.on(QuadraticSpline)
-def _(basis, like):
+def _first_node_quadratic_spline(basis, like):
     return 0.5
 
 

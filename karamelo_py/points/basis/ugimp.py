@@ -80,7 +80,7 @@ _averaged = averaged_hats(2)
 
 
 @along.on(UGIMP)
-def _(basis, kin, grid, place, direction):
+def _along_ugimp(basis, kin, grid, place, direction):
     a, lo, hi = box(grid, kin, place, direction, 1e-3, 0.5)
     last = cells_along(grid, direction)
     lo = max(lo, real(0, a))

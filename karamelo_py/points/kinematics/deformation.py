@@ -119,7 +119,7 @@ _POLAR_STEPS = 7
 
 
 @stretch.on(Space)
-def _(kin, f):
+def _stretch_space(kin, f):
     r = f
     for _ in range(_POLAR_STEPS):
         r = _towards_rotation(kin, r)

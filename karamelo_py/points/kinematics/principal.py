@@ -19,18 +19,18 @@ def from_principal(kin, values, frame):
 
 
 @principal.on(Line)
-def _(kin, s):
+def _principal_line(kin, s):
     return s, ()
 
 
 @from_principal.on(Line)
-def _(kin, values, frame):
+def _from_principal_line(kin, values, frame):
     return values
 
 
 @principal.on(PlaneStrain)
 @principal.on(Axisymmetric)
-def _(kin, s):
+def _principal_axisymmetric(kin, s):
     half = real(0.5, s[0])
     apart = half * (s[0] - s[1])
     mean = half * (s[0] + s[1])
@@ -44,7 +44,7 @@ def _(kin, s):
 
 @from_principal.on(PlaneStrain)
 @from_principal.on(Axisymmetric)
-def _(kin, values, frame):
+def _from_principal_axisymmetric(kin, values, frame):
     # frame: cosine and sine of twice the angle to the first principal direction
     half = real(0.5, values[0])
     mean = half * (values[0] + values[1])
@@ -69,7 +69,7 @@ _SWEEPS = 8
 
 
 @principal.on(Space)
-def _(kin, s):
+def _principal_space(kin, s):
     # Jacobi's rotations (Golub & Van Loan 2013, section 8.5): directions are right to round-off
     # whether or not principal values are equal, which closed forms are not.
     a, b, c, d, e, f = s
@@ -108,5 +108,5 @@ def _composed(kin, values: Number, frame: Number):
 
 
 @from_principal.on(Space)
-def _(kin, values, frame):
+def _from_principal_space(kin, values, frame):
     return _composed(kin, values, frame)

@@ -89,7 +89,7 @@ def viscous_after(viscosity, law, j, m, rate):
 
 
 @viscous_after.on(Absent)
-def _(viscosity, law, j, m, rate):
+def _viscous_after_absent(viscosity, law, j, m, rate):
     return ()
 
 
@@ -100,7 +100,7 @@ def slowed_by_viscosity(viscosity, law, j, m, squared, density):
 
 
 @slowed_by_viscosity.on(Absent)
-def _(viscosity, law, j, m, squared, density):
+def _slowed_by_viscosity_absent(viscosity, law, j, m, squared, density):
     return squared
 
 
@@ -114,7 +114,7 @@ def borne_share(damage, memory, like):
 
 
 @borne_share.on(Absent)
-def _(damage, memory, like):
+def _borne_share_absent(damage, memory, like):
     return 1
 
 
@@ -129,7 +129,7 @@ def broken_further(damage, law, kin, m, strain, s, j, dt):
 
 
 @broken_further.on(Absent)
-def _(damage, law, kin, m, strain, s, j, dt):
+def _broken_further_absent(damage, law, kin, m, strain, s, j, dt):
     return ()
 
 
@@ -143,5 +143,5 @@ def released(damage, law, kin, j, s, m, broken):
 
 
 @released.on(Absent)
-def _(damage, law, kin, j, s, m, broken):
+def _released_absent(damage, law, kin, j, s, m, broken):
     return 0

@@ -146,7 +146,7 @@ column(EosStrength, "dissipated", dissipated_energy)
 
 
 @initial_state.on(EosStrength)
-def _(law, kin, like):
+def _initial_state_eos_strength(law, kin, like):
     m = Memory(
         initial_energy(law.eos, like),
         initial_viscous_pressure(law.viscosity, like),
@@ -160,7 +160,7 @@ def _(law, kin, like):
 
 
 @advance.on(EosStrength)
-def _(law, kin, state, dl, dt):
+def _advance_eos_strength(law, kin, state, dl, dt):
     before, s, m = state
     J = before * det(I + dl)
     eps = sym(dl)
@@ -186,23 +186,23 @@ def stress_left(law, state):
 
 
 @cauchy_stress.on(EosStrength)
-def _(law, kin, state):
+def _cauchy_stress_eos_strength(law, kin, state):
     return stress_left(law, state) - full_pressure(law, state.J, state.m) * I
 
 
 @kirchhoff_stress.on(EosStrength)
-def _(law, kin, state):
+def _kirchhoff_stress_eos_strength(law, kin, state):
     J = state.J
     return J * stress_left(law, state) - J * full_pressure(law, J, state.m) * I
 
 
 @jacobian.on(EosStrength)
-def _(law, kin, state):
+def _jacobian_eos_strength(law, kin, state):
     return state.J
 
 
 @wave_speed_squared.on(EosStrength)
-def _(law, kin, state):
+def _wave_speed_squared_eos_strength(law, kin, state):
     # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower.
     J, _, m = state
     elastic = elastic_ratio(law.strength, m.strength, J)
@@ -214,7 +214,7 @@ def _(law, kin, state):
 
 
 @energy_density.on(EosStrength)
-def _(law, kin, state):
+def _energy_density_eos_strength(law, kin, state):
     """What unloading gives back at this temperature: plastic work is not stored."""
     J, s, m = state
     elastic = elastic_ratio(law.strength, m.strength, J)
@@ -228,12 +228,12 @@ def _(law, kin, state):
 
 
 @dissipated_energy.on(EosStrength)
-def _(law, kin, state):
+def _dissipated_energy_eos_strength(law, kin, state):
     return only(state.m.loss)
 
 
 @elastic_strain.on(EosStrength)
-def _(law, kin, state):
+def _elastic_strain_eos_strength(law, kin, state):
     """ln J / 3, the mean of the elastic strain increments, and the elastic shear."""
     strain = symmetric_tensor(kin, shear_strain(law.strength, kin, state.s))
     elastic = elastic_ratio(law.strength, state.m.strength, state.J)
@@ -241,17 +241,17 @@ def _(law, kin, state):
 
 
 @plastic_strain.on(EosStrength)
-def _(law, kin, state):
+def _plastic_strain_eos_strength(law, kin, state):
     return equivalent_plastic_strain(law.strength, state.m.strength)
 
 
 @shown.on(Remembered)
-def _(what, law, kin, state):
+def _shown_remembered(what, law, kin, state):
     return state.m.strength[what.place]
 
 
 @with_stress.on(EosStrength)
-def _(law, kin, state, stress):
+def _with_stress_eos_strength(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
     J, _, m = state
     stress = symmetric_tensor(kin, stress)
@@ -263,38 +263,38 @@ def _(law, kin, state, stress):
 
 
 @specific_volume.on(EosStrength)
-def _(law):
+def _specific_volume_eos_strength(law):
     return specific_volume(law.eos)
 
 
 @damage.on(EosStrength)
-def _(law, kin, state):
+def _damage_eos_strength(law, kin, state):
     return 1 - borne_share(law.damage, state.m.damage, state.J)
 
 
 @damage_initiation.on(EosStrength)
-def _(law, kin, state):
+def _damage_initiation_eos_strength(law, kin, state):
     return initiation(law.damage, state.m.damage)
 
 
 @temperature.on(EosStrength)
-def _(law, kin, state):
+def _temperature_eos_strength(law, kin, state):
     return only(state.m.heat)
 
 
 @with_temperature.on(EosStrength)
-def _(law, kin, state, T):
+def _with_temperature_eos_strength(law, kin, state, T):
     heat = heat_from(state.m.heat, (T,))
     return state._replace(m=state.m._replace(heat=heat))
 
 
 @heat_capacity.on(EosStrength)
-def _(law, like):
+def _heat_capacity_eos_strength(law, like):
     return heat_capacity(law.temperature, like)
 
 
 @warmed.on(EosStrength)
-def _(law, kin, state, heat):
+def _warmed_eos_strength(law, kin, state, heat):
     m = state.m
     taken = taken_heat(law.eos, m.energy, heat)
     m = m._replace(energy=added(m.energy, taken), loss=added(m.loss, taken))
@@ -302,5 +302,5 @@ def _(law, kin, state, heat):
 
 
 @conductivity.on(EosStrength)
-def _(law, like):
+def _conductivity_eos_strength(law, like):
     return conductivity(law.temperature, like)

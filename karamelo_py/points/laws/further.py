@@ -57,7 +57,7 @@ def initial_further(parts, like):
 
 
 @initial_further.on(Further)
-def _(parts, like):
+def _initial_further_further(parts, like):
     return initial_part(parts.part, like) + initial_further(parts.rest, like)
 
 
@@ -68,7 +68,7 @@ def further_after(parts, memory, law, kin, j, s, memories, dt):
 
 
 @further_after.on(Further)
-def _(parts, memory, law, kin, j, s, memories, dt):
+def _further_after_further(parts, memory, law, kin, j, s, memories, dt):
     own = leading(memory, initial_part(parts.part, j))
     rest = following(memory, own)
     after = part_after(parts.part, own, law, kin, j, s, memories, dt)
@@ -82,7 +82,7 @@ def further_pressure(parts, memory, p):
 
 
 @further_pressure.on(Further)
-def _(parts, memory, p):
+def _further_pressure_further(parts, memory, p):
     own = leading(memory, initial_part(parts.part, p))
     rest = following(memory, own)
     return further_pressure(parts.rest, rest, plus(p, part_pressure(parts.part, own)))

@@ -108,24 +108,24 @@ def turned(law, dl, sigma):
 
 
 @turned.on(LinearElastic)
-def _(law, dl, sigma):
+def _turned_linear_elastic(law, dl, sigma):
     return sigma.turned(dl)
 
 
 @turned.on(FixedFrame)
-def _(law, dl, sigma):
+def _turned_fixed_frame(law, dl, sigma):
     return sigma
 
 
 @initial_state.on(LinearElastic)
 @initial_state.on(FixedFrame)
-def _(law, kin, like):
+def _initial_state_fixed_frame(law, kin, like):
     return State(1, nothing(kin))
 
 
 @advance.on(LinearElastic)
 @advance.on(FixedFrame)
-def _(law, kin, state, dl, dt):
+def _advance_fixed_frame(law, kin, state, dl, dt):
     eps = sym(dl)
     increment = 2 * law.G * eps + law.lam * tr(eps) * I
     return State(state.J * det(I + dl), turned(law, dl, state.sigma) + increment)
@@ -133,32 +133,32 @@ def _(law, kin, state, dl, dt):
 
 @kirchhoff_stress.on(LinearElastic)
 @kirchhoff_stress.on(FixedFrame)
-def _(law, kin, state):
+def _kirchhoff_stress_fixed_frame(law, kin, state):
     return state.J * state.sigma
 
 
 @cauchy_stress.on(LinearElastic)
 @cauchy_stress.on(FixedFrame)
-def _(law, kin, state):
+def _cauchy_stress_fixed_frame(law, kin, state):
     return state.sigma
 
 
 @jacobian.on(LinearElastic)
 @jacobian.on(FixedFrame)
-def _(law, kin, state):
+def _jacobian_fixed_frame(law, kin, state):
     return state.J
 
 
 @wave_speed_squared.on(LinearElastic)
 @wave_speed_squared.on(FixedFrame)
-def _(law, kin, state):
+def _wave_speed_squared_fixed_frame(law, kin, state):
     # (lam + 2 G) / rho: the moduli are constant, the volume per mass has grown by det F
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 
 @elastic_strain.on(LinearElastic)
 @elastic_strain.on(FixedFrame)
-def _(law, kin, state):
+def _elastic_strain_fixed_frame(law, kin, state):
     # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
     mean = law.lam / (3 * law.lam + 2 * law.G) * tr(state.sigma)
     return 0.5 / law.G * (state.sigma - mean * I)
@@ -166,11 +166,11 @@ def _(law, kin, state):
 
 @energy_density.on(LinearElastic)
 @energy_density.on(FixedFrame)
-def _(law, kin, state):
+def _energy_density_fixed_frame(law, kin, state):
     return 0.5 * state.J * inner(state.sigma, elastic_strain(law, kin, state))
 
 
 @with_stress.on(LinearElastic)
 @with_stress.on(FixedFrame)
-def _(law, kin, state, stress):
+def _with_stress_fixed_frame(law, kin, state, stress):
     return State(state.J, symmetric_tensor(kin, stress))

@@ -86,46 +86,46 @@ class State(NamedTuple):
 
 
 @initial_state.on(NeoHookean)
-def _(law, kin, like):
+def _initial_state_neo_hookean(law, kin, like):
     return State(unit(kin))
 
 
 @advance.on(NeoHookean)
-def _(law, kin, state, dl, dt):
+def _advance_neo_hookean(law, kin, state, dl, dt):
     return State(state.F.after(dl))
 
 
 @kirchhoff_stress.on(NeoHookean)
-def _(law, kin, state):
+def _kirchhoff_stress_neo_hookean(law, kin, state):
     # P = G (F - F^-T) + lam ln J F^-T, so tau = P F^T = G (b - I) + lam ln J I
     b = state.F.left_cauchy_green()
     return law.G * b + (law.lam * log(det(state.F)) - law.G) * I
 
 
 @cauchy_stress.on(NeoHookean)
-def _(law, kin, state):
+def _cauchy_stress_neo_hookean(law, kin, state):
     return kirchhoff_stress(law, kin, state) / det(state.F)
 
 
 @deformation.on(NeoHookean)
-def _(law, kin, state):
+def _deformation_neo_hookean(law, kin, state):
     return state.F
 
 
 @jacobian.on(NeoHookean)
-def _(law, kin, state):
+def _jacobian_neo_hookean(law, kin, state):
     return det(state.F)
 
 
 @wave_speed_squared.on(NeoHookean)
-def _(law, kin, state):
+def _wave_speed_squared_neo_hookean(law, kin, state):
     # Along a principal direction of stretch a, the tangent of P gives
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
     return speed_squared(law, state.F, law.lam * (1 - log(det(state.F))))
 
 
 @wave_speed_bound.on(NeoHookean)
-def _(law, kin, state):
+def _wave_speed_bound_neo_hookean(law, kin, state):
     # Without a series: 1 / J is above 1 - ln J (by 2 % at J = 0.8), and J / e^2 above its negative.
     J = det(state.F)
     return speed_squared(law, state.F, max(law.lam / J, -law.lam * J * exp(-2)))
@@ -137,13 +137,13 @@ def speed_squared(law, F, bulk):
 
 
 @energy_density.on(NeoHookean)
-def _(law, kin, state):
+def _energy_density_neo_hookean(law, kin, state):
     ln_J = log(det(state.F))
     excess = tr(state.F.left_cauchy_green()) - 3
     return 0.5 * law.G * excess - law.G * ln_J + 0.5 * law.lam * ln_J * ln_J
 
 
 @elastic_strain.on(NeoHookean)
-def _(law, kin, state):
+def _elastic_strain_neo_hookean(law, kin, state):
     """Green-Lagrange strain (F^T F - I) / 2."""
     return 0.5 * state.F.right_cauchy_green() - 0.5 * I

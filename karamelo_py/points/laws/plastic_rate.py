@@ -36,12 +36,12 @@ column(PlasticRate, "epdot", Smoothed())
 
 
 @initial_part.on(PlasticRate)
-def _(part, like):
+def _initial_part_plastic_rate(part, like):
     return (real(0, like), real(-1, like))  # no plastic strain is known yet
 
 
 @part_after.on(PlasticRate)
-def _(part, memory, law, kin, j, s, memories, dt):
+def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
     ep = equivalent_plastic_strain(law.strength, memories.strength)
     before = choose(memory[1] < 0, ep, memory[1])
     change = (ep - before - dt * memory[0]) / part.time
@@ -49,7 +49,7 @@ def _(part, memory, law, kin, j, s, memories, dt):
 
 
 @shown.on(Smoothed)
-def _(what, law, kin, state):
+def _shown_smoothed(what, law, kin, state):
     further = state.m.further
     return further[len(further) - 2]
 

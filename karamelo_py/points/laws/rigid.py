@@ -60,33 +60,33 @@ class Rigid(NamedTuple):
 
 
 @initial_state.on(Rigid)
-def _(law, kin, like):
+def _initial_state_rigid(law, kin, like):
     return ()
 
 
 @advance.on(Rigid)
-def _(law, kin, state, dl, dt):
+def _advance_rigid(law, kin, state, dl, dt):
     return ()
 
 
 @constrained_velocity.on(Rigid)
-def _(law, own, given):
+def _constrained_velocity_rigid(law, own, given):
     return own
 
 
 @cauchy_stress.on(Rigid)
 @kirchhoff_stress.on(Rigid)
 @elastic_strain.on(Rigid)
-def _(law, kin, state):
+def _elastic_strain_rigid(law, kin, state):
     return zero_symmetric(kin, law.specific_volume)
 
 
 @jacobian.on(Rigid)
-def _(law, kin, state):
+def _jacobian_rigid(law, kin, state):
     return real(1, law.specific_volume)
 
 
 @wave_speed_squared.on(Rigid)
 @energy_density.on(Rigid)
-def _(law, kin, state):
+def _energy_density_rigid(law, kin, state):
     return real(0, law.specific_volume)

@@ -68,12 +68,12 @@ column(Expansion, "T", temperature)
 
 
 @initial_heat.on(Expansion)
-def _(heat, like):
+def _initial_heat_expansion(heat, like):
     return Warm(heat.initial_temperature)
 
 
 @thermal_pressure.on(Expansion)
-def _(heat, T):
+def _thermal_pressure_expansion(heat, T):
     return (heat.pressure * (T[0] - heat.initial_temperature),)
 
 
@@ -90,48 +90,48 @@ def expansion_pressure(law, state):
 
 
 @initial_state.on(Thermoelastic)
-def _(law, kin, like):
+def _initial_state_thermoelastic(law, kin, like):
     return State(initial_state(law.elastic, kin, like), initial_heat(law.heat, like).T)
 
 
 @advance.on(Thermoelastic)
-def _(law, kin, state, dl, dt):
+def _advance_thermoelastic(law, kin, state, dl, dt):
     return State(advance(law.elastic, kin, state.elastic, dl, dt), state.T)
 
 
 @cauchy_stress.on(Thermoelastic)
-def _(law, kin, state):
+def _cauchy_stress_thermoelastic(law, kin, state):
     return cauchy_stress(law.elastic, kin, state.elastic) - expansion_pressure(law, state) * I
 
 
 @kirchhoff_stress.on(Thermoelastic)
-def _(law, kin, state):
+def _kirchhoff_stress_thermoelastic(law, kin, state):
     p = jacobian(law, kin, state) * expansion_pressure(law, state)
     return kirchhoff_stress(law.elastic, kin, state.elastic) - p * I
 
 
 @jacobian.on(Thermoelastic)
-def _(law, kin, state):
+def _jacobian_thermoelastic(law, kin, state):
     return jacobian(law.elastic, kin, state.elastic)
 
 
 @deformation.on(Thermoelastic)
-def _(law, kin, state):
+def _deformation_thermoelastic(law, kin, state):
     return deformation(law.elastic, kin, state.elastic)
 
 
 @wave_speed_squared.on(Thermoelastic)
-def _(law, kin, state):
+def _wave_speed_squared_thermoelastic(law, kin, state):
     return wave_speed_squared(law.elastic, kin, state.elastic)
 
 
 @wave_speed_bound.on(Thermoelastic)
-def _(law, kin, state):
+def _wave_speed_bound_thermoelastic(law, kin, state):
     return wave_speed_bound(law.elastic, kin, state.elastic)
 
 
 @energy_density.on(Thermoelastic)
-def _(law, kin, state):
+def _energy_density_thermoelastic(law, kin, state):
     """What unloading gives back at this temperature."""
     j = jacobian(law, kin, state)
     elastic = energy_density(law.elastic, kin, state.elastic)
@@ -139,37 +139,37 @@ def _(law, kin, state):
 
 
 @elastic_strain.on(Thermoelastic)
-def _(law, kin, state):
+def _elastic_strain_thermoelastic(law, kin, state):
     warmer = state.T - law.heat.initial_temperature
     return elastic_strain(law.elastic, kin, state.elastic) - law.heat.alpha * warmer * I
 
 
 @with_stress.on(Thermoelastic)
-def _(law, kin, state, stress):
+def _with_stress_thermoelastic(law, kin, state, stress):
     elastic = symmetric_tensor(kin, stress) + expansion_pressure(law, state) * I
     return State(with_stress(law.elastic, kin, state.elastic, elastic), state.T)
 
 
 @specific_volume.on(Thermoelastic)
-def _(law):
+def _specific_volume_thermoelastic(law):
     return specific_volume(law.elastic)
 
 
 @temperature.on(Thermoelastic)
-def _(law, kin, state):
+def _temperature_thermoelastic(law, kin, state):
     return state.T
 
 
 @with_temperature.on(Thermoelastic)
-def _(law, kin, state, T):
+def _with_temperature_thermoelastic(law, kin, state, T):
     return State(state.elastic, T)
 
 
 @heat_capacity.on(Thermoelastic)
-def _(law, like):
+def _heat_capacity_thermoelastic(law, like):
     return law.heat.cp
 
 
 @conductivity.on(Thermoelastic)
-def _(law, like):
+def _conductivity_thermoelastic(law, like):
     return law.heat.kappa

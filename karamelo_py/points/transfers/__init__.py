@@ -48,11 +48,11 @@ def take_nodal_velocity(transfer: type) -> None:
     """Let the points of `transfer` take the velocity of the nodes after the step, as PIC's do."""
 
     @lost_shares.on(transfer)
-    def _(transfer, like):
+    def _lost_shares_transfer(transfer, like):
         return real(1, like), real(1, like)
 
     @updated_velocity.on(transfer)
-    def _(transfer, v, v_pic, dv):
+    def _updated_velocity_transfer(transfer, v, v_pic, dv):
         return v_pic
 
 

@@ -24,24 +24,24 @@ def register(transfer: type) -> None:
     transfer.keeps_gradient = False
 
     @add_momentum.on(transfer)
-    def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, B, total):
+    def _add_momentum_transfer(transfer, kin, basis, grid, stencil, k, weight, mass, v, B, total):
         flat = planar(kin)
         affine = vector(flat, affine_weight(basis, kin, grid, stencil, k))
         return vector(flat, total) + weight * mass * vector(flat, v) + mass * (B @ affine)
 
     @affine_velocity.on(transfer)
-    def _(transfer, B, inverse_d):
+    def _affine_velocity_transfer(transfer, B, inverse_d):
         return inverse_d[0] * B if len(inverse_d) else ()
 
     @zero_moment.on(transfer)
-    def _(transfer, kin, like):
+    def _zero_moment_transfer(transfer, kin, like):
         return zero(planar(kin), like)
 
     @by_arms.on(transfer)
-    def _(transfer, inverse_d):
+    def _by_arms_transfer(transfer, inverse_d):
         return (1.0,)
 
     @add_moment.on(transfer)
-    def _(transfer, kin, basis, grid, stencil, k, weight, gradient, v, B):
+    def _add_moment_transfer(transfer, kin, basis, grid, stencil, k, weight, gradient, v, B):
         arm = vector(planar(kin), reach(basis, kin, grid, stencil, k))
         return B + outer(weight * vector(planar(kin), v), arm)

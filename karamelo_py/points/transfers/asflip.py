@@ -49,12 +49,12 @@ class ASFLIP(NamedTuple):
 
 
 @known_volume.on(ASFLIP)
-def _(transfer, law, kin, state):
+def _known_volume_asflip(transfer, law, kin, state):
     return jacobian(law, kin, state)
 
 
 @displacing_velocity.on(ASFLIP)
-def _(transfer, v, v_pic, j):
+def _displacing_velocity_asflip(transfer, v, v_pic, j):
     one = real(1, j)
     beta = choose(one - j < real(COMPRESSED, j), transfer.beta * one, j - j)
     return add_scaled(v_pic, beta, subtract(v, v_pic))

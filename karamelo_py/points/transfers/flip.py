@@ -38,13 +38,13 @@ def blended(transfer: type) -> None:
     """Let the velocity of points follow from `transfer` as that of FLIP does, by its `alpha`."""
 
     @updated_velocity.on(transfer)
-    def _(transfer, v, v_pic, dv):
+    def _updated_velocity_transfer(transfer, v, v_pic, dv):
         alpha = transfer.alpha
         return (1 - alpha) * v_pic + alpha * (v + dv)
 
     # With P = S S+ from points to points, v becomes alpha v + (1 - alpha) P v + S dv.
     @lost_shares.on(transfer)
-    def _(transfer, like):
+    def _lost_shares_transfer(transfer, like):
         alpha = transfer.alpha
         return (1 - alpha) * (1 + alpha), (1 - alpha) * (1 - alpha)
 

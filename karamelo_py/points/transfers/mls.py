@@ -36,7 +36,7 @@ class MLS(NamedTuple):
 
 
 @gradient_weight.on(MLS)
-def _(transfer, basis, kin, grid, stencil, k, gradient):
+def _gradient_weight_mls(transfer, basis, kin, grid, stencil, k, gradient):
     return with_hoop(kin, affine_weight(basis, kin, grid, stencil, k), gradient)
 
 
@@ -49,12 +49,12 @@ def with_hoop(kin, planar: Vector, gradient: Vector):
 @forces_by_arms.on(MLS, Line)
 @forces_by_arms.on(MLS, PlaneStrain)
 @forces_by_arms.on(MLS, Space)
-def _(transfer, kin):
+def _forces_by_arms_mls_space(transfer, kin):
     return True
 
 
 @by_arms.on(MLS)
-def _(transfer, inverse_d):
+def _by_arms_mls(transfer, inverse_d):
     return inverse_d
 
 
@@ -63,14 +63,14 @@ def _(transfer, inverse_d):
 @straining.on(MLS, Line)
 @straining.on(MLS, PlaneStrain)
 @straining.on(MLS, Space)
-def _(transfer, kin, gradient):
+def _straining_mls_space(transfer, kin, gradient):
     return ()
 
 
 @kept_gradient.on(MLS, Line)
 @kept_gradient.on(MLS, PlaneStrain)
 @kept_gradient.on(MLS, Space)
-def _(transfer, kin, moment, gradient):
+def _kept_gradient_mls_space(transfer, kin, moment, gradient):
     return moment
 
 

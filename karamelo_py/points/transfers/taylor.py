@@ -17,18 +17,22 @@ def register(transfer: type) -> None:
     transfer.keeps_gradient = True
 
     @add_momentum.on(transfer)
-    def _(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
+    def _add_momentum_transfer(
+        transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total
+    ):
         arm = reach(basis, kin, grid, stencil, k)
         return add_scaled(total, weight * mass, add(v, tensor_dot(planar(kin), moment, arm)))
 
     @affine_velocity.on(transfer)
-    def _(transfer, moment, inverse_d):
+    def _affine_velocity_transfer(transfer, moment, inverse_d):
         return moment
 
     @zero_moment.on(transfer)
-    def _(transfer, kin, like):
+    def _zero_moment_transfer(transfer, kin, like):
         return zero_tensor(planar(kin), like)
 
     @add_moment.on(transfer)
-    def _(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
+    def _add_moment_transfer(
+        transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment
+    ):
         return add_outer(planar(kin), moment, velocity, gradient)

@@ -66,11 +66,11 @@ class XPIC(NamedTuple):
 
 
 @updated_velocity.on(XPIC)
-def _(transfer, v, v_pic, dv):
+def _updated_velocity_xpic(transfer, v, v_pic, dv):
     # kernels.rows.sum_series has put the sum of the series, with the change, in the place of dv.
     return dv
 
 
 @terms.on(XPIC)
-def _(transfer):
+def _terms_xpic(transfer):
     return transfer.order

@@ -213,7 +213,7 @@ def register(basis: type, d: int, corners: int) -> None:
     """
 
     @first_node.on(basis)
-    def _(basis, like):
+    def _first_node_basis(basis, like):
         return real(0.5, like)
 
     for kin in tags_of(d):
@@ -229,7 +229,7 @@ def register_carried(basis: type) -> None:
     placed.on(basis)(define("basis, kin", f"return {corners}"))
 
     @carrier.on(basis)
-    def _(basis, kin, grid, stencil, corner):
+    def _carrier_basis(basis, kin, grid, stencil, corner):
         return _around(kin, grid, stencil.corners[corner])
 
     carry.on(basis)(

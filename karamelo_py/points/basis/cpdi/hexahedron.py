@@ -80,7 +80,7 @@ def _edges(kin, place: Vector):
 
 
 @domain.on(H8, Space)
-def _(basis, kin, place):
+def _domain_h8_space(basis, kin, place):
     along = _edges(kin, place)
     # Rows of the Jacobian at the Gauss points: u does not depend on xi, v not on eta, w not on
     # zeta; numbers say at which points of the other two directions.
@@ -148,7 +148,7 @@ def _least_jacobian(kin, u: Number, v: Number, w: Number):
 
 
 @upright.on(H8)
-def _(basis, kin, place):
+def _upright_h8(basis, kin, place):
     u, v, w = _edges(kin, place)
     return _least_jacobian(kin, u, v, w) > 0
 

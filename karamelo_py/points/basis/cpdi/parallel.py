@@ -103,11 +103,11 @@ for _basis in (R4, R8):
         domain.on(_basis, _tag)(domain_of)
 
     @deformed.on(_basis)
-    def _(basis, kin, place, dl):
+    def _deformed_basis(basis, kin, place, dl):
         return _deformed_edges(kin, place, dl)
 
     @extent.on(_basis)
-    def _(basis, kin, grid, place):
+    def _extent_basis(basis, kin, grid, place):
         return _extent(kin, grid, place)
 
     register(_basis, _basis.dimension, 2**_basis.dimension)

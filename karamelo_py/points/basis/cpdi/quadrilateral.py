@@ -25,7 +25,7 @@ class Q4(Domain):
 
 @domain.on(Q4, PlaneStrain)
 @domain.on(Q4, Axisymmetric)
-def _(basis, kin, place):
+def _domain_q4_axisymmetric(basis, kin, place):
     x1, y1, x2, y2, x3, y3, x4, y4 = place[2:]
     # Diagonals; their cross product is twice the area V.
     px, py = x3 - x1, y3 - y1
@@ -46,7 +46,7 @@ def _(basis, kin, place):
 
 
 @upright.on(Q4)
-def _(basis, kin, place):
+def _upright_q4(basis, kin, place):
     x1, y1, x2, y2, x3, y3, x4, y4 = place[2:]
     ax, ay, bx, by = x2 - x1, y2 - y1, x3 - x2, y3 - y2
     cx, cy, dx, dy = x4 - x3, y4 - y3, x1 - x4, y1 - y4

@@ -74,7 +74,7 @@ for _basis in (T3, Tet4):
         domain.on(_basis, _tag)(domain_of)
 
     @upright.on(_basis)
-    def _(basis, kin, place):
+    def _upright_basis(basis, kin, place):
         return _upright(kin, place)
 
     register_carried(_basis)

@@ -92,17 +92,17 @@ def warmed(heat, damage, one):
 
 
 @warmed.on(Warm)
-def _(heat, damage, one):
+def _warmed_warm(heat, damage, one):
     return one + damage.d5 * homologous(heat, damage.Tr, damage.Tm)
 
 
 @initial_damage.on(JohnsonCookDamage)
-def _(damage, like):
+def _initial_damage_johnson_cook_damage(damage, like):
     return (real(0, like),)
 
 
 @damage_after.on(JohnsonCookDamage)
-def _(damage, memory, strain, triaxiality, heat, dt):
+def _damage_after_johnson_cook_damage(damage, memory, strain, triaxiality, heat, dt):
     grows = (strain > 0) & (triaxiality > real(_CLOSED, strain))
     if not in_any(grows):
         return memory
@@ -116,7 +116,7 @@ def _(damage, memory, strain, triaxiality, heat, dt):
 
 
 @integrity.on(JohnsonCookDamage)
-def _(damage, memory):
+def _integrity_johnson_cook_damage(damage, memory):
     one = real(1, memory[0])
     zero = real(0, memory[0])
     D = real(_BRITTLENESS, memory[0]) * (memory[0] - one)
@@ -124,5 +124,5 @@ def _(damage, memory):
 
 
 @initiation.on(JohnsonCookDamage)
-def _(damage, memory):
+def _initiation_johnson_cook_damage(damage, memory):
     return memory[0]

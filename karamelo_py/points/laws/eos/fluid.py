@@ -68,17 +68,17 @@ class Tait(NamedTuple):
 
 
 @pressure.on(Tait)
-def _(eos, j, memory, heat):
+def _pressure_tait(eos, j, memory, heat):
     return max(eos.K * (power(j, -eos.gamma) - real(1, j)), -eos.tension)
 
 
 @bulk_modulus.on(Tait)
-def _(eos, j, memory, heat):
+def _bulk_modulus_tait(eos, j, memory, heat):
     return eos.K * eos.gamma * power(j, -eos.gamma)
 
 
 @compression_energy.on(Tait)
-def _(eos, j, memory):
+def _compression_energy_tait(eos, j, memory):
     one = real(1, j)
     exponent = one - eos.gamma
     whole = j if eos.tension >= eos.K else min(j, ratio_at_pressure(eos, -eos.tension, ()))
@@ -89,7 +89,7 @@ def _(eos, j, memory):
 
 
 @ratio_at_pressure.on(Tait)
-def _(eos, p, heat):
+def _ratio_at_pressure_tait(eos, p, heat):
     # Tension of K would need an infinite volume.
     one = real(1, p)
     borne = max(p, -eos.tension)

@@ -90,43 +90,43 @@ class IdealGas(NamedTuple):
 
 
 @initial_energy.on(IdealGas)
-def _(eos, like):
+def _initial_energy_ideal_gas(eos, like):
     return (eos.energy,)
 
 
 @compressed.on(IdealGas)
-def _(eos, memory, before, j, heating):
+def _compressed_ideal_gas(eos, memory, before, j, heating):
     # dE = -p dJ has the solution E J^(gamma - 1) = const, whatever the size of the step.
     return (memory[0] * power(before / j, eos.gamma - real(1, j)) + heating,)
 
 
 @taken_heat.on(IdealGas)
-def _(eos, memory, heat):
+def _taken_heat_ideal_gas(eos, memory, heat):
     # A moment may hold a little more than there was: a cold gas does not pay all of that at once.
     return (max(heat, real(-0.1, heat) * memory[0]),)
 
 
 @stored_heat.on(IdealGas)
-def _(eos, loss):
+def _stored_heat_ideal_gas(eos, loss):
     return loss
 
 
 @pressure.on(IdealGas)
-def _(eos, j, memory, heat):
+def _pressure_ideal_gas(eos, j, memory, heat):
     return (eos.gamma - real(1, j)) * memory[0] / j
 
 
 @bulk_modulus.on(IdealGas)
-def _(eos, j, memory, heat):
+def _bulk_modulus_ideal_gas(eos, j, memory, heat):
     return eos.gamma * (eos.gamma - real(1, j)) * memory[0] / j
 
 
 @compression_energy.on(IdealGas)
-def _(eos, j, memory):
+def _compression_energy_ideal_gas(eos, j, memory):
     return memory[0] - eos.energy
 
 
 @at_pressure.on(IdealGas)
-def _(eos, j, memory, p, heat):
+def _at_pressure_ideal_gas(eos, j, memory, p, heat):
     # The volume stays, the energy follows; a gas bears no tension.
     return j, (max(p, real(0, p)) * j / (eos.gamma - real(1, p)),)

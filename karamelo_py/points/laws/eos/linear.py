@@ -47,21 +47,21 @@ class LinearPressure(NamedTuple):
 
 
 @pressure.on(LinearPressure)
-def _(eos, j, memory, heat):
+def _pressure_linear_pressure(eos, j, memory, heat):
     return eos.K * (real(1, eos.K) - j)
 
 
 @bulk_modulus.on(LinearPressure)
-def _(eos, j, memory, heat):
+def _bulk_modulus_linear_pressure(eos, j, memory, heat):
     return eos.K * j
 
 
 @compression_energy.on(LinearPressure)
-def _(eos, j, memory):
+def _compression_energy_linear_pressure(eos, j, memory):
     change = real(1, eos.K) - j
     return real(0.5, eos.K) * eos.K * change * change
 
 
 @ratio_at_pressure.on(LinearPressure)
-def _(eos, p, heat):
+def _ratio_at_pressure_linear_pressure(eos, p, heat):
     return real(1, eos.K) - p / eos.K

@@ -120,17 +120,17 @@ def heated(heat, p, Tr, factor):
 
 
 @heated.on(Warm)
-def _(heat, p, Tr, factor):
+def _heated_warm(heat, p, Tr, factor):
     return p + max(heat.T - Tr, real(0, Tr)) * factor
 
 
 @pressure.on(Shock)
-def _(eos, j, memory, heat):
+def _pressure_shock(eos, j, memory, heat):
     return heated(heat, cold_pressure(eos, j), eos.Tr, eos.thermal)
 
 
 @bulk_modulus.on(Shock)
-def _(eos, j, memory, heat):
+def _bulk_modulus_shock(eos, j, memory, heat):
     one = real(1, j)
     closed = one - j
     y = eos.S * min(closed, tangent_from(eos, j))
@@ -141,7 +141,7 @@ def _(eos, j, memory, heat):
 
 
 @compression_energy.on(Shock)
-def _(eos, j, memory):
+def _compression_energy_shock(eos, j, memory):
     one, half = real(1, j), real(0.5, j)
     closed = one - j
     inside = min(closed, tangent_from(eos, j))
@@ -160,7 +160,7 @@ def _(eos, j, memory):
 
 
 @ratio_at_pressure.on(Shock)
-def _(eos, p, heat):
+def _ratio_at_pressure_shock(eos, p, heat):
     one = real(1, p)
     two = real(2, p)
     cold = (p - heated(heat, real(0, p), eos.Tr, eos.thermal)) / eos.modulus

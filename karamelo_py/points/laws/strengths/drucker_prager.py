@@ -110,12 +110,12 @@ frictional(DruckerPrager)
 
 
 @tension_bound.on(DruckerPrager)
-def _(strength, lowest):
+def _tension_bound_drucker_prager(strength, lowest):
     return max(lowest, -strength.tension)
 
 
 @pressure_response.on(DruckerPrager)
-def _(strength, kin, s, p, K, strain):
+def _pressure_response_drucker_prager(strength, kin, s, p, K, strain):
     cohesion, friction, dilation = surface(strength, strain)
     trial = sqrt(0.5 * inner(s, s))
     lowest = lowest_pressure(strength, strain)

@@ -52,32 +52,32 @@ class Viscous(NamedTuple):
 
 
 @initial_loss.on(Viscous)
-def _(strength, like):
+def _initial_loss_viscous(strength, like):
     return (real(0, like),)
 
 
 @shear_response.on(Viscous)
-def _(strength, kin, s, strain, memory, heat, dt):
+def _shear_response_viscous(strength, kin, s, strain, memory, heat, dt):
     new = scale(real(2, dt) * strength.mu / dt, deviator(kin, strain))
     return new, memory, contract(kin, new, strain)
 
 
 @damped_speed_squared.on(Viscous)
-def _(strength, squared, density):
+def _damped_speed_squared_viscous(strength, squared, density):
     # nu = 4/3 mu/rho
     return damped(squared, real(4 / 3, density) * strength.mu / (density * strength.cell_size))
 
 
 @shear_modulus.on(Viscous)
-def _(strength):
+def _shear_modulus_viscous(strength):
     return real(0, strength.mu)
 
 
 @shear_strain.on(Viscous)
-def _(strength, kin, s):
+def _shear_strain_viscous(strength, kin, s):
     return zero_symmetric(kin, strength.mu)
 
 
 @shear_energy.on(Viscous)
-def _(strength, kin, s):
+def _shear_energy_viscous(strength, kin, s):
     return real(0, strength.mu)

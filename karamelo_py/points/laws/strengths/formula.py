@@ -160,7 +160,7 @@ hardening(FlowStress)
 
 
 @flow_stress.on(FlowStress)
-def _(strength, memory, increment, heat, dt):
+def _flow_stress_flow_stress(strength, memory, increment, heat, dt):
     zero = real(0, increment)
     T = temperature_or(heat, strength.initial_temperature)
     near = real(1e-6, increment) * (increment + real(1e-4, increment))

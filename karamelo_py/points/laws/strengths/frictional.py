@@ -55,15 +55,15 @@ def frictional(strength: type) -> None:
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
 
     @elastic_ratio.on(strength)
-    def _(strength, memory, j):
+    def _elastic_ratio_strength(strength, memory, j):
         return j / (memory[1] * memory[2])
 
     @with_elastic_ratio.on(strength)
-    def _(strength, memory, j, elastic):
+    def _with_elastic_ratio_strength(strength, memory, j, elastic):
         return (memory[0], j / (elastic * memory[2]), memory[2])
 
     @respond.on(strength)
-    def _(strength, law, kin, s, strain, j, memories, dt):
+    def _respond_strength(strength, law, kin, s, strain, j, memories, dt):
         memory, heat = memories.strength, memories.heat
         trial = elastic_trial(strength.G, s, strain)
         elastic = elastic_ratio(strength, memory, j)

@@ -62,7 +62,7 @@ def hardening(strength: type, **own: float | str) -> None:
     remembers(strength, ep=0.0, **own)
 
     @shear_response.on(strength)
-    def _(strength, kin, s, strain, memory, heat, dt):
+    def _shear_response_strength(strength, kin, s, strain, memory, heat, dt):
         trial = elastic_trial(strength.G, s, strain)
         q = von_mises(trial)
         x = plastic_increment(strength, q, memory, heat, dt)

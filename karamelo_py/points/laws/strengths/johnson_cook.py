@@ -169,7 +169,7 @@ def softened(softening, heat, like):
 
 
 @softened.on(Softening, Warm)
-def _(softening, heat, like):
+def _softened_softening_warm(softening, heat, like):
     return real(1, like) - power(homologous(heat, softening.Tr, softening.Tm), softening.m)
 
 
@@ -180,7 +180,7 @@ def quickened(rate, flow, slope, increment, dt):
 
 
 @quickened.on(RateFactor)
-def _(rate, flow, slope, increment, dt):
+def _quickened_rate_factor(rate, flow, slope, increment, dt):
     one = real(1, increment)
     relative = increment / (dt * rate.epsdot0)
     faster = relative > one
@@ -190,13 +190,13 @@ def _(rate, flow, slope, increment, dt):
 
 
 @foreseen.on(JohnsonCook)
-def _(strength, memory, heat):
+def _foreseen_johnson_cook(strength, memory, heat):
     hard = power_of_strain(strength.B, strength.n, memory[0])
     return hard, softened(strength.softening, heat, hard)
 
 
 @first_guess.on(JohnsonCook)
-def _(strength, memory, q, slope):
+def _first_guess_johnson_cook(strength, memory, q, slope):
     ep, hard, soft = memory
     if not isinstance(strength.rate, Absent):
         return real(0, q), real(0, q)  # the rate rises with the strain: what is known is for none
@@ -205,7 +205,7 @@ def _(strength, memory, q, slope):
 
 
 @flow_stress.on(JohnsonCook)
-def _(strength, memory, increment, heat, dt):
+def _flow_stress_johnson_cook(strength, memory, increment, heat, dt):
     ep, before, soft = memory
     hard, slope = power_law(strength.B, strength.n, ep, before, increment)
     return quickened(strength.rate, (strength.A + hard) * soft, slope * soft, increment, dt)

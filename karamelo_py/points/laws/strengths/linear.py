@@ -41,5 +41,5 @@ def elastic_trial(G, s, strain):
 
 
 @shear_response.on(Elastic)
-def _(strength, kin, s, strain, memory, heat, dt):
+def _shear_response_elastic(strength, kin, s, strain, memory, heat, dt):
     return elastic_trial(strength.G, s, strain), memory, 0

@@ -136,7 +136,7 @@ def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
 
 
 @pressure_response.on(MohrCoulomb)
-def _(strength, kin, s, p, K, strain):
+def _pressure_response_mohr_coulomb(strength, kin, s, p, K, strain):
     k, sin_phi, sin_psi = surface(strength, strain)
     half = real(0.5, p)
     two = real(2, p)

@@ -82,12 +82,12 @@ remembers(MuI, ep=0.0, inertial=0.0)
 
 
 @elastic_ratio.on(MuI)
-def _(strength, memory, j):
+def _elastic_ratio_mu_i(strength, memory, j):
     return min(j, real(1, j))  # grains that are apart are not stretched
 
 
 @respond.on(MuI)
-def _(strength, law, kin, s, strain, j, memories, dt):
+def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
     zero, one = real(0, j), real(1, j)
     memory = memories.strength
     elastic = elastic_ratio(strength, memory, j)

@@ -65,7 +65,7 @@ remembers(LinearHardening, ep=0.0)
 
 @shear_response.on(Plastic)
 @shear_response.on(LinearHardening)
-def _(strength, kin, s, strain, memory, heat, dt):
+def _shear_response_linear_hardening(strength, kin, s, strain, memory, heat, dt):
     trial = elastic_trial(strength.G, s, strain)
     q = von_mises(trial)
     H = hardening_modulus(strength)
@@ -81,10 +81,10 @@ def hardening_modulus(strength):
 
 
 @hardening_modulus.on(Plastic)
-def _(strength):
+def _hardening_modulus_plastic(strength):
     return 0.0
 
 
 @hardening_modulus.on(LinearHardening)
-def _(strength):
+def _hardening_modulus_linear_hardening(strength):
     return strength.H

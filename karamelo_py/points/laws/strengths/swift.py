@@ -58,18 +58,18 @@ hardening(Swift)
 
 
 @foreseen.on(Swift)
-def _(strength, memory, heat):
+def _foreseen_swift(strength, memory, heat):
     return (power_of_strain(strength.B, strength.n, memory[0] - strength.C),)
 
 
 @first_guess.on(Swift)
-def _(strength, memory, q, slope):
+def _first_guess_swift(strength, memory, q, slope):
     ep, hard = memory
     return power_law_guess(strength.n, ep - strength.C, hard, q - strength.A - hard, slope)
 
 
 @flow_stress.on(Swift)
-def _(strength, memory, increment, heat, dt):
+def _flow_stress_swift(strength, memory, increment, heat, dt):
     ep, before = memory
     hard, slope = power_law(strength.B, strength.n, ep - strength.C, before, increment)
     return strength.A + hard, slope

@@ -99,7 +99,7 @@ hardening(Tabulated)
 
 
 @flow_stress.on(Tabulated)
-def _(strength, memory, increment, heat, dt):
+def _flow_stress_tabulated(strength, memory, increment, heat, dt):
     x = memory[0] + increment
     last = int(strength.count) - 1
     for k in range(last):

@@ -87,7 +87,7 @@ hardening(ZerilliArmstrong)
 
 
 @foreseen.on(ZerilliArmstrong)
-def _(strength, memory, heat):
+def _foreseen_zerilli_armstrong(strength, memory, heat):
     half = real(0.5, memory[0])
     T = temperature_or(heat, strength.initial_temperature)
     return (
@@ -98,7 +98,7 @@ def _(strength, memory, heat):
 
 
 @flow_stress.on(ZerilliArmstrong)
-def _(strength, memory, increment, heat, dt):
+def _flow_stress_zerilli_armstrong(strength, memory, increment, heat, dt):
     half, one = real(0.5, increment), real(1, increment)
     ep, athermal, root, thermal = memory
     athermal, slope = power_law(strength.C5, strength.n, ep, athermal, increment)

@@ -41,7 +41,7 @@ def temperature_or(heat, otherwise):
 
 
 @temperature_or.on(Warm)
-def _(heat, otherwise):
+def _temperature_or_warm(heat, otherwise):
     return heat.T
 
 
@@ -52,7 +52,7 @@ def heat_from(like, numbers):
 
 
 @heat_from.on(Warm)
-def _(like, numbers):
+def _heat_from_warm(like, numbers):
     return Warm(numbers[0])
 
 

@@ -63,26 +63,26 @@ column(PlasticWork, "T", temperature)
 
 
 @initial_heat.on(PlasticWork)
-def _(temperature, like):
+def _initial_heat_plastic_work(temperature, like):
     return Warm(temperature.T0)
 
 
 @heated.on(PlasticWork)
-def _(temperature, heat, work):
+def _heated_plastic_work(temperature, heat, work):
     warmer = heat.T + temperature.chi / temperature.cp * work
     return Warm(choose(temperature.Tm > heat.T, warmer, heat.T))
 
 
 @thermal_pressure.on(PlasticWork)
-def _(temperature, heat):
+def _thermal_pressure_plastic_work(temperature, heat):
     return (temperature.alpha * (heat.T - temperature.T0),)
 
 
 @heat_capacity.on(PlasticWork)
-def _(law, like):
+def _heat_capacity_plastic_work(law, like):
     return law.cp
 
 
 @conductivity.on(PlasticWork)
-def _(law, like):
+def _conductivity_plastic_work(law, like):
     return law.kappa

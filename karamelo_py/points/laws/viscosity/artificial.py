@@ -27,18 +27,18 @@ def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
 
 
 @initial_viscous_pressure.on(ArtificialViscosity)
-def _(viscosity, like):
+def _initial_viscous_pressure_artificial_viscosity(viscosity, like):
     return (real(0, like),)
 
 
 @viscous_pressure.on(ArtificialViscosity)
-def _(viscosity, rate, density, sound):
+def _viscous_pressure_artificial_viscosity(viscosity, rate, density, sound):
     closing = max(-rate, real(0, rate))
     h = viscosity.cell_size
     return (density * h * closing * (viscosity.Q1 * h * closing + viscosity.Q2 * sound),)
 
 
 @viscous_speed.on(ArtificialViscosity)
-def _(viscosity, memory, density, sound):
+def _viscous_speed_artificial_viscosity(viscosity, memory, density, sound):
     # nu / h = Q1 h |d| + Q2 c, and q / rho >= Q1 (h d)^2
     return sqrt(viscosity.Q1 * memory[0] / density) + viscosity.Q2 * sound

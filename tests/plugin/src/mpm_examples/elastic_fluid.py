@@ -43,45 +43,45 @@ class ElasticFluid(NamedTuple):
 
 
 @initial_state.on(ElasticFluid)
-def _(law, kin, like):
+def _initial_state_elastic_fluid(law, kin, like):
     return (real(1, like),)
 
 
 @advance.on(ElasticFluid)
-def _(law, kin, state, dl, dt):
+def _advance_elastic_fluid(law, kin, state, dl, dt):
     return (state[0] * volume_ratio(kin, dl),)
 
 
 @cauchy_stress.on(ElasticFluid)
-def _(law, kin, state):
+def _cauchy_stress_elastic_fluid(law, kin, state):
     # Without shear: sigma = K (J - 1) I.
     zero = zero_symmetric(kin, law.K)
     return add_pressure(kin, real(1, law.K), zero, law.K * (state[0] - real(1, law.K)))
 
 
 @kirchhoff_stress.on(ElasticFluid)
-def _(law, kin, state):
+def _kirchhoff_stress_elastic_fluid(law, kin, state):
     return scale(state[0], cauchy_stress(law, kin, state))
 
 
 @jacobian.on(ElasticFluid)
-def _(law, kin, state):
+def _jacobian_elastic_fluid(law, kin, state):
     return state[0]
 
 
 @wave_speed_squared.on(ElasticFluid)
-def _(law, kin, state):
+def _wave_speed_squared_elastic_fluid(law, kin, state):
     # dp/d(density), with density = rho0 / J
     return law.K * law.specific_volume * state[0] * state[0]
 
 
 @energy_density.on(ElasticFluid)
-def _(law, kin, state):
+def _energy_density_elastic_fluid(law, kin, state):
     excess = state[0] - real(1, law.K)
     return real(0.5, law.K) * law.K * excess * excess
 
 
 @elastic_strain.on(ElasticFluid)
-def _(law, kin, state):
+def _elastic_strain_elastic_fluid(law, kin, state):
     third = (state[0] - real(1, law.K)) / real(3, law.K)
     return add_pressure(kin, real(1, law.K), zero_symmetric(kin, law.K), third)

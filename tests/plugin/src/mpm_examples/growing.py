@@ -30,5 +30,5 @@ class Growing(NamedTuple):
 
 
 @updated_velocity.on(Growing)
-def _(transfer, v, v_pic, dv):
+def _updated_velocity_growing(transfer, v, v_pic, dv):
     return scale(transfer.factor**transfer.times, add(v, dv))

@@ -30,10 +30,10 @@ column(Heating, "T", temperature)
 
 
 @initial_heat.on(Heating)
-def _(temperature, like):
+def _initial_heat_heating(temperature, like):
     return Warm(temperature.T0)
 
 
 @heated.on(Heating)
-def _(temperature, heat, work):
+def _heated_heating(temperature, heat, work):
     return Warm(heat.T + work / temperature.cp)

@@ -38,21 +38,21 @@ class Logarithmic(NamedTuple):
 
 
 @pressure.on(Logarithmic)
-def _(eos, j, memory, heat):
+def _pressure_logarithmic(eos, j, memory, heat):
     return -eos.K * log(j)
 
 
 @bulk_modulus.on(Logarithmic)
-def _(eos, j, memory, heat):
+def _bulk_modulus_logarithmic(eos, j, memory, heat):
     return eos.K
 
 
 @compression_energy.on(Logarithmic)
-def _(eos, j, memory):
+def _compression_energy_logarithmic(eos, j, memory):
     # The integral of p dj from j to 1.
     return eos.K * (real(1, j) - j + j * log(j))
 
 
 @ratio_at_pressure.on(Logarithmic)
-def _(eos, p, heat):
+def _ratio_at_pressure_logarithmic(eos, p, heat):
     return exp(-p / eos.K)

@@ -49,12 +49,12 @@ def fading(strength, dt):
 
 
 @flow_stress.on(Recovering)
-def _(strength, memory, increment, heat, dt):
+def _flow_stress_recovering(strength, memory, increment, heat, dt):
     R = (memory[1] + strength.H * increment) * fading(strength, dt)
     return strength.A + R, strength.H * fading(strength, dt)
 
 
 @hardened.on(Recovering)
-def _(strength, memory, increment, dt):
+def _hardened_recovering(strength, memory, increment, dt):
     R = (memory[1] + strength.H * increment) * fading(strength, dt)
     return (memory[0] + increment, R)

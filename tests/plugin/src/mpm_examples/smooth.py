@@ -32,7 +32,7 @@ class Smooth(NamedTuple):
 
 
 @along.on(Smooth)
-def _(basis, kin, grid, place, direction):
+def _along_smooth(basis, kin, grid, place, direction):
     hat = along(Linear(), kin, grid, place, direction)
     r, one, two = hat.r, real(1, hat.r), real(2, hat.r)
     right = r + basis.share * r * (one - r) * (two * r - one)

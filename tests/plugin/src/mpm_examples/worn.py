@@ -28,20 +28,20 @@ column(Worn, "damage", damage)
 
 
 @initial_damage.on(Worn)
-def _(damage, like):
+def _initial_damage_worn(damage, like):
     return (real(0, like),)
 
 
 @damage_after.on(Worn)
-def _(damage, memory, strain, triaxiality, heat, dt):
+def _damage_after_worn(damage, memory, strain, triaxiality, heat, dt):
     return (min(memory[0] + strain / damage.limit, real(1, strain)),)
 
 
 @integrity.on(Worn)
-def _(damage, memory):
+def _integrity_worn(damage, memory):
     return real(1, memory[0]) - memory[0]
 
 
 @initiation.on(Worn)
-def _(damage, memory):
+def _initiation_worn(damage, memory):
     return memory[0]
