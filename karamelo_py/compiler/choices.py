@@ -15,6 +15,8 @@ from numba.core import event
 _OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
 # What Numba's own functions do with lanes cannot be followed from them: all of it is in every key.
 WHOLE = [str(path) for path in sorted(Path(__file__).with_name("lanes").glob("*.py"))]
+# Nor are methods of tensors, which belong to objects and not to names.
+WHOLE.append(str(Path(__file__).parents[1] / "points" / "kinematics" / "tensors.py"))
 SPELLED = "<spelled>"  # the file of functions that are written at compile time
 
 

@@ -17,7 +17,7 @@ from karamelo_py.compiler.choices import (
     tag_class,
 )
 from karamelo_py.compiler.trace import forget, roll, run_for_kernel, traced
-from karamelo_py.compiler.values import at_work
+from karamelo_py.compiler.values import OF_REALS, at_work
 
 # Point functions must melt into the loops that call them, however large they get.
 _INLINED = {"forceinline": True, "no_cfunc_wrapper": True}
@@ -246,6 +246,9 @@ def _choose(condition, a, b):
 
 def _one_of(condition: bool, a: float, b: float) -> float:
     return a if condition else b
+
+
+OF_REALS |= {fma, choose}
 
 
 def in_all(condition: bool) -> bool:

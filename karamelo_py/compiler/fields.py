@@ -38,6 +38,7 @@ from numba.extending import lower_builtin, type_callable
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import is_held, item_of
+from karamelo_py.compiler.tuples import count_in, flat, nested_as
 
 LINE = 64  # bytes that caches get at once
 
@@ -230,8 +231,12 @@ def _lower_field(context, builder, signature, arguments):
 
 @shared
 def load(array, p, like):
-    """Components 0, 1, ... of point `p`, as many as `like` has; none where there is no array."""
-    return () if array is None else tuple([array[k, p] for k in range(len(like))])
+    """Components 0, 1, ... of point `p`, as `like` has them; none where there is no array."""
+    if array is None:
+        return ()
+    if type(like) is tuple:
+        return tuple([array[k, p] for k in range(len(like))])
+    return nested_as(like, tuple([array[k, p] for k in range(count_in(like))]))
 
 
 @shared
@@ -244,6 +249,7 @@ def store(array, p, values):
 def store_from(array, p, first, values):
     """Components from `first` on of point `p` become those of `values`; earlier ones stay."""
     if array is not None:
+        values = flat(values)
         for k in range(first, len(values)):
             array[k, p] = values[k]
 

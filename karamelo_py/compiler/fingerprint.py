@@ -167,6 +167,8 @@ def _function(function: Callable) -> tuple[str, list]:
     if hasattr(function, "find") and hasattr(function, "tags"):
         # Its implementations are in the choices.
         return f"point function {name_of(function)} {function.tags}", []
+    if hasattr(function, "inner"):
+        return f"method {name_of(function)}", [function.inner]
     if is_opaque(function):
         return f"function {name_of(function)}", []
     code = function.__code__
@@ -246,6 +248,8 @@ def _class(one: type) -> tuple[str, list]:
     fields = getattr(one, "_fields", ())
     parts: list = [*one.__bases__, fields]
     for key, value in vars(one).items():
-        if not key.startswith(("__", "_abc_")) and key not in fields:
+        if getattr(value, "inner", None) is not None:  # a method of `algebra`
+            parts += [key, value.inner]
+        elif not key.startswith(("__", "_abc_")) and key not in fields:
             parts += [key, value]
     return f"class {name}", parts

@@ -55,11 +55,28 @@ def is_value(thing: Any) -> bool:
     return isinstance(thing, Value)
 
 
+def is_real(thing: Any) -> bool:
+    """Whether it is a real number that only a run knows."""
+    return isinstance(thing, Value) and isinstance(thing._kind, types.Float)
+
+
+def is_literal(thing: Any) -> bool:
+    """Whether it is a number without a precision of its own."""
+    return type(thing) in (int, float)
+
+
 def _is_same(a: Any, b: Any) -> bool:
     if a is b:
         return True
     plain = isinstance(a, _PLAIN) and type(a) is type(b)
     return plain and repr(a) == repr(b)
+
+
+class Grows(Untraceable):
+    """A literal, carried from turn to turn of a loop, becomes a number of a type of its own."""
+
+    def __init__(self, place: int, kind: types.Type):
+        self.place, self.kind = place, kind
 
 
 class Flow:
@@ -150,7 +167,14 @@ class Flow:
             return _DROPPED
         kinds = [types.unliteral(self.lowering.kind_of(t)) for t in things]
         kind = kinds[0]
-        if any(k != kind for k in kinds):
+        real = [k for t, k in zip(things, kinds, strict=True) if is_real(t)]
+        if (
+            real
+            and all(k == real[0] for k in real)
+            and all(is_real(t) or is_literal(t) for t in things)
+        ):
+            kind = real[0]  # literals have no precision of their own
+        elif any(k != kind for k in kinds):
             kind = self.lowering.typing.unify_types(*kinds)
         if kind is None or isinstance(kind, types.Optional | types.UnicodeType):
             return _DROPPED
@@ -160,15 +184,21 @@ class Flow:
 
     # --- loops
 
-    def loop(self, names: dict[str, Any], changed: frozenset[str]) -> tuple[Head, dict[str, Any]]:
-        """A loop begins, in which names stand for something else each time: what they stand for."""
+    def loop(
+        self, names: dict[str, Any], changed: frozenset[str], grown: dict[int, types.Type]
+    ) -> tuple[Head, dict[str, Any]]:
+        """A loop begins, in which names stand for something else each time: what they stand for.
+
+        `grown` are the types that literals among these get, by their places.
+        """
         leaves: list[_Leaf] = []
+        self.grown = grown
         inside = dict(names)
-        for name in changed & names.keys():
+        for name in sorted(changed & names.keys()):
             inside[name] = self._carried(names[name], leaves)
         block = self._block()
         self._enter(block, leaves, [leaf.on[0] for leaf in leaves])
-        carried = {name: inside[name] for name in changed & names.keys()}
+        carried = {name: inside[name] for name in sorted(changed & names.keys())}
         self.start(Way(block, {}, dict(self.lowering.read)))
         return Head(block, leaves, carried), inside
 
@@ -179,6 +209,7 @@ class Flow:
         if thing is None or not isinstance(thing, (Value, HeldValue, *_PLAIN)):
             return thing
         kind = types.unliteral(self.lowering.kind_of(thing))
+        kind = self.grown.get(len(leaves), kind)
         made = (HeldValue if isinstance(thing, HeldValue) else Value)(kind, None)
         leaves.append(_Leaf(made, [thing]))
         return made
@@ -186,6 +217,7 @@ class Flow:
     def close(self, head: Head, names: dict[str, Any]) -> None:
         """Back to where a loop begins."""
         values: list = []
+        self.began = [leaf.on[0] for leaf in head.leaves]
         for name, before in head.names.items():
             if name not in names:
                 raise Untraceable
@@ -196,6 +228,12 @@ class Flow:
         """What the leaves of `before` become, in their order."""
         if isinstance(before, Value | HeldValue):
             kind = types.unliteral(self.lowering.kind_of(after))
+            if (
+                kind != before._kind
+                and is_literal(self.began[len(values)])
+                and isinstance(getattr(kind, "scalar", kind), types.Float)
+            ):
+                raise Grows(len(values), kind)
             if kind != before._kind and (
                 self.lowering.typing.unify_types(kind, before._kind) != before._kind
             ):

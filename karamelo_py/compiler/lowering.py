@@ -34,6 +34,9 @@ class Lowering:
         What was read of held tuples on the way to here.
     """
 
+    spread: Callable  # what makes lanes of a number
+    converted: Callable  # what makes lanes of real numbers of lanes of whole ones
+
     def __init__(self, seen: Callable, typing: Any, context: Any = None, builder: Any = None):
         self.seen, self.typing, self.context, self.builder = seen, typing, context, builder
         self.classes: set[type] = set()
@@ -91,6 +94,9 @@ class Lowering:
             items = [self.lowered(a, k) for a, k in zip(thing, wanted, strict=True)]
             return self.context.make_tuple(self.builder, wanted, items)
         number = isinstance(thing, int | float | np.generic)
+        if number and hasattr(wanted, "width"):
+            made = self.context.get_constant_generic(self.builder, wanted.scalar, thing)
+            return self.spread(self.builder, made, wanted)
         if number and not isinstance(wanted, types.Literal):
             kind = types.unliteral(kind)
             made = self.context.get_constant_generic(self.builder, kind, thing)
@@ -123,6 +129,14 @@ class Lowering:
         values = [self.lowered(a, k) for a, k in zip(arguments, called.args, strict=True)]
         made = resolved.made(self.context)
         return self.wrapped(called.return_type, made(self.builder, values))
+
+    def in_type_of(self, thing: Any, like: Any) -> Any:
+        """A whole number as a real one of the type of `like`."""
+        if hasattr(thing._kind, "width"):
+            return self.call(self.converted, (thing, like))
+        kind = getattr(like._kind, "scalar", like._kind)
+        value = self.builder and self.context.cast(self.builder, thing._value, thing._kind, kind)
+        return Value(kind, value)
 
     def call_bound(self, method: Value, arguments: tuple) -> Any:
         """What a method of a number or an array gives."""

@@ -37,6 +37,7 @@ from karamelo_py.compiler.flow import Flow
 from karamelo_py.compiler.lowering import Lowering, numbers_of, resolutions
 from karamelo_py.compiler.methods import refuse_methods
 from karamelo_py.compiler.values import (
+    OF_REALS,
     OF_WHOLE,
     Asks,
     Emitted,
@@ -44,10 +45,14 @@ from karamelo_py.compiler.values import (
     HeldValue,
     Untraceable,
     Value,
+    alike,
     asking,
     at_work,
     counting,
+    derivatives,
     emit,
+    has_derivatives,
+    is_literal,
     now,
     writing,
 )
@@ -77,6 +82,10 @@ class _Dispatched(Emitted):
     def __call__(self, *arguments: Any) -> Any:
         if self.counts(arguments):
             return self.seen(*arguments)
+        if self.seen in derivatives and has_derivatives(arguments):
+            return now().seen(derivatives[self.seen])(*arguments)
+        if self.seen in OF_REALS:
+            arguments = alike(arguments)
         lowering = now()
         kinds = _kinds_of(self.seen, map(lowering.kind_of, arguments))
         found = _formula(self.seen, lowering.typing, kinds)
@@ -116,7 +125,13 @@ def _attribute(thing: Any, *name: Any) -> Any:
 
 
 _OF_NUMBERS = {*OF_WHOLE, float}
-_INSTEAD = {type: _class_of, isinstance: _is_instance, range: counting, getattr: _attribute}
+_INSTEAD = {
+    is_literal: is_literal,
+    type: _class_of,
+    isinstance: _is_instance,
+    range: counting,
+    getattr: _attribute,
+}
 _SAFE = {
     callable,
     len,
@@ -134,7 +149,7 @@ _SAFE = {
     slice,
     hasattr,
 }
-_CONSTANT = (type(None), bool, int, float, str, np.number, np.bool_)
+_CONSTANT = (type(None), type(NotImplemented), bool, int, float, str, np.number, np.bool_)
 
 
 def _seen(thing: Any) -> Any:

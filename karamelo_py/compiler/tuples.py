@@ -48,15 +48,22 @@ def flat(nested):
 
 @shared
 def nested_as(like, numbers):
-    """Numbers one after another, in tuples nested as those of `like`."""
-    made, begin = (), 0
+    """Numbers one after another, in tuples nested as those of `like`, and of their classes."""
+    made, begin = [], 0
     for item in like:
         inner = isinstance(item, tuple)
-        end = begin + (len(flat(item)) if inner else 1)
-        own = numbers[begin:end]
-        made += (nested_as(item, own),) if inner else own
+        end = begin + (count_in(item) if inner else 1)
+        made.append(nested_as(item, numbers[begin:end]) if inner else numbers[begin])
         begin = end
-    return made
+    return type(like)(*made) if hasattr(like, "_fields") else tuple(made)
+
+
+@shared
+def count_in(nested):
+    """How many numbers nested tuples have."""
+    if type(nested) is tuple and not nested:
+        return 0
+    return sum([count_in(item) if isinstance(item, tuple) else 1 for item in nested])
 
 
 @shared
@@ -113,20 +120,25 @@ def add_row(a, first, b):
 
 @shared
 def leading(values, like):
-    """The first len(like) of `values`."""
-    return values[: len(like)]
+    """The first of the numbers in `values`, as `like` is."""
+    return nested_as(like, flat(values)[: count_in(like)])
 
 
 @shared
 def following(values, like):
-    """What comes after the first len(like) of `values`, perhaps nothing."""
-    return values[len(like) :]
+    """The numbers in `values` after those that are in `like`, perhaps none."""
+    return flat(values)[count_in(like) :]
 
 
 @shared
 def plus(number, present):
     """number + present[0], or the number alone where `present` is empty."""
     return number + present[0] if len(present) else number
+
+
+def only(present):
+    """present[0], or 0 where `present` is empty."""
+    return present[0] if len(present) else 0
 
 
 @shared

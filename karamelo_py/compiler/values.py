@@ -5,6 +5,7 @@ meets one becomes code of the function that is compiled.
 """
 
 import builtins
+import math
 import operator
 import sys
 import types as python
@@ -12,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from numba import types
 
 from karamelo_py.compiler.held import _Held
@@ -77,6 +79,38 @@ def at_work() -> bool:
     return bool(_lowerings)
 
 
+def _real_kind(thing: Any) -> Any:
+    """The number type of a real number or of lanes of these; None of all else."""
+    kind = thing._kind if isinstance(thing, Value) else None
+    kind = getattr(kind, "scalar", kind)
+    return kind if isinstance(kind, types.Float) else None
+
+
+def alike(arguments: tuple) -> tuple:
+    """Literals, and numbers of things, as numbers of the type of the real numbers beside them.
+
+    A literal has no precision of its own: `2 * x` is single where x is.
+    """
+    kinds = [kind for kind in map(_real_kind, arguments) if kind is not None]
+    if not kinds:
+        return arguments
+    kind = max(kinds, key=lambda k: k.bitwidth)
+    like = next(a for a in arguments if _real_kind(a) is kind)
+    return tuple([_in_type_of(like, kind, a) for a in arguments])
+
+
+def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
+    if type(thing) in (int, float):
+        with np.errstate(over="ignore"):
+            return thing if kind.bitwidth == 64 else np.float32(thing)
+    if not isinstance(thing, Value):
+        return thing
+    own = getattr(thing._kind, "scalar", thing._kind)
+    if isinstance(own, types.Integer) and not isinstance(own, types.Boolean):
+        return now().in_type_of(thing, like)
+    return thing
+
+
 def emit(function: Callable, *arguments: Any) -> Any:
     """What `function` gives for these arguments: code of Numba's, or of what was chosen by type."""
     return now().call(function, arguments)
@@ -132,11 +166,21 @@ _BINARY = ("add", "sub", "mul", "truediv", "floordiv", "mod", "pow")
 _BITS = ("and_", "or_", "xor", "lshift", "rshift")
 
 
+def _operated(operation: Callable, a: Any, b: Any) -> Any:
+    """What an operator gives; of tensors and the like, what these make of it."""
+    if isinstance(a if isinstance(b, Value) else b, tuple):
+        return NotImplemented
+    if operation is operator.pow and type(b) is int and 1 < b <= 4 and _real_kind(a):
+        half = a * a if b != 3 else a
+        return half * half if b == 4 else (half * a if b == 3 else half)
+    return emit(operation, *alike((a, b)))
+
+
 def _in_place(operation: Callable) -> Callable:
     def apply(a: Value, b: Any) -> Any:
         if isinstance(a._kind, types.Array):  # it would change
             raise Untraceable
-        return emit(operation, a, b)
+        return _operated(operation, a, b)
 
     return apply
 
@@ -145,12 +189,12 @@ def _operators() -> None:
     for name in (*_BINARY, *_BITS):
         operation = getattr(operator, name)
         plain = name.rstrip("_")
-        setattr(Value, f"__{plain}__", lambda a, b, do=operation: emit(do, a, b))
-        setattr(Value, f"__r{plain}__", lambda a, b, do=operation: emit(do, b, a))
+        setattr(Value, f"__{plain}__", lambda a, b, do=operation: _operated(do, a, b))
+        setattr(Value, f"__r{plain}__", lambda a, b, do=operation: _operated(do, b, a))
         setattr(Value, f"__i{plain}__", _in_place(operation))
     for name in ("lt", "le", "gt", "ge", "eq", "ne"):
         operation = getattr(operator, name)
-        setattr(Value, f"__{name}__", lambda a, b, do=operation: emit(do, a, b))
+        setattr(Value, f"__{name}__", lambda a, b, do=operation: _operated(do, a, b))
     for name in ("neg", "pos", "invert"):
         operation = getattr(operator, name)
         setattr(Value, f"__{name}__", lambda a, do=operation: emit(do, a))
@@ -193,6 +237,20 @@ class HeldValue:
     __eq__ = __ne__ = __hash__ = __contains__ = __add__ = __radd__ = ask
 
 
+derivatives: dict = {}  # of functions, for numbers with derivatives (`karamelo_py.points.dual`)
+
+
+def has_derivatives(arguments: tuple) -> bool:
+    """Whether one of the arguments is such a number."""
+    kind = derivatives.get("class")
+    return kind is not None and any(isinstance(a, kind) for a in arguments)
+
+
+def is_literal(thing: Any) -> bool:
+    """Whether a number stands in the text, so that it is known."""
+    return type(thing) in (int, float)
+
+
 class Emitted:
     """A function that compiled code has a version of its own of."""
 
@@ -200,7 +258,15 @@ class Emitted:
         self.seen = function
 
     def __call__(self, *arguments: Any) -> Any:
-        return self.seen(*arguments) if self.counts(arguments) else emit(self.seen, *arguments)
+        if self.counts(arguments):
+            return self.seen(*arguments)
+        if self.seen in derivatives and has_derivatives(arguments):
+            return now().seen(derivatives[self.seen])(*arguments)
+        if self.seen in OF_REALS:
+            if all(type(a) in (int, float) for a in arguments):
+                return self.seen(*arguments)  # known already
+            arguments = alike(arguments)
+        return emit(self.seen, *arguments)
 
     def counts(self, arguments: tuple) -> bool:
         """Whether it is about whole numbers that are known, as lengths of loops are."""
@@ -208,6 +274,8 @@ class Emitted:
 
 
 OF_WHOLE = {min, max, abs, int, bool}
+# Functions whose literals are of the type of the numbers beside them; more are added by name.
+OF_REALS = {min, max, *(f for n, f in vars(math).items() if callable(f) and n[0] != "_")}
 
 LONGEST = 1000  # range that is gone through
 LONG = 8  # range that is gone through where it need not be

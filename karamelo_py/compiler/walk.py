@@ -14,7 +14,7 @@ from typing import Any
 
 from numba import types
 
-from karamelo_py.compiler.flow import Counter, Flow, Range, Way, is_value
+from karamelo_py.compiler.flow import Counter, Flow, Grows, Range, Way, is_value
 from karamelo_py.compiler.terms import BINARY, CHANGING, Terms
 from karamelo_py.compiler.texts import NotKnown, text_of
 from karamelo_py.compiler.values import LONG, Asks, Untraceable
@@ -48,6 +48,7 @@ class Walked:
         self.function, self.flow, self.rolled = function, flow, rolled
         self.definition = text_of(function)
         self.unrolled: set[ast.For] = set()  # loops that must be
+        self.grown: dict[tuple, dict] = {}  # types of literals that loops begin with, by place
         self.signature = inspect.signature(function)
         self.__code__ = function.__code__
         free = function.__code__.co_freevars
@@ -258,13 +259,39 @@ class _Walk(Terms):
     def roll(
         self, node: ast.For | ast.While, counter: Counter | None, item: Callable | None = None
     ) -> None:
-        """A loop that ends when the run says so; `item` of a count is what it is about then."""
+        """A loop that ends when the run says so; `item` of a count is what it is about then.
+
+        Types are found first: literals that it begins with become numbers of these types.
+        """
+        kinds = tuple(sorted((n, v._kind._code) for n, v in self.names.items() if is_value(v)))
+        grown = self.walked.grown.setdefault((node, kinds), {})
+        state = dict(self.names), self.breaks, self.continues, [*self.returns]
+        read = dict(self.flow.lowering.read)
+        while True:
+            try:
+                self.rolled(node, counter, item, grown)
+                return
+            except Grows as literal:
+                if self.flow.builder:
+                    raise
+                grown[literal.place] = literal.kind
+                self.names, self.breaks, self.continues, self.returns = (
+                    dict(state[0]),
+                    state[1],
+                    state[2],
+                    [*state[3]],
+                )
+                self.goes, self.flow.lowering.read = True, dict(read)
+
+    def rolled(
+        self, node: ast.For | ast.While, counter: Counter | None, item: Callable | None, grown: dict
+    ) -> None:
         outer = self.breaks, self.continues
         self.breaks, self.continues = [], []
         if counter:
             self.names[_COUNT] = counter.start
         changed = _stored(node) | ({_COUNT} if counter else frozenset())
-        head, self.names = self.flow.loop(self.names, changed)
+        head, self.names = self.flow.loop(self.names, changed, grown)
         count = self.names.get(_COUNT)
         condition = counter.goes_on(count) if counter else self.do(node.test)
         ways = []

@@ -8,7 +8,7 @@ from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.lanes import Eights, Fours
 from karamelo_py.compiler.lanes.records import accumulate_affine
-from karamelo_py.compiler.tuples import add, add_scaled, scale
+from karamelo_py.compiler.tuples import add, add_scaled, nested_as, scale
 from karamelo_py.kernels.arrays import MASS, of_force
 from karamelo_py.kernels.averaging import NodalStress
 from karamelo_py.kernels.g2p import Move, update_at, zero_vector
@@ -163,7 +163,8 @@ def _gathered_at_once_move(task, w, stencil, total):
     moment = from_columns(
         planar(w.kin), tuple([add_scaled(scale(step, m), way, v) for m, way in pairs])
     )
-    return v, add(total[1], changes[0]), scale(real(factor[0], step), moment)
+    moment = scale(real(factor[0], step), moment)
+    return v, add(total[1], changes[0]), nested_as(total[2], moment)
 
 
 @shared

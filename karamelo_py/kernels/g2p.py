@@ -50,6 +50,7 @@ from karamelo_py.points.kinematics import (
     volume_ratio,
     zero_tensor,
 )
+from karamelo_py.points.kinematics.tensors import tensor, vector
 from karamelo_py.points.laws import (
     advance,
     constrained_velocity,
@@ -378,8 +379,9 @@ def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
 def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
     law = law_of(w, p)
-    old = load_vector(w.kin, w.points.v, p)
-    v = constrained_velocity(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
+    old = vector(w.kin, load_vector(w.kin, w.points.v, p))
+    v_pic, dv = vector(w.kin, total[0]), vector(w.kin, total[1])
+    v = constrained_velocity(law, old, updated_velocity(w.transfer, old, v_pic, dv))
     x = load_vector(w.kin, w.places.x, p)
     j = known_volume(w.transfer, law, w.kin, state_of(w, law, p, dt))
     displacing = displacing_velocity(w.transfer, v, total[0], j)
@@ -422,7 +424,7 @@ def _strain(w, x, p, dt, dl, ratio, fastest):
     old = state_of(w, law, p, dt)
     f = deformation_of(w.frame, w.kin, law, old, w.points, p)
     increment = spatial_increment(w.frame, w.kin, dl, f)
-    state = advance(law, w.kin, old, increment, dt)
+    state = advance(law, w.kin, old, tensor(w.kin, increment), dt)
     store(w.points.state, p, state)
     now = strained(w.frame, w.kin, f, dl)
     store_optional(field(w.points.fields, DeformationGradient), p, now)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import index, point_function, prefetch, real, shared
 from karamelo_py.compiler.fields import field, load, load_vector
-from karamelo_py.compiler.tuples import record
+from karamelo_py.compiler.tuples import count_in, record
 from karamelo_py.points.basis import blank, locate
 from karamelo_py.points.frames import DeformationGradient, Total
 from karamelo_py.points.kinematics import zero_tensor
@@ -70,7 +70,7 @@ def ask_ahead(w, p, like):
     if w.kin.dimension == 3 and len(moment):
         _ask_for_motion(w, p)
         _ask(field(w.points.fields, Moment), len(moment), p)
-        _ask(w.points.state, len(initial_state(law_of(w, p), w.kin, like)), p)
+        _ask(w.points.state, count_in(initial_state(law_of(w, p), w.kin, like)), p)
 
 
 @shared
@@ -78,7 +78,7 @@ def ask_ahead_of_stretch(w, p, like):
     """The same of what a stretch of points is settled with, while it gathers."""
     if w.kin.dimension == 3:
         _ask_for_motion(w, p)
-        _ask(w.points.state, len(initial_state(law_of(w, p), w.kin, like)), p)
+        _ask(w.points.state, count_in(initial_state(law_of(w, p), w.kin, like)), p)
         f = field(w.points.fields, DeformationGradient)
         if f is not None:
             _ask(f, len(zero_tensor(w.kin, like)), p)

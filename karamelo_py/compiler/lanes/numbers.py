@@ -24,6 +24,7 @@ from karamelo_py.compiler.compile import (
     round_off,
 )
 from karamelo_py.compiler.lanes.registers import I32, Lanes, call_vector, known, splat, vector_of
+from karamelo_py.compiler.lowering import Lowering
 
 # --- arithmetic -------------------------------------------------------------------------------
 
@@ -270,6 +271,10 @@ def _converted(typing_context, value, like):
         return convert(arguments[0], vector_of(lanes))
 
     return lanes(value, like), codegen
+
+
+Lowering.converted = _converted
+Lowering.spread = staticmethod(splat)
 
 
 @intrinsic

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, in_all, real, shared
+from karamelo_py.compiler.compile import choose, in_all
 from karamelo_py.points.basis import first_node
 from karamelo_py.points.basis.product import (
     Along,
@@ -40,38 +40,34 @@ class QuadraticSpline(NamedTuple):
 def _along_quadratic_spline(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
-    nearest = int(a + real(0.5, a))
+    nearest = int(a + 0.5)
     bulk = (nearest >= 1) & (nearest < last)
-    t = a - real(nearest, a)
-    half = real(0.5, a)
-    left, right = half - t, half + t
-    weights = (half * left * left, real(0.75, a) - t * t, half * right * right)
+    t = a - nearest
+    left, right = 0.5 - t, 0.5 + t
+    weights = (0.5 * left * left, 0.75 - t * t, 0.5 * right * right)
     gradients = (-left * grid.inv_h, -(t + t) * grid.inv_h, right * grid.inv_h)
-    line = Along(nearest - 1, real(1, a) + t, weights, gradients, ())
+    line = Along(nearest - 1, 1 + t, weights, gradients, ())
     if in_all(bulk):
         return line
-    return choose(bulk, line, _at_wall(grid, a, last))
+    return choose(bulk, line, at_wall(grid, a, last))
 
 
-@shared
-def _at_wall(grid, a, last):
+def at_wall(grid, a, last):
     """The hat functions of the cell at a wall, with a third node of no weight."""
     cell = min(int(a), last - 1)
     first = max(min(cell, last - 2), 0)
-    t = a - real(cell, a)
-    zero, one = real(0, a), real(1, a)
+    t = a - cell
     second = first < cell  # the cell is that between the last two of the three nodes
-    weights = (choose(second, zero, one - t), choose(second, one - t, t), choose(second, t, zero))
+    weights = (choose(second, 0, 1 - t), choose(second, 1 - t, t), choose(second, t, 0))
     gradients = (
-        choose(second, zero, -grid.inv_h),
+        choose(second, 0, -grid.inv_h),
         choose(second, -grid.inv_h, grid.inv_h),
-        choose(second, grid.inv_h, zero),
+        choose(second, grid.inv_h, 0),
     )
-    return Along(first, a - real(first, a), weights, gradients, ())
+    return Along(first, a - first, weights, gradients, ())
 
 
-@shared
-def _in_bulk(grid, line, direction):
+def in_bulk(grid, line, direction):
     """Whether these are the splines, and not the functions at a wall."""
     return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
 
@@ -79,9 +75,9 @@ def _in_bulk(grid, line, direction):
 @affine_along.on(QuadraticSpline)
 def _affine_along_quadratic_spline(basis, grid, line, direction):
     # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
-    four, r = real(4, line.r) * grid.inv_h, line.r
-    affine = tuple([four * (real(k, r) - r) * weight for k, weight in enumerate(line.weights)])
-    return choose(_in_bulk(grid, line, direction), affine, line.gradients)
+    four = 4 * grid.inv_h
+    affine = tuple([four * (k - line.r) * weight for k, weight in enumerate(line.weights)])
+    return choose(in_bulk(grid, line, direction), affine, line.gradients)
 
 
 @inverse_spread.on(QuadraticSpline)
@@ -91,7 +87,7 @@ def _inverse_spread_quadratic_spline(basis, grid):
 
 @evenly.on(QuadraticSpline)
 def _evenly_quadratic_spline(basis, grid, stencil):
-    first, *rest = (_in_bulk(grid, line, d) for d, line in enumerate(stencil.lines))
+    first, *rest = (in_bulk(grid, line, d) for d, line in enumerate(stencil.lines))
     for bulk in rest:
         first = first & bulk
     return first
@@ -99,7 +95,7 @@ def _evenly_quadratic_spline(basis, grid, stencil):
 
 @first_node.on(QuadraticSpline)
 def _first_node_quadratic_spline(basis, like):
-    return real(0.5, like)
+    return 0.5
 
 
 register(QuadraticSpline, 3)

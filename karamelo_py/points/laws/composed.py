@@ -7,20 +7,19 @@ and damage need more than one of them.
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, point_function, real, shared
-from karamelo_py.compiler.tuples import either, following, leading, plus
-from karamelo_py.points.kinematics import after_symmetric, von_mises
+from karamelo_py.compiler.compile import choose, point_function, shared
+from karamelo_py.compiler.tuples import either, only
+from karamelo_py.points.kinematics.tensors import von_mises
 from karamelo_py.points.laws import Absent, specific_volume
-from karamelo_py.points.laws.damages import damage_after, initial_damage, integrity
-from karamelo_py.points.laws.eos import bulk_modulus, compression_energy, initial_energy, pressure
+from karamelo_py.points.laws.damages import damage_after, integrity
+from karamelo_py.points.laws.eos import bulk_modulus, compression_energy, pressure
 from karamelo_py.points.laws.further import further_pressure
 from karamelo_py.points.laws.strengths import (
     elastic_ratio,
     initial_loss,
-    initial_memory,
     shear_energy,
 )
-from karamelo_py.points.laws.temperatures import heat_from, initial_heat, thermal_pressure
+from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.points.laws.viscosity import (
     damped,
     initial_viscous_pressure,
@@ -47,30 +46,12 @@ def lossless(law, like):
     return either(initial_loss(law.strength, like), initial_viscous_pressure(law.viscosity, like))
 
 
-@shared
-def memory_of(law, kin, state):
-    """What the parts remember."""
-    like = state[0]
-    rest = after_symmetric(kin, state[1:])
-    energy = leading(rest, initial_energy(law.eos, like))
-    rest = following(rest, energy)
-    viscous = leading(rest, initial_viscous_pressure(law.viscosity, like))
-    rest = following(rest, viscous)
-    broken = leading(rest, initial_damage(law.damage, like))
-    rest = following(rest, broken)
-    heat = heat_from(initial_heat(law.temperature, like), rest)
-    rest = following(rest, heat)
-    loss = leading(rest, lossless(law, like))
-    rest = following(rest, loss)
-    strength = leading(rest, initial_memory(law.strength, like))
-    return Memory(energy, viscous, broken, heat, loss, strength, following(rest, strength))
+class State(NamedTuple):
+    """State of a point."""
 
-
-@shared
-def state_of(j, s, m):
-    """The state of a point from its numbers."""
-    heat = leading(m.heat, m.heat)  # the tuple without its name
-    return (j,) + s + m.energy + m.viscous + m.damage + heat + m.loss + m.strength + m.further
+    J: Any  # det F
+    s: Any  # deviatoric stress of the intact material
+    m: Memory
 
 
 # ---- pressure -----------------------------------------------------------------------------------
@@ -81,7 +62,7 @@ def intact_pressure(law, j, m):
     """Pressure of the intact material, without viscous pressure."""
     elastic = elastic_ratio(law.strength, m.strength, j)
     p = pressure(law.eos, elastic, m.energy, m.heat)
-    p = plus(p, thermal_pressure(law.temperature, m.heat))
+    p += only(thermal_pressure(law.temperature, m.heat))
     return further_pressure(law.further, m.further, p)
 
 
@@ -89,7 +70,7 @@ def intact_pressure(law, j, m):
 def full_pressure(law, j, m):
     """The pressure in the stress: damage takes of tension, not of compression."""
     p = intact_pressure(law, j, m)
-    return plus(choose(p < 0, p * borne_share(law.damage, m.damage, p), p), m.viscous)
+    return choose(p < 0, p * borne_share(law.damage, m.damage, p), p) + only(m.viscous)
 
 
 @shared
@@ -103,7 +84,7 @@ def sound(law, j, m):
 @point_function(otherwise=True)
 def viscous_after(viscosity, law, j, m, rate):
     """Viscous pressure (q,) at a rate of volume change, or ()."""
-    density = real(1, j) / (specific_volume(law.eos) * j)
+    density = 1 / (specific_volume(law.eos) * j)
     return viscous_pressure(viscosity, rate, density, sound(law, j, m))
 
 
@@ -134,17 +115,16 @@ def borne_share(damage, memory, like):
 
 @borne_share.on(Absent)
 def _borne_share_absent(damage, memory, like):
-    return real(1, like)
+    return 1
 
 
 @point_function(otherwise=True)
 def broken_further(damage, law, kin, m, strain, s, j, dt):
     """Memory of the damage after an increment of plastic strain; () where nothing breaks."""
     p = intact_pressure(law, j, m)
-    q = von_mises(kin, s)
-    bound = q + real(1e-3, p) * abs(p)
+    bound = von_mises(s) + 1e-3 * abs(p)
     known = bound > 0
-    triaxiality = choose(known, -p / choose(known, bound, real(1, p)), real(0, p))
+    triaxiality = choose(known, -p / choose(known, bound, 1), 0)
     return damage_after(damage, m.damage, strain, triaxiality, m.heat, dt)
 
 
@@ -158,10 +138,10 @@ def released(damage, law, kin, j, s, m, broken):
     """Stored energy that an increment of damage sets free."""
     shear = j * shear_energy(law.strength, kin, s)
     tension = intact_pressure(law, j, m) < 0
-    energy = shear + choose(tension, compression_energy(law.eos, j, m.energy), real(0, j))
+    energy = shear + choose(tension, compression_energy(law.eos, j, m.energy), 0)
     return (integrity(damage, m.damage) - integrity(damage, broken)) * energy
 
 
 @released.on(Absent)
 def _released_absent(damage, law, kin, j, s, m, broken):
-    return j - j
+    return 0

@@ -11,18 +11,9 @@ a plug-in's, are chained (`karamelo_py.points.laws.further`).
 from math import log
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, real, shared
-from karamelo_py.compiler.tuples import added, increased, plus, scale
-from karamelo_py.points.kinematics import (
-    add_pressure,
-    deviator,
-    leading_symmetric,
-    spin,
-    symmetric_part,
-    trace,
-    volume_ratio,
-    zero_symmetric,
-)
+from karamelo_py.compiler.compile import choose
+from karamelo_py.compiler.tuples import added, increased, only
+from karamelo_py.points.kinematics.tensors import I, det, dev, nothing, sym, symmetric_tensor, tr
 from karamelo_py.points.laws import (
     Absent,
     advance,
@@ -49,15 +40,14 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.points.laws.composed import (
     Memory,
+    State,
     borne_share,
     broken_further,
     full_pressure,
     intact_pressure,
     lossless,
-    memory_of,
     released,
     slowed_by_viscosity,
-    state_of,
     viscous_after,
 )
 from karamelo_py.points.laws.damages import initial_damage, initiation
@@ -166,124 +156,110 @@ def _initial_state_eos_strength(law, kin, like):
         initial_memory(law.strength, like),
         initial_further(law.further, like),
     )
-    return state_of(real(1, like), zero_symmetric(kin, like), m)
+    return State(1, nothing(kin), m)
 
 
 @advance.on(EosStrength)
 def _advance_eos_strength(law, kin, state, dl, dt):
-    m = memory_of(law, kin, state)
-    before = state[0]
-    j = before * volume_ratio(kin, dl)
-    strain = symmetric_part(kin, dl)
-    old = spin(kin, dl, leading_symmetric(kin, state[1:]))
-    s, memory, work = respond(law.strength, law, kin, old, strain, j, m, dt)
-    work = j * work * borne_share(law.damage, m.damage, work)
-    viscous = viscous_after(law.viscosity, law, j, m, trace(strain) / dt)
-    viscous_work = plus(j - j, viscous) * (before - j)
-    energy = compressed(law.eos, m.energy, before, j, work + viscous_work)
+    before, s, m = state
+    J = before * det(I + dl)
+    eps = sym(dl)
+    s, memory, work = respond(law.strength, law, kin, s.turned(dl), eps, J, m, dt)
+    work = J * work * borne_share(law.damage, m.damage, work)
+    viscous = viscous_after(law.viscosity, law, J, m, tr(eps) / dt)
+    viscous_work = only(viscous) * (before - J)
+    energy = compressed(law.eos, m.energy, before, J, work + viscous_work)
     flow = equivalent_plastic_strain(law.strength, memory)
     flow -= equivalent_plastic_strain(law.strength, m.strength)
     now = Memory(energy, viscous, m.damage, m.heat, m.loss, memory, m.further)
-    broken = broken_further(law.damage, law, kin, now, flow, s, j, dt)
+    broken = broken_further(law.damage, law, kin, now, flow, s, J, dt)
     heat = heated(law.temperature, m.heat, work * specific_volume(law.eos))
-    gone = work + viscous_work + released(law.damage, law, kin, j, s, now, broken)
+    gone = work + viscous_work + released(law.damage, law, kin, J, s, now, broken)
     loss = increased(m.loss, gone)
-    further = further_after(law.further, m.further, law, kin, j, s, now, dt)
-    return state_of(j, s, Memory(energy, viscous, broken, heat, loss, memory, further))
+    further = further_after(law.further, m.further, law, kin, J, s, now, dt)
+    return State(J, s, Memory(energy, viscous, broken, heat, loss, memory, further))
 
 
-@shared
-def stress_left(law, kin, m, state):
+def stress_left(law, state):
     """The deviatoric stress that damage leaves, (1 - D) s."""
-    s = leading_symmetric(kin, state[1:])
-    return scale(borne_share(law.damage, m.damage, s[0]), s)
+    return borne_share(law.damage, state.m.damage, state.J) * state.s
 
 
 @cauchy_stress.on(EosStrength)
 def _cauchy_stress_eos_strength(law, kin, state):
-    m = memory_of(law, kin, state)
-    s = stress_left(law, kin, m, state)
-    return add_pressure(kin, real(1, state[0]), s, -full_pressure(law, state[0], m))
+    return stress_left(law, state) - full_pressure(law, state.J, state.m) * I
 
 
 @kirchhoff_stress.on(EosStrength)
 def _kirchhoff_stress_eos_strength(law, kin, state):
-    j = state[0]
-    m = memory_of(law, kin, state)
-    s = stress_left(law, kin, m, state)
-    return add_pressure(kin, j, s, -j * full_pressure(law, j, m))
+    J = state.J
+    return J * stress_left(law, state) - J * full_pressure(law, J, state.m) * I
 
 
 @jacobian.on(EosStrength)
 def _jacobian_eos_strength(law, kin, state):
-    return state[0]
+    return state.J
 
 
 @wave_speed_squared.on(EosStrength)
 def _wave_speed_squared_eos_strength(law, kin, state):
     # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower.
-    j = state[0]
-    m = memory_of(law, kin, state)
-    elastic = elastic_ratio(law.strength, m.strength, j)
+    J, _, m = state
+    elastic = elastic_ratio(law.strength, m.strength, J)
     modulus = bulk_modulus(law.eos, elastic, m.energy, m.heat)
-    volume = specific_volume(law.eos) * j
-    squared = (modulus + real(4 / 3, j) * shear_modulus(law.strength)) * volume
-    density = real(1, j) / volume
-    squared = damped_speed_squared(law.strength, squared, density)
-    return slowed_by_viscosity(law.viscosity, law, j, m, squared, density)
+    volume = specific_volume(law.eos) * J
+    squared = (modulus + 4 / 3 * shear_modulus(law.strength)) * volume
+    squared = damped_speed_squared(law.strength, squared, 1 / volume)
+    return slowed_by_viscosity(law.viscosity, law, J, m, squared, 1 / volume)
 
 
 @energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
     """What unloading gives back at this temperature: plastic work is not stored."""
-    j = state[0]
-    m = memory_of(law, kin, state)
-    elastic = elastic_ratio(law.strength, m.strength, j)
+    J, s, m = state
+    elastic = elastic_ratio(law.strength, m.strength, J)
     volume = compression_energy(law.eos, elastic, m.energy)
-    volume -= stored_heat(law.eos, plus(j - j, m.loss))
-    volume += plus(j - j, thermal_pressure(law.temperature, m.heat)) * (real(1, j) - j)
-    tension = intact_pressure(law, j, m) < 0
-    share = borne_share(law.damage, m.damage, j)
+    volume -= stored_heat(law.eos, only(m.loss))
+    volume += only(thermal_pressure(law.temperature, m.heat)) * (1 - J)
+    tension = intact_pressure(law, J, m) < 0
+    share = borne_share(law.damage, m.damage, J)
     volume = choose(tension, share * volume, volume)
-    shear = shear_energy(law.strength, kin, leading_symmetric(kin, state[1:]))
-    return volume + j * (share * shear)
+    return volume + J * (share * shear_energy(law.strength, kin, s))
 
 
 @dissipated_energy.on(EosStrength)
 def _dissipated_energy_eos_strength(law, kin, state):
-    return plus(state[0] - state[0], memory_of(law, kin, state).loss)
+    return only(state.m.loss)
 
 
 @elastic_strain.on(EosStrength)
 def _elastic_strain_eos_strength(law, kin, state):
     """ln J / 3, the mean of the elastic strain increments, and the elastic shear."""
-    m = memory_of(law, kin, state)
-    strain = shear_strain(law.strength, kin, leading_symmetric(kin, state[1:]))
-    elastic = elastic_ratio(law.strength, m.strength, state[0])
-    return add_pressure(kin, real(1, state[0]), strain, real(1 / 3, state[0]) * log(elastic))
+    strain = symmetric_tensor(kin, shear_strain(law.strength, kin, state.s))
+    elastic = elastic_ratio(law.strength, state.m.strength, state.J)
+    return strain + 1 / 3 * log(elastic) * I
 
 
 @plastic_strain.on(EosStrength)
 def _plastic_strain_eos_strength(law, kin, state):
-    return equivalent_plastic_strain(law.strength, memory_of(law, kin, state).strength)
+    return equivalent_plastic_strain(law.strength, state.m.strength)
 
 
 @shown.on(Remembered)
 def _shown_remembered(what, law, kin, state):
-    return memory_of(law, kin, state).strength[what.place]
+    return state.m.strength[what.place]
 
 
 @with_stress.on(EosStrength)
 def _with_stress_eos_strength(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
-    m = memory_of(law, kin, state)
-    elastic = elastic_ratio(law.strength, m.strength, state[0])
-    beside = plus(plus(elastic - elastic, thermal_pressure(law.temperature, m.heat)), m.viscous)
-    beside = further_pressure(law.further, m.further, beside)
-    p = -trace(stress) * real(1 / 3, elastic) - beside
+    J, _, m = state
+    stress = symmetric_tensor(kin, stress)
+    elastic = elastic_ratio(law.strength, m.strength, J)
+    beside = only(thermal_pressure(law.temperature, m.heat)) + only(m.viscous)
+    p = -tr(stress) * (1 / 3) - further_pressure(law.further, m.further, beside)
     after, energy = at_pressure(law.eos, elastic, m.energy, p, m.heat)
-    now = Memory(energy, m.viscous, m.damage, m.heat, m.loss, m.strength, m.further)
-    return state_of(state[0] * (after / elastic), deviator(kin, stress), now)
+    return State(J * (after / elastic), dev(stress), m._replace(energy=energy))
 
 
 @specific_volume.on(EosStrength)
@@ -293,26 +269,23 @@ def _specific_volume_eos_strength(law):
 
 @damage.on(EosStrength)
 def _damage_eos_strength(law, kin, state):
-    one = real(1, state[0])
-    return one - borne_share(law.damage, memory_of(law, kin, state).damage, one)
+    return 1 - borne_share(law.damage, state.m.damage, state.J)
 
 
 @damage_initiation.on(EosStrength)
 def _damage_initiation_eos_strength(law, kin, state):
-    return initiation(law.damage, memory_of(law, kin, state).damage)
+    return initiation(law.damage, state.m.damage)
 
 
 @temperature.on(EosStrength)
 def _temperature_eos_strength(law, kin, state):
-    return plus(state[0] - state[0], memory_of(law, kin, state).heat)
+    return only(state.m.heat)
 
 
 @with_temperature.on(EosStrength)
 def _with_temperature_eos_strength(law, kin, state, T):
-    m = memory_of(law, kin, state)
-    heat = heat_from(m.heat, (T,))
-    now = Memory(m.energy, m.viscous, m.damage, heat, m.loss, m.strength, m.further)
-    return state_of(state[0], leading_symmetric(kin, state[1:]), now)
+    heat = heat_from(state.m.heat, (T,))
+    return state._replace(m=state.m._replace(heat=heat))
 
 
 @heat_capacity.on(EosStrength)
@@ -322,12 +295,10 @@ def _heat_capacity_eos_strength(law, like):
 
 @warmed.on(EosStrength)
 def _warmed_eos_strength(law, kin, state, heat):
-    m = memory_of(law, kin, state)
+    m = state.m
     taken = taken_heat(law.eos, m.energy, heat)
-    energy = added(m.energy, taken)
-    loss = added(m.loss, taken)
-    now = Memory(energy, m.viscous, m.damage, m.heat, loss, m.strength, m.further)
-    return state_of(state[0], leading_symmetric(kin, state[1:]), now)
+    m = m._replace(energy=added(m.energy, taken), loss=added(m.loss, taken))
+    return state._replace(m=m)
 
 
 @conductivity.on(EosStrength)

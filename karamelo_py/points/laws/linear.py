@@ -1,22 +1,10 @@
-"""material linear: isotropic linear elasticity for large rotations.
+"""material linear: isotropic linear elasticity for large rotations."""
 
-The state of a point is (det F, Cauchy stress).
-"""
+from typing import Annotated, Any, Literal, NamedTuple
 
-from typing import Annotated, Literal, NamedTuple
-
-from karamelo_py.compiler.compile import point_function, real
-from karamelo_py.compiler.tuples import add, scale
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics import (
-    add_pressure,
-    contract,
-    spin,
-    symmetric_part,
-    trace,
-    volume_ratio,
-    zero_symmetric,
-)
+from karamelo_py.points.kinematics.tensors import I, det, inner, nothing, sym, symmetric_tensor, tr
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
@@ -107,80 +95,82 @@ class FixedFrame(NamedTuple):
     G: float  # shear modulus
 
 
+class State(NamedTuple):
+    """State of a point."""
+
+    J: Any  # det F
+    sigma: Any  # Cauchy stress
+
+
 @point_function()
-def turned(law, kin, dl, stress):
+def turned(law, dl, sigma):
     """The old stress in the frame after the increment dl."""
 
 
 @turned.on(LinearElastic)
-def _turned_linear_elastic(law, kin, dl, stress):
-    return spin(kin, dl, stress)
+def _turned_linear_elastic(law, dl, sigma):
+    return sigma.turned(dl)
 
 
 @turned.on(FixedFrame)
-def _turned_fixed_frame(law, kin, dl, stress):
-    return stress
+def _turned_fixed_frame(law, dl, sigma):
+    return sigma
 
 
 @initial_state.on(LinearElastic)
 @initial_state.on(FixedFrame)
 def _initial_state_fixed_frame(law, kin, like):
-    return (real(1, like),) + zero_symmetric(kin, like)
+    return State(1, nothing(kin))
 
 
 @advance.on(LinearElastic)
 @advance.on(FixedFrame)
 def _advance_fixed_frame(law, kin, state, dl, dt):
-    strain = symmetric_part(kin, dl)
-    old = turned(law, kin, dl, state[1:])
-    pressure = law.lam * trace(strain)
-    increment = add_pressure(kin, real(2, law.G) * law.G, strain, pressure)
-    return (state[0] * volume_ratio(kin, dl),) + add(old, increment)
+    eps = sym(dl)
+    increment = 2 * law.G * eps + law.lam * tr(eps) * I
+    return State(state.J * det(I + dl), turned(law, dl, state.sigma) + increment)
 
 
 @kirchhoff_stress.on(LinearElastic)
 @kirchhoff_stress.on(FixedFrame)
 def _kirchhoff_stress_fixed_frame(law, kin, state):
-    return scale(state[0], state[1:])
+    return state.J * state.sigma
 
 
 @cauchy_stress.on(LinearElastic)
 @cauchy_stress.on(FixedFrame)
 def _cauchy_stress_fixed_frame(law, kin, state):
-    return state[1:]
+    return state.sigma
 
 
 @jacobian.on(LinearElastic)
 @jacobian.on(FixedFrame)
 def _jacobian_fixed_frame(law, kin, state):
-    return state[0]
+    return state.J
 
 
 @wave_speed_squared.on(LinearElastic)
 @wave_speed_squared.on(FixedFrame)
 def _wave_speed_squared_fixed_frame(law, kin, state):
     # (lam + 2 G) / rho: the moduli are constant, the volume per mass has grown by det F
-    return (law.lam + real(2, law.G) * law.G) * law.specific_volume * state[0]
+    return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 
 @elastic_strain.on(LinearElastic)
 @elastic_strain.on(FixedFrame)
 def _elastic_strain_fixed_frame(law, kin, state):
     # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
-    stress = state[1:]
-    half = real(0.5, law.G)
-    mean = law.lam / (real(3, law.G) * law.lam + real(2, law.G) * law.G) * trace(stress)
-    return scale(half / law.G, add_pressure(kin, real(1, law.G), stress, -mean))
+    mean = law.lam / (3 * law.lam + 2 * law.G) * tr(state.sigma)
+    return 0.5 / law.G * (state.sigma - mean * I)
 
 
 @energy_density.on(LinearElastic)
 @energy_density.on(FixedFrame)
 def _energy_density_fixed_frame(law, kin, state):
-    strain = elastic_strain(law, kin, state)
-    return real(0.5, law.G) * state[0] * contract(kin, state[1:], strain)
+    return 0.5 * state.J * inner(state.sigma, elastic_strain(law, kin, state))
 
 
 @with_stress.on(LinearElastic)
 @with_stress.on(FixedFrame)
 def _with_stress_fixed_frame(law, kin, state, stress):
-    return (state[0],) + stress
+    return State(state.J, symmetric_tensor(kin, stress))

@@ -1,25 +1,11 @@
-"""material neo-hookean: compressible hyperelasticity.
-
-The state of a point is the deformation gradient F.
-"""
+"""material neo-hookean: compressible hyperelasticity."""
 
 from math import exp
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.powers import logarithm_near_one
-from karamelo_py.compiler.tuples import scale
+from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics import (
-    add_pressure,
-    deform,
-    determinant,
-    identity,
-    largest_row_sum,
-    left_cauchy_green,
-    right_cauchy_green,
-    trace,
-)
+from karamelo_py.points.kinematics.tensors import I, det, tr, unit
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
@@ -93,72 +79,71 @@ class NeoHookean(NamedTuple):
         return expanding(cls(1 / rho, *moduli), moduli, cp, kappa, alpha)
 
 
+class State(NamedTuple):
+    """State of a point."""
+
+    F: Any  # deformation gradient
+
+
 @initial_state.on(NeoHookean)
 def _initial_state_neo_hookean(law, kin, like):
-    return identity(kin, like)
+    return State(unit(kin))
 
 
 @advance.on(NeoHookean)
 def _advance_neo_hookean(law, kin, state, dl, dt):
-    return deform(kin, dl, state)
+    return State(state.F.after(dl))
 
 
 @kirchhoff_stress.on(NeoHookean)
 def _kirchhoff_stress_neo_hookean(law, kin, state):
     # P = G (F - F^-T) + lam ln J F^-T, so tau = P F^T = G (b - I) + lam ln J I
-    pressure = law.lam * logarithm_near_one(determinant(kin, state)) - law.G
-    return add_pressure(kin, law.G, left_cauchy_green(kin, state), pressure)
+    b = state.F.left_cauchy_green()
+    return law.G * b + (law.lam * log(det(state.F)) - law.G) * I
 
 
 @cauchy_stress.on(NeoHookean)
 def _cauchy_stress_neo_hookean(law, kin, state):
-    inverse = real(1, law.G) / determinant(kin, state)
-    return scale(inverse, kirchhoff_stress(law, kin, state))
+    return kirchhoff_stress(law, kin, state) / det(state.F)
 
 
 @deformation.on(NeoHookean)
 def _deformation_neo_hookean(law, kin, state):
-    return state
+    return state.F
 
 
 @jacobian.on(NeoHookean)
 def _jacobian_neo_hookean(law, kin, state):
-    return determinant(kin, state)
+    return det(state.F)
 
 
 @wave_speed_squared.on(NeoHookean)
 def _wave_speed_squared_neo_hookean(law, kin, state):
     # Along a principal direction of stretch a, the tangent of P gives
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
-    ln_j = logarithm_near_one(determinant(kin, state))
-    return _speed_squared(law, kin, state, law.lam * (real(1, law.G) - ln_j))
+    return speed_squared(law, state.F, law.lam * (1 - log(det(state.F))))
 
 
 @wave_speed_bound.on(NeoHookean)
 def _wave_speed_bound_neo_hookean(law, kin, state):
     # Without a series: 1 / J is above 1 - ln J (by 2 % at J = 0.8), and J / e^2 above its negative.
-    j = determinant(kin, state)
-    bulk = max(law.lam / j, -law.lam * j * real(exp(-2), j))
-    return _speed_squared(law, kin, state, bulk)
+    J = det(state.F)
+    return speed_squared(law, state.F, max(law.lam / J, -law.lam * J * exp(-2)))
 
 
-@shared
-def _speed_squared(law, kin, state, bulk):
-    zero, one = real(0, law.G), real(1, law.G)
-    stretch = largest_row_sum(kin, left_cauchy_green(kin, state))
-    return (law.G * (one + stretch) + max(bulk, zero)) * law.specific_volume
+def speed_squared(law, F, bulk):
+    stretch = F.left_cauchy_green().largest_row_sum()
+    return (law.G * (1 + stretch) + max(bulk, 0)) * law.specific_volume
 
 
 @energy_density.on(NeoHookean)
 def _energy_density_neo_hookean(law, kin, state):
-    half = real(0.5, law.G)
-    ln_j = logarithm_near_one(determinant(kin, state))
-    excess = trace(left_cauchy_green(kin, state)) - real(3, law.G)
-    return half * law.G * excess - law.G * ln_j + half * law.lam * ln_j * ln_j
+    ln_J = log(det(state.F))
+    excess = tr(state.F.left_cauchy_green()) - 3
+    return 0.5 * law.G * excess - law.G * ln_J + 0.5 * law.lam * ln_J * ln_J
 
 
 @elastic_strain.on(NeoHookean)
 def _elastic_strain_neo_hookean(law, kin, state):
     """Green-Lagrange strain (F^T F - I) / 2."""
-    half = real(0.5, law.G)
-    return add_pressure(kin, half, right_cauchy_green(kin, state), -half)
+    return 0.5 * state.F.right_cauchy_green() - 0.5 * I

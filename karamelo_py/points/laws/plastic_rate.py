@@ -12,7 +12,6 @@ from karamelo_py.points.laws import (
     shown,
     wave_speed_squared,
 )
-from karamelo_py.points.laws.composed import memory_of
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.further import Further, initial_part, part_after
 from karamelo_py.points.laws.strengths import equivalent_plastic_strain
@@ -51,7 +50,7 @@ def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
 
 @shown.on(Smoothed)
 def _shown_smoothed(what, law, kin, state):
-    further = memory_of(law, kin, state).further
+    further = state.m.further
     return further[len(further) - 2]
 
 

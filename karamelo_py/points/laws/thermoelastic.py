@@ -2,9 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.tuples import following, leading
-from karamelo_py.points.kinematics import add_pressure
+from karamelo_py.points.kinematics.tensors import I, symmetric_tensor
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
@@ -79,89 +77,77 @@ def _thermal_pressure_expansion(heat, T):
     return (heat.pressure * (T[0] - heat.initial_temperature),)
 
 
-@shared
-def mechanical(law, kin, state):
-    """The state of the elastic law."""
-    return leading(state, initial_state(law.elastic, kin, law.heat.alpha))
+class State(NamedTuple):
+    """State of a point."""
+
+    elastic: Any  # that of the elastic law
+    T: Any  # temperature
 
 
-@shared
-def heat_of(law, kin, state):
-    """(T,) of the state."""
-    return following(state, mechanical(law, kin, state))
-
-
-@shared
-def thermal_pressure_of(law, kin, state):
+def expansion_pressure(law, state):
     """3 K alpha (T - T0)."""
-    return thermal_pressure(law.heat, heat_of(law, kin, state))[0]
+    return thermal_pressure(law.heat, (state.T,))[0]
 
 
 @initial_state.on(Thermoelastic)
 def _initial_state_thermoelastic(law, kin, like):
-    return initial_state(law.elastic, kin, like) + (initial_heat(law.heat, like).T,)
+    return State(initial_state(law.elastic, kin, like), initial_heat(law.heat, like).T)
 
 
 @advance.on(Thermoelastic)
 def _advance_thermoelastic(law, kin, state, dl, dt):
-    new = advance(law.elastic, kin, mechanical(law, kin, state), dl, dt)
-    return new + heat_of(law, kin, state)
+    return State(advance(law.elastic, kin, state.elastic, dl, dt), state.T)
 
 
 @cauchy_stress.on(Thermoelastic)
 def _cauchy_stress_thermoelastic(law, kin, state):
-    elastic = cauchy_stress(law.elastic, kin, mechanical(law, kin, state))
-    return add_pressure(kin, real(1, elastic[0]), elastic, -thermal_pressure_of(law, kin, state))
+    return cauchy_stress(law.elastic, kin, state.elastic) - expansion_pressure(law, state) * I
 
 
 @kirchhoff_stress.on(Thermoelastic)
 def _kirchhoff_stress_thermoelastic(law, kin, state):
-    elastic = kirchhoff_stress(law.elastic, kin, mechanical(law, kin, state))
-    p = jacobian(law, kin, state) * thermal_pressure_of(law, kin, state)
-    return add_pressure(kin, real(1, p), elastic, -p)
+    p = jacobian(law, kin, state) * expansion_pressure(law, state)
+    return kirchhoff_stress(law.elastic, kin, state.elastic) - p * I
 
 
 @jacobian.on(Thermoelastic)
 def _jacobian_thermoelastic(law, kin, state):
-    return jacobian(law.elastic, kin, mechanical(law, kin, state))
+    return jacobian(law.elastic, kin, state.elastic)
 
 
 @deformation.on(Thermoelastic)
 def _deformation_thermoelastic(law, kin, state):
-    return deformation(law.elastic, kin, mechanical(law, kin, state))
+    return deformation(law.elastic, kin, state.elastic)
 
 
 @wave_speed_squared.on(Thermoelastic)
 def _wave_speed_squared_thermoelastic(law, kin, state):
-    return wave_speed_squared(law.elastic, kin, mechanical(law, kin, state))
+    return wave_speed_squared(law.elastic, kin, state.elastic)
 
 
 @wave_speed_bound.on(Thermoelastic)
 def _wave_speed_bound_thermoelastic(law, kin, state):
-    return wave_speed_bound(law.elastic, kin, mechanical(law, kin, state))
+    return wave_speed_bound(law.elastic, kin, state.elastic)
 
 
 @energy_density.on(Thermoelastic)
 def _energy_density_thermoelastic(law, kin, state):
     """What unloading gives back at this temperature."""
     j = jacobian(law, kin, state)
-    elastic = energy_density(law.elastic, kin, mechanical(law, kin, state))
-    return elastic + thermal_pressure_of(law, kin, state) * (real(1, j) - j)
+    elastic = energy_density(law.elastic, kin, state.elastic)
+    return elastic + expansion_pressure(law, state) * (1 - j)
 
 
 @elastic_strain.on(Thermoelastic)
 def _elastic_strain_thermoelastic(law, kin, state):
-    strain = elastic_strain(law.elastic, kin, mechanical(law, kin, state))
-    warmer = heat_of(law, kin, state)[0] - law.heat.initial_temperature
-    return add_pressure(kin, real(1, warmer), strain, -law.heat.alpha * warmer)
+    warmer = state.T - law.heat.initial_temperature
+    return elastic_strain(law.elastic, kin, state.elastic) - law.heat.alpha * warmer * I
 
 
 @with_stress.on(Thermoelastic)
 def _with_stress_thermoelastic(law, kin, state, stress):
-    p = thermal_pressure_of(law, kin, state)
-    elastic = add_pressure(kin, real(1, p), stress, p)
-    new = with_stress(law.elastic, kin, mechanical(law, kin, state), elastic)
-    return new + heat_of(law, kin, state)
+    elastic = symmetric_tensor(kin, stress) + expansion_pressure(law, state) * I
+    return State(with_stress(law.elastic, kin, state.elastic, elastic), state.T)
 
 
 @specific_volume.on(Thermoelastic)
@@ -171,12 +157,12 @@ def _specific_volume_thermoelastic(law):
 
 @temperature.on(Thermoelastic)
 def _temperature_thermoelastic(law, kin, state):
-    return heat_of(law, kin, state)[0]
+    return state.T
 
 
 @with_temperature.on(Thermoelastic)
 def _with_temperature_thermoelastic(law, kin, state, T):
-    return mechanical(law, kin, state) + (T,)
+    return State(state.elastic, T)
 
 
 @heat_capacity.on(Thermoelastic)

@@ -7,9 +7,9 @@ momentum to round-off for functions whose D changes with the place in the cell, 
 eqs. 15 to 18).
 """
 
-from karamelo_py.compiler.tuples import add_scaled, scale
 from karamelo_py.points.basis import affine_weight, reach
-from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
+from karamelo_py.points.kinematics import planar
+from karamelo_py.points.kinematics.tensors import outer, vector, zero
 from karamelo_py.points.transfers import (
     add_moment,
     add_momentum,
@@ -24,28 +24,24 @@ def register(transfer: type) -> None:
     transfer.keeps_gradient = False
 
     @add_momentum.on(transfer)
-    def _add_momentum_transfer(
-        transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total
-    ):
-        affine = affine_weight(basis, kin, grid, stencil, k)
-        mean = add_scaled(total, weight * mass, v)
-        return add_scaled(mean, mass, tensor_dot(planar(kin), moment, affine))
+    def _add_momentum_transfer(transfer, kin, basis, grid, stencil, k, weight, mass, v, B, total):
+        flat = planar(kin)
+        affine = vector(flat, affine_weight(basis, kin, grid, stencil, k))
+        return vector(flat, total) + weight * mass * vector(flat, v) + mass * (B @ affine)
 
     @affine_velocity.on(transfer)
-    def _affine_velocity_transfer(transfer, moment, inverse_d):
-        return scale(inverse_d[0], moment) if len(inverse_d) else ()
+    def _affine_velocity_transfer(transfer, B, inverse_d):
+        return inverse_d[0] * B if len(inverse_d) else ()
 
     @zero_moment.on(transfer)
     def _zero_moment_transfer(transfer, kin, like):
-        return zero_tensor(planar(kin), like)
+        return zero(planar(kin), like)
 
     @by_arms.on(transfer)
     def _by_arms_transfer(transfer, inverse_d):
         return (1.0,)
 
     @add_moment.on(transfer)
-    def _add_moment_transfer(
-        transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment
-    ):
-        arm = reach(basis, kin, grid, stencil, k)
-        return add_outer(planar(kin), moment, scale(weight, velocity), arm)
+    def _add_moment_transfer(transfer, kin, basis, grid, stencil, k, weight, gradient, v, B):
+        arm = vector(planar(kin), reach(basis, kin, grid, stencil, k))
+        return B + outer(weight * vector(planar(kin), v), arm)

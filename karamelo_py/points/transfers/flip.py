@@ -3,8 +3,6 @@
 from types import MappingProxyType
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.tuples import add, add_scaled, scale
 from karamelo_py.language.kinds import Constraint
 from karamelo_py.points.transfers import lost_shares, updated_velocity
 
@@ -36,24 +34,19 @@ class FLIP(NamedTuple):
     variants = MappingProxyType({"gradient-enhanced": "TFLIP"})
 
 
-@shared
-def blend(alpha, v, v_pic, dv):
-    """(1 - alpha) v_pic + alpha (v + dv)."""
-    return add_scaled(scale(real(1, alpha) - alpha, v_pic), alpha, add(v, dv))
-
-
 def blended(transfer: type) -> None:
     """Let the velocity of points follow from `transfer` as that of FLIP does, by its `alpha`."""
 
     @updated_velocity.on(transfer)
     def _updated_velocity_transfer(transfer, v, v_pic, dv):
-        return blend(transfer.alpha, v, v_pic, dv)
+        alpha = transfer.alpha
+        return (1 - alpha) * v_pic + alpha * (v + dv)
 
     # With P = S S+ from points to points, v becomes alpha v + (1 - alpha) P v + S dv.
     @lost_shares.on(transfer)
     def _lost_shares_transfer(transfer, like):
-        pic = real(1, like) - transfer.alpha
-        return pic * (real(1, like) + transfer.alpha), pic * pic
+        alpha = transfer.alpha
+        return (1 - alpha) * (1 + alpha), (1 - alpha) * (1 - alpha)
 
 
 blended(FLIP)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.kinematics.tensors import tensor
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
@@ -249,7 +250,7 @@ class Point:
 
     def _flat(self, gradient: np.ndarray) -> tuple:
         """A (3, 3) tensor as the kinematics has it."""
-        return tuple(float(gradient[place]) for place in GRADIENT[type(self.kin)])
+        return tensor(self.kin, [float(gradient[place]) for place in GRADIENT[type(self.kin)]])
 
     def _accept(self, state: tuple, increment: np.ndarray) -> None:
         """Take the new state; the work is that of the mean Kirchhoff stress."""

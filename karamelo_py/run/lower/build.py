@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import fields
+from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels.arrays import (
     SUMS_WIDTH,
     UPDATE_WIDTH,
@@ -301,7 +302,8 @@ def lower_blocks(
 def start(law, T0: float | None, kin, real: type) -> np.ndarray:
     """The state (s,) of a point at rest."""
     state = initial_state(law, kin, real(1))
-    return np.array(state if T0 is None else with_temperature(law, kin, state, real(T0)), real)
+    state = state if T0 is None else with_temperature(law, kin, state, real(T0))
+    return np.array(flat(state), real)
 
 
 def point_kinds(hub: Hub, real: type) -> tuple[type, ...]:

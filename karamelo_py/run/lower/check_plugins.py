@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.tuples import record
+from karamelo_py.compiler.tuples import flat, record
 from karamelo_py.kernels.laws import law_in, law_on
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.language.faults import fault
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
 from karamelo_py.points.kinematics import zero_symmetric
+from karamelo_py.points.kinematics.tensors import tensor
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
@@ -87,8 +88,8 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
         dl = (type(one)(strain),) * kin.tensor_size
         with _trial(hub, part):
             state = initial_state(law, kin, one)
-            after = advance(law, kin, state, dl, one)
-            if len(after) != len(state):
+            after = advance(law, kin, state, tensor(kin, dl), one)
+            if len(flat(after)) != len(flat(state)):
                 what = (
                     f"what a point remembers is {len(state)} numbers at first and {len(after)} "
                     "after a step: their number must not change"

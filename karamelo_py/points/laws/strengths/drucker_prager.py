@@ -3,10 +3,8 @@
 from math import cos, inf, sin, sqrt, tan
 from typing import Annotated, Literal, NamedTuple
 
-from karamelo_py.compiler.compile import real
-from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics import contract
+from karamelo_py.points.kinematics.tensors import inner
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import (
     frictional,
@@ -119,8 +117,7 @@ def _tension_bound_drucker_prager(strength, lowest):
 @pressure_response.on(DruckerPrager)
 def _pressure_response_drucker_prager(strength, kin, s, p, K, strain):
     cohesion, friction, dilation = surface(strength, strain)
-    zero = real(0, p)
-    trial = sqrt(real(0.5, p) * contract(kin, s, s))
+    trial = sqrt(0.5 * inner(s, s))
     lowest = lowest_pressure(strength, strain)
     f = trial - cohesion - friction * p
     root = trial
@@ -135,5 +132,5 @@ def _pressure_response_drucker_prager(strength, kin, s, p, K, strain):
         p = lowest
         root = min(trial, cohesion + friction * lowest)
     if root < trial:
-        return scale(max(root, zero) / trial, s), p
+        return max(root, 0) / trial * s, p
     return s, p

@@ -11,9 +11,9 @@ Trans. Graph. 36(4), section 4.3.4). What plastic flow by shear gains (dilatancy
 
 from math import inf, log, sqrt
 
-from karamelo_py.compiler.compile import point_function, real, shared
-from karamelo_py.compiler.tuples import plus, scale, subtract
-from karamelo_py.points.kinematics import contract
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.tuples import plus
+from karamelo_py.points.kinematics.tensors import inner
 from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
 from karamelo_py.points.laws.strengths import (
     elastic_ratio,
@@ -26,25 +26,22 @@ from karamelo_py.points.laws.strengths.linear import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
 
 
-@shared
 def surface(strength, strain):
     """Cohesion, friction and dilation of the yield surface after a plastic strain.
 
     They go from the peak to the residual in a straight line; a step uses those of its beginning.
     """
-    one = real(1, strain)
-    share = min(strain * strength.softening, one)
-    kept = one - share
+    share = min(strain * strength.softening, 1)
+    kept = 1 - share
     cohesion = kept * strength.cohesion + share * strength.residual_cohesion
     friction = kept * strength.friction + share * strength.residual_friction
     return cohesion, friction, min(strength.dilation, friction)
 
 
-@shared
 def lowest_pressure(strength, strain):
     """The pressure below which nothing is borne, -cohesion / friction or a bound of its own."""
     cohesion, friction, _ = surface(strength, strain)
-    return tension_bound(strength, -cohesion / friction if friction > 0 else real(-inf, strain))
+    return tension_bound(strength, -cohesion / friction if friction > 0 else -inf)
 
 
 @point_function(otherwise=True)
@@ -68,28 +65,27 @@ def frictional(strength: type) -> None:
     @respond.on(strength)
     def _respond_strength(strength, law, kin, s, strain, j, memories, dt):
         memory, heat = memories.strength, memories.heat
-        trial = elastic_trial(kin, strength.G, s, strain)
-        one = real(1, j)
+        trial = elastic_trial(strength.G, s, strain)
         elastic = elastic_ratio(strength, memory, j)
-        warm = plus(real(0, j), thermal_pressure(law.temperature, heat))
+        warm = plus(0, thermal_pressure(law.temperature, heat))
         p = pressure(law.eos, elastic, memories.energy, heat) + warm
-        if memory[2] > one and p > 0:
+        if memory[2] > 1 and p > 0:
             # What had come apart closes before it bears pressure.
-            apart = max(one, j / (memory[1] * ratio_at_pressure(law.eos, -warm, heat)))
+            apart = max(1, j / (memory[1] * ratio_at_pressure(law.eos, -warm, heat)))
             memory = (memory[0], memory[1], apart)
             elastic = elastic_ratio(strength, memory, j)
             p = pressure(law.eos, elastic, memories.energy, heat) + warm
         K = bulk_modulus(law.eos, elastic, memories.energy, heat)
         lowest = lowest_pressure(strength, memory[0])
         new, reached = pressure_response(strength, kin, trial, p, K, memory[0])
-        plastic = scale(real(0.5, j) / strength.G, subtract(trial, new))
-        increment = sqrt(real(2 / 3, j) * contract(kin, plastic, plastic))
+        plastic = 0.5 / strength.G * (trial - new)
+        increment = sqrt(2 / 3 * inner(plastic, plastic))
         memory = (memory[0] + increment, memory[1], memory[2])
-        work = contract(kin, new, plastic)
+        work = inner(new, plastic)
         if reached != p:
             # The volume that bears the new pressure is elastic; the rest is plastic.
             after = ratio_at_pressure(law.eos, reached - warm, heat)
-            if p < lowest and reached - lowest <= real(1e-6, p) * (lowest - p):
+            if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
                 memory = (memory[0], memory[1], j / (memory[1] * after))
             else:
                 memory = with_elastic_ratio(strength, memory, j, after)

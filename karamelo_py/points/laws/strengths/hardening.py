@@ -2,9 +2,8 @@
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import choose, in_any, point_function, real, round_off, shared
-from karamelo_py.compiler.tuples import scale
-from karamelo_py.points.kinematics import von_mises
+from karamelo_py.compiler.compile import choose, in_any, point_function, round_off, shared
+from karamelo_py.points.kinematics.tensors import von_mises
 from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.linear import elastic_trial
 
@@ -33,7 +32,7 @@ def first_guess(strength, memory, q, slope):
     `slope` is 3 G, `memory` with what is `foreseen`. A change c is followed by about k c^2, or less
     the further the flow stress has hardened: k is the second number.
     """
-    return real(0, q), real(0, q)
+    return 0.0, 0.0
 
 
 @point_function(otherwise=True)
@@ -42,12 +41,10 @@ def hardened(strength, memory, increment, dt):
     return (memory[0] + increment,)
 
 
-@shared
 def returned(trial, q, flow, x):
     """The deviatoric stress `trial`, brought back to `flow` where the plastic strain `x` grows."""
-    one = real(1, q)
     yields = x > 0
-    return scale(choose(yields, flow / choose(yields, q, one), one), trial)
+    return choose(yields, flow / choose(yields, q, 1), 1) * trial
 
 
 def hardening(strength: type, **own: float | str) -> None:
@@ -66,10 +63,10 @@ def hardening(strength: type, **own: float | str) -> None:
 
     @shear_response.on(strength)
     def _shear_response_strength(strength, kin, s, strain, memory, heat, dt):
-        trial = elastic_trial(kin, strength.G, s, strain)
-        q = von_mises(kin, trial)
+        trial = elastic_trial(strength.G, s, strain)
+        q = von_mises(trial)
         x = plastic_increment(strength, q, memory, heat, dt)
-        flow = q - real(3, q) * strength.G * x
+        flow = q - 3 * strength.G * x
         return returned(trial, q, flow, x), hardened(strength, memory, x, dt), flow * x
 
 
@@ -84,12 +81,11 @@ def plastic_increment(strength, q, memory, heat, dt):
     The left side falls with x and the flow stress does not: there is one solution, whatever the
     size of the step. Newton's method from a first guess, kept within bounds by bisection.
     """
-    zero, half = real(0, q), real(0.5, q)
-    slope = real(3, q) * strength.G
-    enough = real(4, q) * round_off(q) * q  # what the three terms are rounded to
+    slope = 3 * strength.G
+    enough = 4 * round_off(q) * q  # what the three terms are rounded to
     small = sqrt(round_off(q)) * q
-    low, high = zero, q / slope
-    active = q > zero
+    low, high = 0.0, q / slope
+    active = q > 0
     memory += foreseen(strength, memory, heat)
     x, curved = first_guess(strength, memory, q, slope)
     last = x
@@ -107,9 +103,9 @@ def plastic_increment(strength, q, memory, heat, dt):
         next_is_small = (abs(change) * square <= least * last * last) & (curved * square <= least)
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))
         within = (low < new) & (new < high)
-        middle = half * (low + high)
+        middle = 0.5 * (low + high)
         # What is rounded may lie below 0: plastic strain only grows.
-        x = choose(active, max(choose(done | within, new, middle), zero), x)
+        x = choose(active, max(choose(done | within, new, middle), 0), x)
         last = change
         # Lanes that have finished wait for the others.
         active = active & (not (done | (middle <= low) | (middle >= high)))

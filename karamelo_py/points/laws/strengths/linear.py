@@ -2,10 +2,8 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.tuples import add_scaled
 from karamelo_py.language.signature import Positive
-from karamelo_py.points.kinematics import deviator
+from karamelo_py.points.kinematics.tensors import dev
 from karamelo_py.points.laws.strengths import shear_response
 
 
@@ -36,13 +34,12 @@ class Elastic(NamedTuple):
     G: Annotated[float, Positive]
 
 
-@shared
-def elastic_trial(kin, G, s, strain):
+def elastic_trial(G, s, strain):
     """Deviatoric stress after a strain increment, were it all elastic."""
     # The deviator of the sum: rounding errors of many steps would give s a trace otherwise.
-    return deviator(kin, add_scaled(s, real(2, G) * G, strain))
+    return dev(s + 2 * G * strain)
 
 
 @shear_response.on(Elastic)
 def _shear_response_elastic(strength, kin, s, strain, memory, heat, dt):
-    return elastic_trial(kin, strength.G, s, strain), memory, real(0, strength.G)
+    return elastic_trial(strength.G, s, strain), memory, 0

@@ -94,7 +94,7 @@ def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
     p = pressure(law.eos, elastic, memories.energy, memories.heat)
     p = plus(p, thermal_pressure(law.temperature, memories.heat))
     together = p > zero
-    trial = elastic_trial(kin, strength.G, s, strain)
+    trial = elastic_trial(strength.G, s, strain)
     shear = sqrt(real(0.5, j) * contract(kin, trial, trial))
     flows = together & (shear > strength.mu_s * p)
     p = choose(together, p, one)

@@ -2,9 +2,9 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics import von_mises
+from karamelo_py.points.kinematics.tensors import von_mises
 from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import returned
 from karamelo_py.points.laws.strengths.linear import elastic_trial
@@ -66,11 +66,11 @@ remembers(LinearHardening, ep=0.0)
 @shear_response.on(Plastic)
 @shear_response.on(LinearHardening)
 def _shear_response_linear_hardening(strength, kin, s, strain, memory, heat, dt):
-    trial = elastic_trial(kin, strength.G, s, strain)
-    q = von_mises(kin, trial)
+    trial = elastic_trial(strength.G, s, strain)
+    q = von_mises(trial)
     H = hardening_modulus(strength)
     flow = strength.yield_stress + H * memory[0]
-    x = max(q - flow, real(0, q)) / (real(3, q) * strength.G + H)
+    x = max(q - flow, 0) / (3 * strength.G + H)
     flow += H * x
     return returned(trial, q, flow, x), (memory[0] + x,), flow * x
 
@@ -82,7 +82,7 @@ def hardening_modulus(strength):
 
 @hardening_modulus.on(Plastic)
 def _hardening_modulus_plastic(strength):
-    return real(0, strength.G)
+    return 0.0
 
 
 @hardening_modulus.on(LinearHardening)
