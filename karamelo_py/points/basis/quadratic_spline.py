@@ -3,15 +3,7 @@
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, in_all
-from karamelo_py.points.basis import first_node
-from karamelo_py.points.basis.product import (
-    Along,
-    affine_along,
-    along,
-    evenly,
-    inverse_spread,
-    register,
-)
+from karamelo_py.points.basis import first_node, product
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -36,7 +28,7 @@ class QuadraticSpline(NamedTuple):
     courant_still = 1.25
 
 
-@along.on(QuadraticSpline)
+@product.along.on(QuadraticSpline)
 def _along_quadratic_spline(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
@@ -46,7 +38,7 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
     left, right = 0.5 - t, 0.5 + t
     weights = (0.5 * left * left, 0.75 - t * t, 0.5 * right * right)
     gradients = (-left * grid.inv_h, -(t + t) * grid.inv_h, right * grid.inv_h)
-    line = Along(nearest - 1, 1 + t, weights, gradients, ())
+    line = product.Along(nearest - 1, 1 + t, weights, gradients, ())
     if in_all(bulk):
         return line
     return choose(bulk, line, at_wall(grid, a, last))
@@ -64,7 +56,7 @@ def at_wall(grid, a, last):
         choose(second, -grid.inv_h, grid.inv_h),
         choose(second, grid.inv_h, 0),
     )
-    return Along(first, a - first, weights, gradients, ())
+    return product.Along(first, a - first, weights, gradients, ())
 
 
 def in_bulk(grid, line, direction):
@@ -72,7 +64,7 @@ def in_bulk(grid, line, direction):
     return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
 
 
-@affine_along.on(QuadraticSpline)
+@product.affine_along.on(QuadraticSpline)
 def _affine_along_quadratic_spline(basis, grid, line, direction):
     # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
     four = 4 * grid.inv_h
@@ -80,12 +72,12 @@ def _affine_along_quadratic_spline(basis, grid, line, direction):
     return choose(in_bulk(grid, line, direction), affine, line.gradients)
 
 
-@inverse_spread.on(QuadraticSpline)
+@product.inverse_spread.on(QuadraticSpline)
 def _inverse_spread_quadratic_spline(basis, grid):
     return (4 * grid.inv_h * grid.inv_h,)
 
 
-@evenly.on(QuadraticSpline)
+@product.evenly.on(QuadraticSpline)
 def _evenly_quadratic_spline(basis, grid, stencil):
     first, *rest = (in_bulk(grid, line, d) for d, line in enumerate(stencil.lines))
     for bulk in rest:
@@ -98,4 +90,4 @@ def _first_node_quadratic_spline(basis, like):
     return 0.5
 
 
-register(QuadraticSpline, 3)
+product.register(QuadraticSpline, 3)

@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import choose
 from karamelo_py.compiler.tuples import added, increased, only
-from karamelo_py.points.kinematics.tensors import I, det, dev, nothing, sym, symmetric_tensor, tr
+from karamelo_py.points.kinematics import tensors
 from karamelo_py.points.laws import (
     Absent,
     advance,
     cauchy_stress,
     column,
+    composed,
     conductivity,
     damage,
     damage_initiation,
@@ -32,23 +33,12 @@ from karamelo_py.points.laws import (
     plastic_strain,
     shown,
     specific_volume,
+    strengths,
     temperature,
     warmed,
     wave_speed_squared,
     with_stress,
     with_temperature,
-)
-from karamelo_py.points.laws.composed import (
-    Memory,
-    State,
-    borne_share,
-    broken_further,
-    full_pressure,
-    intact_pressure,
-    lossless,
-    released,
-    slowed_by_viscosity,
-    viscous_after,
 )
 from karamelo_py.points.laws.damages import initial_damage, initiation
 from karamelo_py.points.laws.eos import (
@@ -67,17 +57,6 @@ from karamelo_py.points.laws.further import (
     initial_further,
 )
 from karamelo_py.points.laws.named import Eos, Option, Strength
-from karamelo_py.points.laws.strengths import (
-    Remembered,
-    damped_speed_squared,
-    elastic_ratio,
-    equivalent_plastic_strain,
-    initial_memory,
-    respond,
-    shear_energy,
-    shear_modulus,
-    shear_strain,
-)
 from karamelo_py.points.laws.temperatures import heat_from, heated, initial_heat, thermal_pressure
 from karamelo_py.points.laws.viscosity import initial_viscous_pressure
 from karamelo_py.script.errors import ScriptError
@@ -147,53 +126,55 @@ column(EosStrength, "dissipated", dissipated_energy)
 
 @initial_state.on(EosStrength)
 def _initial_state_eos_strength(law, kin, like):
-    m = Memory(
+    m = composed.Memory(
         initial_energy(law.eos, like),
         initial_viscous_pressure(law.viscosity, like),
         initial_damage(law.damage, like),
         initial_heat(law.temperature, like),
-        lossless(law, like),
-        initial_memory(law.strength, like),
+        composed.lossless(law, like),
+        strengths.initial_memory(law.strength, like),
         initial_further(law.further, like),
     )
-    return State(1, nothing(kin), m)
+    return composed.State(1, tensors.nothing(kin), m)
 
 
 @advance.on(EosStrength)
 def _advance_eos_strength(law, kin, state, dl, dt):
     before, s, m = state
-    J = before * det(I + dl)
-    eps = sym(dl)
-    s, memory, work = respond(law.strength, law, kin, s.turned(dl), eps, J, m, dt)
-    work = J * work * borne_share(law.damage, m.damage, work)
-    viscous = viscous_after(law.viscosity, law, J, m, tr(eps) / dt)
+    J = before * tensors.det(tensors.I + dl)
+    eps = tensors.sym(dl)
+    s, memory, work = strengths.respond(law.strength, law, kin, s.turned(dl), eps, J, m, dt)
+    work = J * work * composed.borne_share(law.damage, m.damage, work)
+    viscous = composed.viscous_after(law.viscosity, law, J, m, tensors.tr(eps) / dt)
     viscous_work = only(viscous) * (before - J)
     energy = compressed(law.eos, m.energy, before, J, work + viscous_work)
-    flow = equivalent_plastic_strain(law.strength, memory)
-    flow -= equivalent_plastic_strain(law.strength, m.strength)
-    now = Memory(energy, viscous, m.damage, m.heat, m.loss, memory, m.further)
-    broken = broken_further(law.damage, law, kin, now, flow, s, J, dt)
+    flow = strengths.equivalent_plastic_strain(law.strength, memory)
+    flow -= strengths.equivalent_plastic_strain(law.strength, m.strength)
+    now = composed.Memory(energy, viscous, m.damage, m.heat, m.loss, memory, m.further)
+    broken = composed.broken_further(law.damage, law, kin, now, flow, s, J, dt)
     heat = heated(law.temperature, m.heat, work * specific_volume(law.eos))
-    gone = work + viscous_work + released(law.damage, law, kin, J, s, now, broken)
+    gone = work + viscous_work + composed.released(law.damage, law, kin, J, s, now, broken)
     loss = increased(m.loss, gone)
     further = further_after(law.further, m.further, law, kin, J, s, now, dt)
-    return State(J, s, Memory(energy, viscous, broken, heat, loss, memory, further))
+    return composed.State(
+        J, s, composed.Memory(energy, viscous, broken, heat, loss, memory, further)
+    )
 
 
 def stress_left(law, state):
     """The deviatoric stress that damage leaves, (1 - D) s."""
-    return borne_share(law.damage, state.m.damage, state.J) * state.s
+    return composed.borne_share(law.damage, state.m.damage, state.J) * state.s
 
 
 @cauchy_stress.on(EosStrength)
 def _cauchy_stress_eos_strength(law, kin, state):
-    return stress_left(law, state) - full_pressure(law, state.J, state.m) * I
+    return stress_left(law, state) - composed.full_pressure(law, state.J, state.m) * tensors.I
 
 
 @kirchhoff_stress.on(EosStrength)
 def _kirchhoff_stress_eos_strength(law, kin, state):
     J = state.J
-    return J * stress_left(law, state) - J * full_pressure(law, J, state.m) * I
+    return J * stress_left(law, state) - J * composed.full_pressure(law, J, state.m) * tensors.I
 
 
 @jacobian.on(EosStrength)
@@ -205,26 +186,26 @@ def _jacobian_eos_strength(law, kin, state):
 def _wave_speed_squared_eos_strength(law, kin, state):
     # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower.
     J, _, m = state
-    elastic = elastic_ratio(law.strength, m.strength, J)
+    elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     modulus = bulk_modulus(law.eos, elastic, m.energy, m.heat)
     volume = specific_volume(law.eos) * J
-    squared = (modulus + 4 / 3 * shear_modulus(law.strength)) * volume
-    squared = damped_speed_squared(law.strength, squared, 1 / volume)
-    return slowed_by_viscosity(law.viscosity, law, J, m, squared, 1 / volume)
+    squared = (modulus + 4 / 3 * strengths.shear_modulus(law.strength)) * volume
+    squared = strengths.damped_speed_squared(law.strength, squared, 1 / volume)
+    return composed.slowed_by_viscosity(law.viscosity, law, J, m, squared, 1 / volume)
 
 
 @energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
     """What unloading gives back at this temperature: plastic work is not stored."""
     J, s, m = state
-    elastic = elastic_ratio(law.strength, m.strength, J)
+    elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     volume = compression_energy(law.eos, elastic, m.energy)
     volume -= stored_heat(law.eos, only(m.loss))
     volume += only(thermal_pressure(law.temperature, m.heat)) * (1 - J)
-    tension = intact_pressure(law, J, m) < 0
-    share = borne_share(law.damage, m.damage, J)
+    tension = composed.intact_pressure(law, J, m) < 0
+    share = composed.borne_share(law.damage, m.damage, J)
     volume = choose(tension, share * volume, volume)
-    return volume + J * (share * shear_energy(law.strength, kin, s))
+    return volume + J * (share * strengths.shear_energy(law.strength, kin, s))
 
 
 @dissipated_energy.on(EosStrength)
@@ -235,17 +216,17 @@ def _dissipated_energy_eos_strength(law, kin, state):
 @elastic_strain.on(EosStrength)
 def _elastic_strain_eos_strength(law, kin, state):
     """ln J / 3, the mean of the elastic strain increments, and the elastic shear."""
-    strain = symmetric_tensor(kin, shear_strain(law.strength, kin, state.s))
-    elastic = elastic_ratio(law.strength, state.m.strength, state.J)
-    return strain + 1 / 3 * log(elastic) * I
+    strain = tensors.symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, state.s))
+    elastic = strengths.elastic_ratio(law.strength, state.m.strength, state.J)
+    return strain + 1 / 3 * log(elastic) * tensors.I
 
 
 @plastic_strain.on(EosStrength)
 def _plastic_strain_eos_strength(law, kin, state):
-    return equivalent_plastic_strain(law.strength, state.m.strength)
+    return strengths.equivalent_plastic_strain(law.strength, state.m.strength)
 
 
-@shown.on(Remembered)
+@shown.on(strengths.Remembered)
 def _shown_remembered(what, law, kin, state):
     return state.m.strength[what.place]
 
@@ -254,12 +235,12 @@ def _shown_remembered(what, law, kin, state):
 def _with_stress_eos_strength(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
     J, _, m = state
-    stress = symmetric_tensor(kin, stress)
-    elastic = elastic_ratio(law.strength, m.strength, J)
+    stress = tensors.symmetric_tensor(kin, stress)
+    elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     beside = only(thermal_pressure(law.temperature, m.heat)) + only(m.viscous)
-    p = -tr(stress) * (1 / 3) - further_pressure(law.further, m.further, beside)
+    p = -tensors.tr(stress) * (1 / 3) - further_pressure(law.further, m.further, beside)
     after, energy = at_pressure(law.eos, elastic, m.energy, p, m.heat)
-    return State(J * (after / elastic), dev(stress), m._replace(energy=energy))
+    return composed.State(J * (after / elastic), tensors.dev(stress), m._replace(energy=energy))
 
 
 @specific_volume.on(EosStrength)
@@ -269,7 +250,7 @@ def _specific_volume_eos_strength(law):
 
 @damage.on(EosStrength)
 def _damage_eos_strength(law, kin, state):
-    return 1 - borne_share(law.damage, state.m.damage, state.J)
+    return 1 - composed.borne_share(law.damage, state.m.damage, state.J)
 
 
 @damage_initiation.on(EosStrength)

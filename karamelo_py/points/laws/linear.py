@@ -4,18 +4,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics.tensors import I, det, inner, nothing, sym, symmetric_tensor, tr
-from karamelo_py.points.laws import (
-    advance,
-    cauchy_stress,
-    elastic_strain,
-    energy_density,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    wave_speed_squared,
-    with_stress,
-)
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import tensors
 from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
@@ -117,60 +107,60 @@ def _turned_fixed_frame(law, dl, sigma):
     return sigma
 
 
-@initial_state.on(LinearElastic)
-@initial_state.on(FixedFrame)
+@laws.initial_state.on(LinearElastic)
+@laws.initial_state.on(FixedFrame)
 def _initial_state_fixed_frame(law, kin, like):
-    return State(1, nothing(kin))
+    return State(1, tensors.nothing(kin))
 
 
-@advance.on(LinearElastic)
-@advance.on(FixedFrame)
+@laws.advance.on(LinearElastic)
+@laws.advance.on(FixedFrame)
 def _advance_fixed_frame(law, kin, state, dl, dt):
-    eps = sym(dl)
-    increment = 2 * law.G * eps + law.lam * tr(eps) * I
-    return State(state.J * det(I + dl), turned(law, dl, state.sigma) + increment)
+    eps = tensors.sym(dl)
+    increment = 2 * law.G * eps + law.lam * tensors.tr(eps) * tensors.I
+    return State(state.J * tensors.det(tensors.I + dl), turned(law, dl, state.sigma) + increment)
 
 
-@kirchhoff_stress.on(LinearElastic)
-@kirchhoff_stress.on(FixedFrame)
+@laws.kirchhoff_stress.on(LinearElastic)
+@laws.kirchhoff_stress.on(FixedFrame)
 def _kirchhoff_stress_fixed_frame(law, kin, state):
     return state.J * state.sigma
 
 
-@cauchy_stress.on(LinearElastic)
-@cauchy_stress.on(FixedFrame)
+@laws.cauchy_stress.on(LinearElastic)
+@laws.cauchy_stress.on(FixedFrame)
 def _cauchy_stress_fixed_frame(law, kin, state):
     return state.sigma
 
 
-@jacobian.on(LinearElastic)
-@jacobian.on(FixedFrame)
+@laws.jacobian.on(LinearElastic)
+@laws.jacobian.on(FixedFrame)
 def _jacobian_fixed_frame(law, kin, state):
     return state.J
 
 
-@wave_speed_squared.on(LinearElastic)
-@wave_speed_squared.on(FixedFrame)
+@laws.wave_speed_squared.on(LinearElastic)
+@laws.wave_speed_squared.on(FixedFrame)
 def _wave_speed_squared_fixed_frame(law, kin, state):
     # (lam + 2 G) / rho: the moduli are constant, the volume per mass has grown by det F
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 
-@elastic_strain.on(LinearElastic)
-@elastic_strain.on(FixedFrame)
+@laws.elastic_strain.on(LinearElastic)
+@laws.elastic_strain.on(FixedFrame)
 def _elastic_strain_fixed_frame(law, kin, state):
     # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
-    mean = law.lam / (3 * law.lam + 2 * law.G) * tr(state.sigma)
-    return 0.5 / law.G * (state.sigma - mean * I)
+    mean = law.lam / (3 * law.lam + 2 * law.G) * tensors.tr(state.sigma)
+    return 0.5 / law.G * (state.sigma - mean * tensors.I)
 
 
-@energy_density.on(LinearElastic)
-@energy_density.on(FixedFrame)
+@laws.energy_density.on(LinearElastic)
+@laws.energy_density.on(FixedFrame)
 def _energy_density_fixed_frame(law, kin, state):
-    return 0.5 * state.J * inner(state.sigma, elastic_strain(law, kin, state))
+    return 0.5 * state.J * tensors.inner(state.sigma, laws.elastic_strain(law, kin, state))
 
 
-@with_stress.on(LinearElastic)
-@with_stress.on(FixedFrame)
+@laws.with_stress.on(LinearElastic)
+@laws.with_stress.on(FixedFrame)
 def _with_stress_fixed_frame(law, kin, state, stress):
-    return State(state.J, symmetric_tensor(kin, stress))
+    return State(state.J, tensors.symmetric_tensor(kin, stress))

@@ -5,19 +5,8 @@ from typing import Annotated, Any, NamedTuple
 
 from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points import laws
 from karamelo_py.points.kinematics.tensors import I, det, tr, unit
-from karamelo_py.points.laws import (
-    advance,
-    cauchy_stress,
-    deformation,
-    elastic_strain,
-    energy_density,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    wave_speed_bound,
-    wave_speed_squared,
-)
 from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
@@ -85,46 +74,46 @@ class State(NamedTuple):
     F: Any  # deformation gradient
 
 
-@initial_state.on(NeoHookean)
+@laws.initial_state.on(NeoHookean)
 def _initial_state_neo_hookean(law, kin, like):
     return State(unit(kin))
 
 
-@advance.on(NeoHookean)
+@laws.advance.on(NeoHookean)
 def _advance_neo_hookean(law, kin, state, dl, dt):
     return State(state.F.after(dl))
 
 
-@kirchhoff_stress.on(NeoHookean)
+@laws.kirchhoff_stress.on(NeoHookean)
 def _kirchhoff_stress_neo_hookean(law, kin, state):
     # P = G (F - F^-T) + lam ln J F^-T, so tau = P F^T = G (b - I) + lam ln J I
     b = state.F.left_cauchy_green()
     return law.G * b + (law.lam * log(det(state.F)) - law.G) * I
 
 
-@cauchy_stress.on(NeoHookean)
+@laws.cauchy_stress.on(NeoHookean)
 def _cauchy_stress_neo_hookean(law, kin, state):
-    return kirchhoff_stress(law, kin, state) / det(state.F)
+    return laws.kirchhoff_stress(law, kin, state) / det(state.F)
 
 
-@deformation.on(NeoHookean)
+@laws.deformation.on(NeoHookean)
 def _deformation_neo_hookean(law, kin, state):
     return state.F
 
 
-@jacobian.on(NeoHookean)
+@laws.jacobian.on(NeoHookean)
 def _jacobian_neo_hookean(law, kin, state):
     return det(state.F)
 
 
-@wave_speed_squared.on(NeoHookean)
+@laws.wave_speed_squared.on(NeoHookean)
 def _wave_speed_squared_neo_hookean(law, kin, state):
     # Along a principal direction of stretch a, the tangent of P gives
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
     return speed_squared(law, state.F, law.lam * (1 - log(det(state.F))))
 
 
-@wave_speed_bound.on(NeoHookean)
+@laws.wave_speed_bound.on(NeoHookean)
 def _wave_speed_bound_neo_hookean(law, kin, state):
     # Without a series: 1 / J is above 1 - ln J (by 2 % at J = 0.8), and J / e^2 above its negative.
     J = det(state.F)
@@ -136,14 +125,14 @@ def speed_squared(law, F, bulk):
     return (law.G * (1 + stretch) + max(bulk, 0)) * law.specific_volume
 
 
-@energy_density.on(NeoHookean)
+@laws.energy_density.on(NeoHookean)
 def _energy_density_neo_hookean(law, kin, state):
     ln_J = log(det(state.F))
     excess = tr(state.F.left_cauchy_green()) - 3
     return 0.5 * law.G * excess - law.G * ln_J + 0.5 * law.lam * ln_J * ln_J
 
 
-@elastic_strain.on(NeoHookean)
+@laws.elastic_strain.on(NeoHookean)
 def _elastic_strain_neo_hookean(law, kin, state):
     """Green-Lagrange strain (F^T F - I) / 2."""
     return 0.5 * state.F.right_cauchy_green() - 0.5 * I

@@ -2,26 +2,8 @@
 
 from typing import Any, NamedTuple
 
+from karamelo_py.points import laws
 from karamelo_py.points.kinematics.tensors import I, symmetric_tensor
-from karamelo_py.points.laws import (
-    advance,
-    cauchy_stress,
-    column,
-    conductivity,
-    deformation,
-    elastic_strain,
-    energy_density,
-    heat_capacity,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    specific_volume,
-    temperature,
-    wave_speed_bound,
-    wave_speed_squared,
-    with_stress,
-    with_temperature,
-)
 from karamelo_py.points.laws.elasticity import LameParameters
 from karamelo_py.points.laws.temperatures import Warm, initial_heat, thermal_pressure
 from karamelo_py.script.errors import ScriptError
@@ -64,7 +46,7 @@ def expanding(
     return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, 0.0))
 
 
-column(Expansion, "T", temperature)
+laws.column(Expansion, "T", laws.temperature)
 
 
 @initial_heat.on(Expansion)
@@ -89,87 +71,87 @@ def expansion_pressure(law, state):
     return thermal_pressure(law.heat, (state.T,))[0]
 
 
-@initial_state.on(Thermoelastic)
+@laws.initial_state.on(Thermoelastic)
 def _initial_state_thermoelastic(law, kin, like):
-    return State(initial_state(law.elastic, kin, like), initial_heat(law.heat, like).T)
+    return State(laws.initial_state(law.elastic, kin, like), initial_heat(law.heat, like).T)
 
 
-@advance.on(Thermoelastic)
+@laws.advance.on(Thermoelastic)
 def _advance_thermoelastic(law, kin, state, dl, dt):
-    return State(advance(law.elastic, kin, state.elastic, dl, dt), state.T)
+    return State(laws.advance(law.elastic, kin, state.elastic, dl, dt), state.T)
 
 
-@cauchy_stress.on(Thermoelastic)
+@laws.cauchy_stress.on(Thermoelastic)
 def _cauchy_stress_thermoelastic(law, kin, state):
-    return cauchy_stress(law.elastic, kin, state.elastic) - expansion_pressure(law, state) * I
+    return laws.cauchy_stress(law.elastic, kin, state.elastic) - expansion_pressure(law, state) * I
 
 
-@kirchhoff_stress.on(Thermoelastic)
+@laws.kirchhoff_stress.on(Thermoelastic)
 def _kirchhoff_stress_thermoelastic(law, kin, state):
-    p = jacobian(law, kin, state) * expansion_pressure(law, state)
-    return kirchhoff_stress(law.elastic, kin, state.elastic) - p * I
+    p = laws.jacobian(law, kin, state) * expansion_pressure(law, state)
+    return laws.kirchhoff_stress(law.elastic, kin, state.elastic) - p * I
 
 
-@jacobian.on(Thermoelastic)
+@laws.jacobian.on(Thermoelastic)
 def _jacobian_thermoelastic(law, kin, state):
-    return jacobian(law.elastic, kin, state.elastic)
+    return laws.jacobian(law.elastic, kin, state.elastic)
 
 
-@deformation.on(Thermoelastic)
+@laws.deformation.on(Thermoelastic)
 def _deformation_thermoelastic(law, kin, state):
-    return deformation(law.elastic, kin, state.elastic)
+    return laws.deformation(law.elastic, kin, state.elastic)
 
 
-@wave_speed_squared.on(Thermoelastic)
+@laws.wave_speed_squared.on(Thermoelastic)
 def _wave_speed_squared_thermoelastic(law, kin, state):
-    return wave_speed_squared(law.elastic, kin, state.elastic)
+    return laws.wave_speed_squared(law.elastic, kin, state.elastic)
 
 
-@wave_speed_bound.on(Thermoelastic)
+@laws.wave_speed_bound.on(Thermoelastic)
 def _wave_speed_bound_thermoelastic(law, kin, state):
-    return wave_speed_bound(law.elastic, kin, state.elastic)
+    return laws.wave_speed_bound(law.elastic, kin, state.elastic)
 
 
-@energy_density.on(Thermoelastic)
+@laws.energy_density.on(Thermoelastic)
 def _energy_density_thermoelastic(law, kin, state):
     """What unloading gives back at this temperature."""
-    j = jacobian(law, kin, state)
-    elastic = energy_density(law.elastic, kin, state.elastic)
+    j = laws.jacobian(law, kin, state)
+    elastic = laws.energy_density(law.elastic, kin, state.elastic)
     return elastic + expansion_pressure(law, state) * (1 - j)
 
 
-@elastic_strain.on(Thermoelastic)
+@laws.elastic_strain.on(Thermoelastic)
 def _elastic_strain_thermoelastic(law, kin, state):
     warmer = state.T - law.heat.initial_temperature
-    return elastic_strain(law.elastic, kin, state.elastic) - law.heat.alpha * warmer * I
+    return laws.elastic_strain(law.elastic, kin, state.elastic) - law.heat.alpha * warmer * I
 
 
-@with_stress.on(Thermoelastic)
+@laws.with_stress.on(Thermoelastic)
 def _with_stress_thermoelastic(law, kin, state, stress):
     elastic = symmetric_tensor(kin, stress) + expansion_pressure(law, state) * I
-    return State(with_stress(law.elastic, kin, state.elastic, elastic), state.T)
+    return State(laws.with_stress(law.elastic, kin, state.elastic, elastic), state.T)
 
 
-@specific_volume.on(Thermoelastic)
+@laws.specific_volume.on(Thermoelastic)
 def _specific_volume_thermoelastic(law):
-    return specific_volume(law.elastic)
+    return laws.specific_volume(law.elastic)
 
 
-@temperature.on(Thermoelastic)
+@laws.temperature.on(Thermoelastic)
 def _temperature_thermoelastic(law, kin, state):
     return state.T
 
 
-@with_temperature.on(Thermoelastic)
+@laws.with_temperature.on(Thermoelastic)
 def _with_temperature_thermoelastic(law, kin, state, T):
     return State(state.elastic, T)
 
 
-@heat_capacity.on(Thermoelastic)
+@laws.heat_capacity.on(Thermoelastic)
 def _heat_capacity_thermoelastic(law, like):
     return law.heat.cp
 
 
-@conductivity.on(Thermoelastic)
+@laws.conductivity.on(Thermoelastic)
 def _conductivity_thermoelastic(law, like):
     return law.heat.kappa
