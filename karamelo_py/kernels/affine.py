@@ -9,19 +9,11 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.lanes import Eights, Fours
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.tuples import add, add_scaled, scale
+from karamelo_py.kernels import p2g
 from karamelo_py.kernels.arrays import MASS, of_force
 from karamelo_py.kernels.averaging import NodalStress
 from karamelo_py.kernels.g2p import Move, update_at, zero_vector
 from karamelo_py.kernels.loss import Lost
-from karamelo_py.kernels.p2g import (
-    Centre,
-    InternalForce,
-    Led,
-    MassMomentum,
-    MomentumAgain,
-    Normal,
-    SeenMass,
-)
 from karamelo_py.kernels.visit import for_tags
 from karamelo_py.points.basis import entry, reach, support
 from karamelo_py.points.basis.product import inverse_spread, spacing
@@ -67,23 +59,23 @@ def _momentum(w, stencil, mass, v, moment):
     return _affine(w, stencil, momentum, columns(planar(w.kin), scale(mass, c)))
 
 
-@affine_part.on(MassMomentum)
+@affine_part.on(p2g.MassMomentum)
 def _affine_part_mass_momentum(quantity, w, stencil, load):
     mass, v, moment, _, _ = load
     given = _momentum(w, stencil, mass, v, moment)
-    if not (len(given) and _lacks(w, (Lost, Led, Centre, Normal, SeenMass))):
+    if not (len(given) and _lacks(w, (Lost, p2g.Led, p2g.Centre, p2g.Normal, p2g.SeenMass))):
         return ()
     momentum, growths = given
     return w.nodes.sums, MASS, (mass, *momentum), tuple([(mass - mass, *g) for g in growths])
 
 
-@affine_part.on(MomentumAgain)
+@affine_part.on(p2g.MomentumAgain)
 def _affine_part_momentum_again(quantity, w, stencil, load):
     given = _momentum(w, stencil, *load)
     return (w.nodes.velocity, 0, *given) if len(given) else ()
 
 
-@affine_part.on(InternalForce)
+@affine_part.on(p2g.InternalForce)
 def _affine_part_internal_force(quantity, w, stencil, load):
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin) and _lacks(w, (NodalStress,))):

@@ -18,15 +18,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import over_blocks, point_function, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels.arrays import (
-    ON_UPDATE,
-    ON_VELOCITY,
-    POST_HEAT_TO_GRID,
-    POST_UPDATE_GRID_HEAT,
-    SUPPLY_HEAT,
-    Hooks,
-    with_nodes,
-)
+from karamelo_py.kernels import arrays
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.heat import (
     Capacity,
@@ -55,7 +47,7 @@ def at_heat_nodes(hooks, stage, target, s):
     """Let the fixes act on the nodes of heat."""
 
 
-@at_heat_nodes.on(Hooks)
+@at_heat_nodes.on(arrays.Hooks)
 def _at_heat_nodes_hooks(hooks, stage, target, s):
     # Temperatures are always kept: FLIP, whatever the transfer of velocity.
     clock = s.control.clock[0]
@@ -81,7 +73,7 @@ def _supply_blocks(block, s, hooks):
         points.mass,
         points.x[s.control.clock[0].now],
     )
-    point_hooks(SUPPLY_HEAT, warmth, s.kin, points.id, hooks, s.control, step_size(s))
+    point_hooks(arrays.SUPPLY_HEAT, warmth, s.kin, points.id, hooks, s.control, step_size(s))
 
 
 @point_function(otherwise=True)
@@ -89,13 +81,13 @@ def at_heated_points(hooks, s):
     """Let the fixes supply heat to points, or set their temperature."""
 
 
-@at_heated_points.on(Hooks)
+@at_heated_points.on(arrays.Hooks)
 def _at_heated_points_hooks(hooks, s):
     clock = s.control.clock[0]
     clock.rise = clock.fall = 0.0
-    clear_totals(SUPPLY_HEAT, hooks, s.control)
+    clear_totals(arrays.SUPPLY_HEAT, hooks, s.control)
     _supply_blocks(s, hooks)
-    publish_totals(SUPPLY_HEAT, hooks, s.control)
+    publish_totals(arrays.SUPPLY_HEAT, hooks, s.control)
     agree_on_heat(s.control.ranks, s.control)
     clock.hottest += step_size(s) * clock.rise
     clock.coldest += step_size(s) * clock.fall
@@ -104,7 +96,7 @@ def _at_heated_points_hooks(hooks, s):
 @shared
 def visit_for_heat(heat, s, mode, visit, gathers, scatters):
     """Visit the points for heat: the nodes are those of heat."""
-    here = with_nodes(s, heat.nodes, heat.buffers)
+    here = arrays.with_nodes(s, heat.nodes, heat.buffers)
     visit_here(here, mode, visit, step_size(s), gathers, scatters)
 
 
@@ -135,12 +127,12 @@ def _conduct_conducting(heat, s, mode, hooks):
     map_heat(heat, s, mode, False, True)
     sweep_nodes(mode, SumsToVelocity(), kin, nodes, s.ranges, dt)
     sweep_nodes(mode, TakeMean(), kin, nodes, s.ranges, dt)
-    at_heat_nodes(hooks, POST_HEAT_TO_GRID, ON_VELOCITY, s)
+    at_heat_nodes(hooks, arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY, s)
     at_heated_points(hooks, s)
     flow = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
     visit_for_heat(heat, s, mode, flow, True, True)
     sweep_nodes(mode, Update(), kin, nodes, s.ranges, dt)
-    at_heat_nodes(hooks, POST_UPDATE_GRID_HEAT, ON_UPDATE, s)
+    at_heat_nodes(hooks, arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, s)
     map_heat(heat, s, mode, True, False)
     # What `Warming` reports as a rate is by what factor conduction has become faster.
     read_reports(s)

@@ -25,21 +25,8 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels import contact_pairs
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
-from karamelo_py.kernels.contact_pairs import (
-    Where,
-    approach_left,
-    compliance_of,
-    excess_of,
-    friction_of,
-    immovable,
-    length_of,
-    outward_of,
-    pair_of,
-    slide_of,
-    work_of_friction,
-    yielding_of,
-)
 from karamelo_py.kernels.loss import Rubbed, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.kernels.rows import touch, touch_velocity
@@ -79,7 +66,7 @@ class SeparateFields(NamedTuple):
 def _take(contact, control, a, i, n, k, impulse, per_mass, x):
     """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
-    if not immovable(contact, n, k):
+    if not contact_pairs.immovable(contact, n, k):
         contact.change[i, k] += impulse * per_mass
     if not counts(control.ranks, n):
         return
@@ -128,7 +115,7 @@ def _clear_change(contact, d, count):
 class Approaching(NamedTuple):
     """Pairs of bodies that approach each other further than they may."""
 
-    where: Where
+    where: contact_pairs.Where
 
 
 class Touched(NamedTuple):
@@ -144,7 +131,12 @@ def _belongs(which, contact, d, nodes, n, m, b):
 
 @_belongs.on(Approaching)
 def _belongs_approaching(which, contact, d, nodes, n, m, b):
-    return excess_of(contact, d, nodes, pair_of(contact, d, nodes, n, m), which.where) > 0
+    return (
+        contact_pairs.excess_of(
+            contact, d, nodes, contact_pairs.pair_of(contact, d, nodes, n, m), which.where
+        )
+        > 0
+    )
 
 
 @_belongs.on(Touched)
@@ -177,31 +169,35 @@ def _share(contact, i, j):
 def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
-    pair = pair_of(contact, d, nodes, _node(contact, place, i), _node(contact, place, j))
-    excess = excess_of(contact, d, nodes, pair, where)
+    pair = contact_pairs.pair_of(
+        contact, d, nodes, _node(contact, place, i), _node(contact, place, j)
+    )
+    excess = contact_pairs.excess_of(contact, d, nodes, pair, where)
     if not excess > 0:
         return
-    size = length_of(d, nodes, pair)
-    compliance = compliance_of(contact, d, nodes, pair, size)
+    size = contact_pairs.length_of(d, nodes, pair)
+    compliance = contact_pairs.compliance_of(contact, d, nodes, pair, size)
     if not compliance > 0:
         return  # the fixes move both
     push = share * excess / compliance
     rub, sticks, across = 0.0, False, 0.0
     friction = contact.friction[a, b]
     if friction > 0:
-        across = approach_left(contact, d, nodes, pair, push / size, size)
-        rub, sticks = friction_of(contact, d, nodes, pair, friction, push, size, across, share)
+        across = contact_pairs.approach_left(contact, d, nodes, pair, push / size, size)
+        rub, sticks = contact_pairs.friction_of(
+            contact, d, nodes, pair, friction, push, size, across, share
+        )
     step = int(control.values[TIMESTEP]) + 1
     contact.touched[pair.n, b] = -step if sticks else step
     if rub > 0:
-        heat = work_of_friction(contact, d, nodes, pair, push / size, across, rub)
+        heat = contact_pairs.work_of_friction(contact, d, nodes, pair, push / size, across, rub)
         share = contact.warmth[a, b]
         warm_node(field(nodes.fields, Rubbed), pair.n, share * heat * pair.per_a)
         warm_node(field(nodes.fields, Rubbed), pair.m, (1.0 - share) * heat * pair.per_b)
     for k in range(d):
-        impulse = push * outward_of(nodes, pair, k) / size
+        impulse = push * contact_pairs.outward_of(nodes, pair, k) / size
         if rub > 0:
-            impulse += rub * slide_of(contact, nodes, pair, k, push / size, across)
+            impulse += rub * contact_pairs.slide_of(contact, nodes, pair, k, push / size, across)
         _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a, where.x)
         _take(contact, control, b, j, pair.m, k, impulse, pair.per_b, where.x)
         force = impulse / control.clock[0].kick
@@ -249,7 +245,7 @@ def touch_node(contact, kin, grids, nodes, control, n):
     count = _meet(contact, nodes, n)
     if count > 1:
         grid = record(grids, n // contact.stride)
-        where = Where(node_position(grid, n), grid.h, control.values[DT])
+        where = contact_pairs.Where(node_position(grid, n), grid.h, control.values[DT])
         _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
 
 
@@ -288,20 +284,20 @@ def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
     across = 0.0
     compliance = 0.0
     for k in range(d):
-        normal = outward_of(nodes, pair, k)
+        normal = contact_pairs.outward_of(nodes, pair, k)
         across += normal * (v[pair.n, k] - v[pair.m, k])
-        compliance += normal * normal * yielding_of(contact, pair, k)
+        compliance += normal * normal * contact_pairs.yielding_of(contact, pair, k)
     push = share * across / compliance if compliance > 0 else 0.0
     for k in range(d):
-        yielding = yielding_of(contact, pair, k)
+        yielding = contact_pairs.yielding_of(contact, pair, k)
         if not yielding > 0:
             continue
-        impulse = push * outward_of(nodes, pair, k)
+        impulse = push * contact_pairs.outward_of(nodes, pair, k)
         if sticks:
             impulse = share * (v[pair.n, k] - v[pair.m, k]) / yielding
-        if not immovable(contact, pair.n, k):
+        if not contact_pairs.immovable(contact, pair.n, k):
             contact.change[i, k] -= impulse * pair.per_a
-        if not immovable(contact, pair.m, k):
+        if not contact_pairs.immovable(contact, pair.m, k):
             contact.change[j, k] += impulse * pair.per_b
 
 
@@ -316,7 +312,7 @@ def _stay_place(contact, d, nodes, place, count, step):
             for j in range(i + 1, count):
                 touched = contact.touched[n, contact.meeting[j]]
                 if abs(touched) == step:
-                    pair = pair_of(contact, d, nodes, n, _node(contact, place, j))
+                    pair = contact_pairs.pair_of(contact, d, nodes, n, _node(contact, place, j))
                     share = _share(contact, i, j)
                     _stay_pair(contact, d, nodes, i, j, pair, share, touched < 0)
         for i in range(count):

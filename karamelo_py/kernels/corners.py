@@ -7,28 +7,8 @@ what the nodes around it have, and shares out among them what it is given.
 
 from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels.g2p import (
-    AverageStress,
-    Move,
-    SecondStrain,
-    SeriesTerm,
-    Strain,
-    StrainInMove,
-    StrainOfLastStep,
-    TrialStrain,
-    TrialStrainOfLastStep,
-    gathered_all,
-)
+from karamelo_py.kernels import g2p, p2g
 from karamelo_py.kernels.loss import Lost
-from karamelo_py.kernels.p2g import (
-    AveragedForce,
-    InternalForce,
-    MassMomentum,
-    MomentumAgain,
-    SeriesBack,
-    Volumes,
-    scattered_all,
-)
 from karamelo_py.points.basis import carried, support
 from karamelo_py.points.basis.cpdi.block import InBlock
 from karamelo_py.points.basis.cpdi.corners import AtCorners
@@ -51,16 +31,16 @@ def _without_moments(part, w):
     return not any(function.defined(type(w.transfer)) for function in asked)
 
 
-for _part in (AverageStress, SeriesTerm, Volumes, SeriesBack):
+for _part in (g2p.AverageStress, g2p.SeriesTerm, p2g.Volumes, p2g.SeriesBack):
     by_corners.on(_part)(_always)
 for _part in (
-    Move, Strain, StrainOfLastStep, SecondStrain, StrainInMove, TrialStrain,
-    TrialStrainOfLastStep, InternalForce, AveragedForce, MomentumAgain,
+    g2p.Move, g2p.Strain, g2p.StrainOfLastStep, g2p.SecondStrain, g2p.StrainInMove, g2p.TrialStrain,
+    g2p.TrialStrainOfLastStep, p2g.InternalForce, p2g.AveragedForce, p2g.MomentumAgain,
 ):  # fmt: skip
     by_corners.on(_part)(_without_moments)
 
 
-@by_corners.on(MassMomentum)
+@by_corners.on(p2g.MassMomentum)
 def _by_corners_mass_momentum(part, w):
     return _without_moments(part, w) and field(w.nodes.fields, Lost) is None
 
@@ -87,7 +67,7 @@ def in_block(w):
 @shared
 def shows_corners(tasks, w):
     """Whether the velocities of the corners themselves are asked for."""
-    return carried(w.basis, w.kin) > 0 and any(isinstance(task, Move) for task in tasks)
+    return carried(w.basis, w.kin) > 0 and any(isinstance(task, g2p.Move) for task in tasks)
 
 
 @shared
@@ -95,7 +75,7 @@ def gather_corners(tasks, w, stencil, totals):
     """The totals of the tasks over all corners."""
     at = _seeing(AtCorners(w.basis), w)
     for c in range(support(at.basis, w.kin)):
-        totals = gathered_all(tasks, at, stencil, c, totals)
+        totals = g2p.gathered_all(tasks, at, stencil, c, totals)
     return totals
 
 
@@ -104,4 +84,4 @@ def scatter_corners(quantities, w, stencil, loads):
     """Give all corners their parts."""
     at = _seeing(AtCorners(w.basis), w)
     for c in range(support(at.basis, w.kin)):
-        scattered_all(quantities, at, stencil, c, loads)
+        p2g.scattered_all(quantities, at, stencil, c, loads)

@@ -10,38 +10,13 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import choose, fma, in_all, point_function, real, shared
 from karamelo_py.compiler.fields import field, increase, load_vector, store, store_from
 from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
+from karamelo_py.kernels import averaging, visit
 from karamelo_py.kernels.arrays import of_change
-from karamelo_py.kernels.averaging import (
-    AveragedStress,
-    NodalStress,
-    VolumeRatio,
-    averaged,
-    gathered_ratio,
-    kept_out,
-    known_gradient,
-    no_ratio,
-)
 from karamelo_py.kernels.loss import Rubbed, in_company, reflect, warm, warm_by_friction
-from karamelo_py.kernels.visit import (
-    deformation_of,
-    for_tags,
-    in_turn,
-    law_of,
-    place_at,
-    records_of,
-    state_of,
-)
+from karamelo_py.points import frames, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.boundary import Bounces, reflected
-from karamelo_py.points.frames import (
-    DeformationGradient,
-    follows,
-    inverse_stretch_squared,
-    of_places_before,
-    spatial_increment,
-    strained,
-)
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import (
     add_outer,
@@ -56,15 +31,6 @@ from karamelo_py.points.laws import (
     jacobian,
     wave_speed_bound,
     wave_speed_squared,
-)
-from karamelo_py.points.transfers import (
-    Moment,
-    add_moment,
-    displacing_velocity,
-    gradient_weight,
-    known_volume,
-    updated_velocity,
-    zero_moment,
 )
 from karamelo_py.points.transfers.xpic import Reflected, Series, TermOfSeries
 
@@ -167,20 +133,20 @@ def empty(task, w, x):
 @empty.on(Move)
 def _empty_move(task, w, x):
     zero = subtract(x, x)
-    return zero, zero, zero_moment(w.transfer, w.kin, x[0])
+    return zero, zero, transfers.zero_moment(w.transfer, w.kin, x[0])
 
 
 @empty.on(Strain)
 @empty.on(StrainOfLastStep)
 @empty.on(SecondStrain)
 def _empty_second_strain(task, w, x):
-    return zero_tensor(w.kin, x[0]), no_ratio(w.averaging, x[0])
+    return zero_tensor(w.kin, x[0]), averaging.no_ratio(w.averaging, x[0])
 
 
 @empty.on(StrainInMove)
 def _empty_strain_in_move(task, w, x):
     gradient = zero_tensor(w.kin, x[0])
-    return kept_out(w.averaging, w, gradient), no_ratio(w.averaging, x[0])
+    return averaging.kept_out(w.averaging, w, gradient), averaging.no_ratio(w.averaging, x[0])
 
 
 @empty.on(TrialStrain)
@@ -199,13 +165,13 @@ def _empty_series_term(task, w, x):
     return subtract(x, x)
 
 
-@records_of.on(Move)
+@visit.records_of.on(Move)
 def _records_of_move(task, nodes):
     return nodes.update
 
 
-@records_of.on(Strain)
-@records_of.on(StrainOfLastStep)
+@visit.records_of.on(Strain)
+@visit.records_of.on(StrainOfLastStep)
 def _records_of_strain_of_last_step(task, nodes):
     return nodes.velocity
 
@@ -218,13 +184,15 @@ def gathered(task, w, stencil, k, total):
 @gathered.on(Move)
 def _gathered_move(task, w, stencil, k, total):
     i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-    g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
+    g = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
     v, dv = update_at(w.kin, w.nodes, i, total[0])
     corners = (*total[3:], v) if moves_corners(w.basis, w.kin) else ()
     return (
         add_scaled(total[0], weight, v),
         add_scaled(total[1], weight, dv),
-        add_moment(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, g, v, total[2]),
+        transfers.add_moment(
+            w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, g, v, total[2]
+        ),
         *corners,
     )
 
@@ -253,7 +221,7 @@ def update_at(kin, nodes, i, like):
 @shared
 def _gradient(w, stencil, k, total):
     i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-    g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
+    g = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
     v = row(w.nodes.velocity, i, 0, zero_vector(w.kin, g[0]))
     return add_outer(w.kin, total, v, g)
 
@@ -271,7 +239,7 @@ def add_gradient(w, stencil, k, total):
 def _gathered_strain_in_move(task, w, stencil, k, total):
     return (
         add_gradient(w, stencil, k, total[0]),
-        gathered_ratio(w.averaging, w, stencil, k, total[1]),
+        averaging.gathered_ratio(w.averaging, w, stencil, k, total[1]),
     )
 
 
@@ -284,7 +252,7 @@ def _gathered_trial_strain_of_last_step(task, w, stencil, k, total):
 @gathered.on(AverageStress)
 def _gathered_average_stress(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    return fma(weight, row(field(w.nodes.fields, NodalStress), i, 0, (total,))[0], total)
+    return fma(weight, row(field(w.nodes.fields, averaging.NodalStress), i, 0, (total,))[0], total)
 
 
 @gathered.on(SeriesTerm)
@@ -313,7 +281,7 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
 
 @settled.on(StrainOfLastStep)
 def _settled_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
-    dl = of_places_before(w.frame, w.kin, scale(dt, total[0]))
+    dl = frames.of_places_before(w.frame, w.kin, scale(dt, total[0]))
     return _strain(w, w.places.x, p, dt, dl, total[1], fastest)
 
 
@@ -324,7 +292,7 @@ def _settled_second_strain(task, w, stencil, p, dt, total, totals, fastest):
 
 @settled.on(StrainInMove)
 def _settled_strain_in_move(task, w, stencil, p, dt, total, totals, fastest):
-    gradient = known_gradient(w.averaging, w, totals[0][2], total[0])
+    gradient = averaging.known_gradient(w.averaging, w, totals[0][2], total[0])
     return _strain(w, w.places.x, p, dt, scale(dt, gradient), total[1], fastest)
 
 
@@ -336,22 +304,22 @@ def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
 
 @settled.on(TrialStrainOfLastStep)
 def _settled_trial_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
-    _keep_ratio(w, p, dt, of_places_before(w.frame, w.kin, scale(dt, total)))
+    _keep_ratio(w, p, dt, frames.of_places_before(w.frame, w.kin, scale(dt, total)))
     return real(0, dt), fastest
 
 
 @shared
 def _keep_ratio(w, p, dt, dl):
-    law = law_of(w, p)
-    state = state_of(w, law, p, dt)
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    increment = spatial_increment(w.frame, w.kin, dl, f)
-    field(w.points.fields, VolumeRatio)[0, p] = volume_ratio(w.kin, increment)
+    law = visit.law_of(w, p)
+    state = visit.state_of(w, law, p, dt)
+    f = visit.deformation_of(w.frame, w.kin, law, state, w.points, p)
+    increment = frames.spatial_increment(w.frame, w.kin, dl, f)
+    field(w.points.fields, averaging.VolumeRatio)[0, p] = volume_ratio(w.kin, increment)
 
 
 @settled.on(AverageStress)
 def _settled_average_stress(task, w, stencil, p, dt, total, totals, fastest):
-    field(w.points.fields, AveragedStress)[0, p] = total
+    field(w.points.fields, averaging.AveragedStress)[0, p] = total
     return real(0, dt), fastest
 
 
@@ -377,12 +345,14 @@ def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
 @shared
 def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
-    law = law_of(w, p)
+    law = visit.law_of(w, p)
     old = load_vector(w.kin, w.points.v, p)
-    v = constrained_velocity(law, old, updated_velocity(w.transfer, old, total[0], total[1]))
+    v = constrained_velocity(
+        law, old, transfers.updated_velocity(w.transfer, old, total[0], total[1])
+    )
     x = load_vector(w.kin, w.places.x, p)
-    j = known_volume(w.transfer, law, w.kin, state_of(w, law, p, dt))
-    displacing = displacing_velocity(w.transfer, v, total[0], j)
+    j = transfers.known_volume(w.transfer, law, w.kin, visit.state_of(w, law, p, dt))
+    displacing = transfers.displacing_velocity(w.transfer, v, total[0], j)
     step = scale(dt, constrained_velocity(law, v, displacing))
     y = add_scaled(x, real(1, dt), step)
     warm_by_friction(field(w.nodes.fields, Rubbed), w, stencil, p, v[0])
@@ -391,13 +361,13 @@ def _move(w, stencil, p, dt, total):
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
     increase(field(w.points.fields, Bounces), p, hits)
     store(w.points.v, p, v)
-    store(field(w.points.fields, Moment), p, moment)
+    store(field(w.points.fields, transfers.Moment), p, moment)
     store(w.places.y, p, y)
     moved = largest_component(w.kin, subtract(y, x)) * w.grid.inv_h
-    if not follows(w.frame):
+    if not frames.follows(w.frame):
         return moved
     if carried(w.basis, w.kin) > 0:
-        before = place_at(w.basis, w.kin, w.places.x, p)
+        before = visit.place_at(w.basis, w.kin, w.places.x, p)
         new = add_row(before, 0, step)
         for corner in range(carried(w.basis, w.kin)):
             if len(total) > 3:
@@ -417,26 +387,26 @@ def _strain(w, x, p, dt, dl, ratio, fastest):
 
     `dl` is dt times the gradient of velocity, `x` are the places whose shapes grow.
     """
-    dl = averaged(w.averaging, w, p, dl, ratio)
-    law = law_of(w, p)
-    old = state_of(w, law, p, dt)
-    f = deformation_of(w.frame, w.kin, law, old, w.points, p)
-    increment = spatial_increment(w.frame, w.kin, dl, f)
+    dl = averaging.averaged(w.averaging, w, p, dl, ratio)
+    law = visit.law_of(w, p)
+    old = visit.state_of(w, law, p, dt)
+    f = visit.deformation_of(w.frame, w.kin, law, old, w.points, p)
+    increment = frames.spatial_increment(w.frame, w.kin, dl, f)
     state = advance(law, w.kin, old, increment, dt)
     store(w.points.state, p, state)
-    now = strained(w.frame, w.kin, f, dl)
-    store_optional(field(w.points.fields, DeformationGradient), p, now)
+    now = frames.strained(w.frame, w.kin, f, dl)
+    store_optional(field(w.points.fields, frames.DeformationGradient), p, now)
     j = jacobian(law, w.kin, state)
     grown = real(0, j)
-    if follows(w.frame) and carried(w.basis, w.kin) == 0:
-        before = place_at(w.basis, w.kin, x, p)
+    if frames.follows(w.frame) and carried(w.basis, w.kin) == 0:
+        before = visit.place_at(w.basis, w.kin, x, p)
         after = deformed(w.basis, w.kin, before, increment)
         store_from(w.places.y, p, dimension(w.kin), after)
         grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
     if not in_all(j > 0):
         return choose(j > 0, grown, real(inf, j)), fastest
     # The speed of waves is only asked of the few points that may be faster than all before them.
-    shorter = inverse_stretch_squared(w.frame, w.kin, now, dt)
+    shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
     most = wave_speed_bound(law, w.kin, state) * shorter
     speed = largest_component(w.kin, subtract(load_vector(w.kin, w.points.v, p), w.common))
     slack = fastest - speed
@@ -453,6 +423,6 @@ def store_optional(array, p, value):
         store(array, p, value)
 
 
-empty_all = for_tags(empty, "w, x")
-gathered_all = for_tags(gathered, "w, stencil, k, totals", each="totals")
-settled_all = in_turn(settled)
+empty_all = visit.for_tags(empty, "w, x")
+gathered_all = visit.for_tags(gathered, "w, stencil, k, totals", each="totals")
+settled_all = visit.in_turn(settled)

@@ -27,17 +27,10 @@ from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.g2p import empty, gathered, settled
 from karamelo_py.kernels.p2g import load_of, scattered
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
+from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
 from karamelo_py.points.kinematics import Line, dimension
-from karamelo_py.points.laws import (
-    conductivity,
-    heat_capacity,
-    jacobian,
-    specific_volume,
-    temperature,
-    with_temperature,
-)
 
 
 class Temperature(StepField):
@@ -147,10 +140,10 @@ def _load_of_heat_content(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     mass = w.points.mass[p]
-    volume = mass * specific_volume(law) * jacobian(law, w.kin, state)
-    T = temperature(law, w.kin, state)
-    capacity = mass * heat_capacity(law, like)
-    conductance = volume * conductivity(law, like)
+    volume = mass * laws.specific_volume(law) * laws.jacobian(law, w.kin, state)
+    T = laws.temperature(law, w.kin, state)
+    capacity = mass * laws.heat_capacity(law, like)
+    conductance = volume * laws.conductivity(law, like)
     fields = w.points.fields
     field(fields, Temperature)[0, p] = T
     field(fields, Capacity)[0, p] = capacity
@@ -249,8 +242,8 @@ def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
     hidden = real(4 * dimension(w.kin), dt) * (rate * w.grid.inv_h * w.grid.inv_h) * dt
     change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
     T = choose(some, fma(field(fields, Share)[0, p], change, T), T)
-    store(w.points.state, p, with_temperature(law, w.kin, state, T))
+    store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
     # By what factor conduction has become faster than in the undeformed body.
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    faster = jacobian(law, w.kin, state) * inverse_stretch_squared(w.frame, w.kin, f, dt)
+    faster = laws.jacobian(law, w.kin, state) * inverse_stretch_squared(w.frame, w.kin, f, dt)
     return real(0, dt) * T, max(fastest, faster)

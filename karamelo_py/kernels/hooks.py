@@ -31,19 +31,7 @@ from numba import types
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.formula import call_evaluate
 from karamelo_py.compiler.loops import subkernel
-from karamelo_py.kernels.arrays import (
-    FINAL_INTEGRATE,
-    INITIAL_INTEGRATE,
-    POST_ADVANCE_PARTICLES,
-    POST_GRID_TO_POINT,
-    POST_HEAT_TO_GRID,
-    POST_PARTICLES_TO_GRID,
-    POST_UPDATE_GRID_HEAT,
-    POST_UPDATE_GRID_STATE,
-    POST_VELOCITIES_TO_GRID,
-    SUPPLY_HEAT,
-    TIME,
-)
+from karamelo_py.kernels import arrays
 from karamelo_py.kernels.totals import WORK, carry, publish
 from karamelo_py.kernels.walls import FRICTION
 
@@ -58,20 +46,20 @@ FUNCTIONS = {"nodes": NODE_FUNCTION, "points": POINT_FUNCTION, "heated points": 
 
 
 NODE_STAGES = {
-    "post_particles_to_grid": POST_PARTICLES_TO_GRID,
-    "post_update_grid_state": POST_UPDATE_GRID_STATE,
-    "post_velocities_to_grid": POST_VELOCITIES_TO_GRID,
+    "post_particles_to_grid": arrays.POST_PARTICLES_TO_GRID,
+    "post_update_grid_state": arrays.POST_UPDATE_GRID_STATE,
+    "post_velocities_to_grid": arrays.POST_VELOCITIES_TO_GRID,
 }
 POINT_STAGES = {
-    "initial_integrate": INITIAL_INTEGRATE,
-    "post_grid_to_point": POST_GRID_TO_POINT,
-    "post_advance_particles": POST_ADVANCE_PARTICLES,
-    "final_integrate": FINAL_INTEGRATE,
+    "initial_integrate": arrays.INITIAL_INTEGRATE,
+    "post_grid_to_point": arrays.POST_GRID_TO_POINT,
+    "post_advance_particles": arrays.POST_ADVANCE_PARTICLES,
+    "final_integrate": arrays.FINAL_INTEGRATE,
 }
 HEAT_STAGES = {
-    "post_heat_to_grid": POST_HEAT_TO_GRID,
-    "supply_heat": SUPPLY_HEAT,
-    "post_update_grid_heat": POST_UPDATE_GRID_HEAT,
+    "post_heat_to_grid": arrays.POST_HEAT_TO_GRID,
+    "supply_heat": arrays.SUPPLY_HEAT,
+    "post_update_grid_heat": arrays.POST_UPDATE_GRID_HEAT,
 }
 STAGES = NODE_STAGES | POINT_STAGES | HEAT_STAGES
 
@@ -149,8 +137,8 @@ def evaluate(hooks, h, component, count, control, result, shift):
 
     The results go to the row `result` of the scratch.
     """
-    time = control.values[TIME]
-    control.values[TIME] = time + shift
+    time = control.values[arrays.TIME]
+    control.values[arrays.TIME] = time + shift
     program = hooks.programs[h, component]
     call_evaluate(
         hooks.evaluate,
@@ -165,7 +153,7 @@ def evaluate(hooks, h, component, count, control, result, shift):
         count,
         result,
     )
-    control.values[TIME] = time
+    control.values[arrays.TIME] = time
 
 
 @subkernel

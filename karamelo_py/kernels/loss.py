@@ -20,16 +20,8 @@ Beside the time integration, what is left is that moments are mapped a little di
 move (not with splines), and that usl strains by dv, which may only cost.
 """
 
+from karamelo_py.compiler import fields
 from karamelo_py.compiler.compile import accumulate, choose, looping, real, round_off, shared
-from karamelo_py.compiler.fields import (
-    StepField,
-    SummedField,
-    field,
-    load,
-    load_vector,
-    store,
-    triple,
-)
 from karamelo_py.compiler.tuples import add_scaled, row, scale, subtract
 from karamelo_py.kernels.arrays import MASS, of_change, of_momentum
 from karamelo_py.kernels.visit import law_of, state_of
@@ -56,16 +48,16 @@ from karamelo_py.points.transfers.xpic import Reflected, Series
 ALONE = 0.6
 
 
-class Lost(SummedField):
+class Lost(fields.SummedField):
     """Kinetic energy that points bring to a node; what it did not keep, per mass; and its mass.
 
     A fused step brings the energy and mass of the next step while points take back the loss.
     """
 
-    shape = triple
+    shape = fields.triple
 
 
-class Rubbed(StepField):
+class Rubbed(fields.StepField):
     """Heat of friction at a node, per mass: of contact between solids and of walls."""
 
 
@@ -87,7 +79,7 @@ def warm_by_friction(rubbed, w, stencil, p, like):
         warms = capacity > 0
         rise = choose(warms, heat, like - like) / choose(warms, capacity, real(1, like))
         T = temperature(law, w.kin, state) + rise
-        store(w.points.state, p, with_temperature(law, w.kin, state, T))
+        fields.store(w.points.state, p, with_temperature(law, w.kin, state, T))
 
 
 @looping
@@ -142,7 +134,7 @@ def warm(w, stencil, p, v):
 
     `v` is the velocity of the nodes at the point, before the update.
     """
-    lost, reflected = field(w.nodes.fields, Lost), field(w.points.fields, Reflected)
+    lost, reflected = fields.field(w.nodes.fields, Lost), fields.field(w.points.fields, Reflected)
     if lost is not None:
         moment = _moment_before(w, stencil, v, zero_moment(w.transfer, w.kin, v[0]))
         moment = in_company(w, stencil, p, moment)
@@ -161,7 +153,7 @@ def in_company(w, stencil, p, moment):
     its own pressure, and its volume grow without bounds, whatever the room around it. The energy of
     what it does not keep heats it.
     """
-    lost = field(w.nodes.fields, Lost)
+    lost = fields.field(w.nodes.fields, Lost)
     if lost is None or len(moment) == 0:
         return moment
     mass = w.points.mass[p]
@@ -185,7 +177,7 @@ def _heat(w, p, gone):
     """Give point `p` the energy per mass that is gone."""
     law = law_of(w, p)
     state = state_of(w, law, p, gone)
-    store(w.points.state, p, warmed(law, w.kin, state, gone / specific_volume(law)))
+    fields.store(w.points.state, p, warmed(law, w.kin, state, gone / specific_volume(law)))
 
 
 @shared
@@ -195,17 +187,17 @@ def reflect(reflected, w, stencil, p, term, k):
     And add up the energy that this loses (see the head of the module).
     """
     if reflected is not None:
-        v = load_vector(w.kin, w.points.v, p)
+        v = fields.load_vector(w.kin, w.points.v, p)
         like = v[0]
         none, half, one = real(0, like), real(0.5, like), real(1, like)
-        before = load(reflected, p, (like, *v))
+        before = fields.load(reflected, p, (like, *v))
         order = w.transfer.order
         rest = subtract(choose(k == 0, v, before[1:]), term)
         gone = choose(k == 0, none, before[0])
         gone += choose(2 * k >= order - 1, one, none) * _spread(w, stencil, term)
         gone += choose(2 * k >= order, half, none) * squared(term)
         gone += choose((order + 1) // 2 == k + 1, half, none) * squared(rest)
-        store(reflected, p, (gone, *rest))
+        fields.store(reflected, p, (gone, *rest))
 
 
 @looping
@@ -213,7 +205,7 @@ def gathered_term(w, stencil, term):
     """The present term of XPIC's series at a point."""
     for k in range(support(w.basis, w.kin)):
         i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-        term = add_scaled(term, weight, row(field(w.nodes.fields, Series), i, 0, term))
+        term = add_scaled(term, weight, row(fields.field(w.nodes.fields, Series), i, 0, term))
     return term
 
 
@@ -223,7 +215,7 @@ def _spread(w, stencil, term):
     spread = term[0] - term[0]
     for k in range(support(w.basis, w.kin)):
         i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-        apart = subtract(row(field(w.nodes.fields, Series), i, 0, term), term)
+        apart = subtract(row(fields.field(w.nodes.fields, Series), i, 0, term), term)
         spread += weight * squared(apart)
     return spread
 

@@ -9,21 +9,7 @@ from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import (
-    BEFORE,
-    MASS,
-    ON_SUMS,
-    ON_UPDATE,
-    ON_VELOCITY,
-    POST_UPDATE_GRID_STATE,
-    POST_VELOCITIES_TO_GRID,
-    TIME,
-    VALUE,
-    Nodes,
-    of_change,
-    of_force,
-    of_momentum,
-)
+from karamelo_py.kernels import arrays, totals
 from karamelo_py.kernels.hooks import (
     NODE_FUNCTION,
     NONE,
@@ -35,15 +21,6 @@ from karamelo_py.kernels.hooks import (
 )
 from karamelo_py.kernels.loss import Rubbed
 from karamelo_py.kernels.searching import first_from
-from karamelo_py.kernels.totals import (
-    WORK,
-    add_many,
-    add_to,
-    carry,
-    counts,
-    hand_over,
-    number_of_all,
-)
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension, planar
@@ -88,8 +65,8 @@ def _taken_over(hooks, control, h, n, c, force):
         held = hooks.held[n, c]
         if held.slot > 0:
             before = held.force
-            if counts(control.ranks, n):
-                add_to(control.totals, held.slot - 1, -before)
+            if totals.counts(control.ranks, n):
+                totals.add_to(control.totals, held.slot - 1, -before)
         held.slot = 1 + hooks.table[h].slot + c
         held.force = before + force
     return before
@@ -98,30 +75,32 @@ def _taken_over(hooks, control, h, n, c, force):
 @subkernel
 def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, share):
     """Act on the chosen nodes; add to the totals, and to the work that is done."""
-    step_back = min(control.clock[0].last_dt, control.values[TIME])  # nothing was before time 0
+    step_back = min(
+        control.clock[0].last_dt, control.values[arrays.TIME]
+    )  # nothing was before time 0
     slot = hooks.table[h].slot
     stage = hooks.table[h].stage
-    remaps = target == ON_VELOCITY and stage == POST_VELOCITIES_TO_GRID
+    remaps = target == arrays.ON_VELOCITY and stage == arrays.POST_VELOCITIES_TO_GRID
     # What is strained by before the forces belongs to the last step, and to what held it then.
-    strains_first = target == ON_VELOCITY and stage == POST_UPDATE_GRID_STATE
+    strains_first = target == arrays.ON_VELOCITY and stage == arrays.POST_UPDATE_GRID_STATE
     strains_first = strains_first and hooks.table[h].holds > 0
-    given = BEFORE if strains_first and hooks.table[h].uses_before else VALUE
+    given = arrays.BEFORE if strains_first and hooks.table[h].uses_before else arrays.VALUE
     for c in range(directions(hooks)):
         if hooks.programs[h, c].begin < 0:
             continue
-        evaluate(hooks, h, c, count, control, np.int64(VALUE), 0.0)
+        evaluate(hooks, h, c, count, control, np.int64(arrays.VALUE), 0.0)
         if hooks.table[h].uses_before:
-            evaluate(hooks, h, c, count, control, np.int64(BEFORE), -step_back)
+            evaluate(hooks, h, c, count, control, np.int64(arrays.BEFORE), -step_back)
         for q in range(count):
             n = hooks.chosen[q]
             work = before = 0.0
-            mass = nodes.sums[n, MASS]
-            if target == ON_SUMS:
-                v = nodes.sums[n, of_momentum(kin) + c] / mass
+            mass = nodes.sums[n, arrays.MASS]
+            if target == arrays.ON_SUMS:
+                v = nodes.sums[n, arrays.of_momentum(kin) + c] / mass
                 star = v
-            elif target == ON_UPDATE:
+            elif target == arrays.ON_UPDATE:
                 star = nodes.update[n, c]
-                v = star - nodes.update[n, of_change(kin) + c]
+                v = star - nodes.update[n, arrays.of_change(kin) + c]
             else:
                 v = nodes.velocity[n, c]
                 star = v
@@ -129,7 +108,7 @@ def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, shar
                 if remaps or (strains_first and last == hooks.scratch[given, q]):
                     star = last
             old, old_star = v, star
-            old_force = nodes.sums[n, of_force(kin) + c]
+            old_force = nodes.sums[n, arrays.of_force(kin) + c]
             v, star, force, total = _call_node_function(
                 hooks.table[h].address,
                 mass,
@@ -137,51 +116,53 @@ def _apply_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count, shar
                 star,
                 old_force,
                 hooks.scratch[given, q],
-                hooks.scratch[BEFORE, q],
+                hooks.scratch[arrays.BEFORE, q],
                 dt,
                 share,
             )
-            if target == ON_UPDATE:
+            if target == arrays.ON_UPDATE:
                 # Points that keep their velocity take the change v* - v: another v is an impulse.
                 total += kept * mass * (old - v) / dt
-                if star == hooks.scratch[VALUE, q]:
+                if star == hooks.scratch[arrays.VALUE, q]:
                     before = _taken_over(hooks, control, h, n, c, total)
-            if target == ON_SUMS:
+            if target == arrays.ON_SUMS:
                 hooks.loads[n, c] += force - old_force  # see _work_of_loads
-                nodes.sums[n, of_force(kin) + c] = force
-            elif target == ON_UPDATE:
+                nodes.sums[n, arrays.of_force(kin) + c] = force
+            elif target == arrays.ON_UPDATE:
                 # Impulse times the mean of the velocities before and after it.
                 work = 0.5 * mass * (star - old_star + kept * (old - v)) * (v + star)
                 clock = control.clock[0]
                 clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
                 nodes.update[n, c] = star
-                nodes.update[n, of_change(kin) + c] = star - v
+                nodes.update[n, arrays.of_change(kin) + c] = star - v
             else:
                 nodes.velocity[n, c] = star if strains_first else v
             # Formulas have been taken: their rows hold what is to be added up.
-            own = counts(control.ranks, n)
-            hooks.scratch[VALUE, q] = total if own else 0.0
-            hooks.scratch[BEFORE, q] = work if own else 0.0
+            own = totals.counts(control.ranks, n)
+            hooks.scratch[arrays.VALUE, q] = total if own else 0.0
+            hooks.scratch[arrays.BEFORE, q] = work if own else 0.0
             if own and before != 0:
-                add_to(control.totals, slot + c, before)
-        add_many(control.totals, WORK, hooks.scratch[BEFORE], count)
+                totals.add_to(control.totals, slot + c, before)
+        totals.add_many(control.totals, totals.WORK, hooks.scratch[arrays.BEFORE], count)
         if slot >= 0:
-            add_many(control.totals, slot + c, hooks.scratch[VALUE], count)
+            totals.add_many(control.totals, slot + c, hooks.scratch[arrays.VALUE], count)
 
 
 @subkernel
 def _rub_at_nodes(target, kin, nodes, hooks, control, dt, kept, h, count):
     """Friction of the chosen nodes along their wall."""
     programs = hooks.programs[h]
-    if target == ON_VELOCITY:
-        if hooks.table[h].stage == POST_VELOCITIES_TO_GRID:  # else v* is that of the step before
+    if target == arrays.ON_VELOCITY:
+        if (
+            hooks.table[h].stage == arrays.POST_VELOCITIES_TO_GRID
+        ):  # else v* is that of the step before
             for q in range(count):
                 stick(kin, nodes, programs, hooks.chosen[q])
         return
-    evaluate(hooks, h, FRICTION, count, control, np.int64(VALUE), 0.0)
+    evaluate(hooks, h, FRICTION, count, control, np.int64(arrays.VALUE), 0.0)
     slot = hooks.table[h].slot
     for q in range(count):
-        n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
+        n, mu = hooks.chosen[q], hooks.scratch[arrays.VALUE, q]
         rub(kin, nodes, programs, hooks.held, n, mu, dt, kept, control, slot)
 
 
@@ -210,7 +191,7 @@ def _choose_nodes(nodes, ranges, hooks, h, row, end, member):
         n = _node(hooks, h, member)
         while n < high:
             member += 1
-            if nodes.sums[n, MASS] > 0:
+            if nodes.sums[n, arrays.MASS] > 0:
                 hooks.chosen[count] = n
                 count += 1
                 if count == BLOCK:
@@ -234,7 +215,7 @@ def _go_through(
             count, row, member = _choose_nodes(nodes, ranges, hooks, h, row, ranges[k, 1], member)
             if task == COUNT:
                 for q in range(count):
-                    heavy += counts(control.ranks, hooks.chosen[q])
+                    heavy += totals.counts(control.ranks, hooks.chosen[q])
             elif count > 0:
                 _do_at_nodes(
                     task, target, kin, grids, nodes, hooks, control, dt, kept, h, count, share
@@ -263,15 +244,15 @@ def _work_at_nodes(kin, nodes, ranges, hooks, control, dt, k):
                 if load == 0:
                     continue
                 hooks.loads[n, c] = 0
-                if not counts(control.ranks, n):
+                if not totals.counts(control.ranks, n):
                     continue
-                change = nodes.update[n, of_change(kin) + c]
-                hooks.scratch[VALUE, count] = dt * load * (nodes.update[n, c] - 0.5 * change)
+                change = nodes.update[n, arrays.of_change(kin) + c]
+                hooks.scratch[arrays.VALUE, count] = dt * load * (nodes.update[n, c] - 0.5 * change)
                 count += 1
                 if count == BLOCK:
-                    add_many(control.totals, WORK, hooks.scratch[VALUE], count)
+                    totals.add_many(control.totals, totals.WORK, hooks.scratch[arrays.VALUE], count)
                     count = 0
-    add_many(control.totals, WORK, hooks.scratch[VALUE], count)
+    totals.add_many(control.totals, totals.WORK, hooks.scratch[arrays.VALUE], count)
 
 
 # --- threads ----------------------------------------------------------------------------------
@@ -294,11 +275,11 @@ def _go_through_part(
     _go_through(
         task, target, kin, grids, nodes, ranges, here, mine, dt, kept, h, share, first, end
     )  # fmt: skip
-    hand_over(own.totals, control.totals, WORK)
+    totals.hand_over(own.totals, control.totals, totals.WORK)
     for other in range(len(hooks.table)):
         slot = hooks.table[other].slot
         for row in range(max(slot, 0), min(slot + 3, own.totals.shape[0]) if slot >= 0 else 0):
-            hand_over(own.totals, control.totals, row)
+            totals.hand_over(own.totals, control.totals, row)
 
 
 _go_through_parts = shared_out(
@@ -330,7 +311,7 @@ def _go_through_threaded(
     _go_through_parts(
         mode, parts, task, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share
     )
-    if target == ON_UPDATE:
+    if target == arrays.ON_UPDATE:
         clock = control.clock[0]
         for k in range(parts):
             clock.set_low = min(clock.set_low, hooks.apart.clock[k, 0].set_low)
@@ -347,16 +328,28 @@ def _work_of_loads(kin, grids, nodes, ranges, hooks, control, dt):
     if hooks.loads.size == 0:
         return
     go_through(
-        hooks.mode, LOADS, ON_SUMS, kin, grids, nodes, ranges, hooks, control, dt, 0.0, NONE, 1.0
+        hooks.mode,
+        LOADS,
+        arrays.ON_SUMS,
+        kin,
+        grids,
+        nodes,
+        ranges,
+        hooks,
+        control,
+        dt,
+        0.0,
+        NONE,
+        1.0,
     )
-    carry(control.totals[WORK])
+    totals.carry(control.totals[totals.WORK])
 
 
 @shared
 def _rubbed_alone(nodes):
     """The nodes with that of their declared fields which walls know."""
     fields = tuple([one for one in nodes.fields if type(one) is Rubbed])
-    return Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
+    return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
 
 
 @shared
@@ -378,7 +371,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, ke
     if stage == DONE:
         _work_of_loads(kin, grids, nodes, ranges, hooks, control, dt)
         return
-    if target == ON_UPDATE:
+    if target == arrays.ON_UPDATE:
         _clear_held(kin, ranges, hooks.held)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
@@ -390,7 +383,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, ke
                 COUNT, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share,
                 NONE, ranges[0, 0],
             )  # fmt: skip
-            share = 1.0 / max(number_of_all(control.ranks, control, heavy), 1)
+            share = 1.0 / max(totals.number_of_all(control.ranks, control, heavy), 1)
         go_through(
             hooks.mode, ACT, target, kin, grids, nodes, ranges, hooks, control, dt, kept, h, share
         )

@@ -11,17 +11,10 @@ from numba import types
 
 from karamelo_py.compiler.addresses import caller_of
 from karamelo_py.compiler.loops import entered
+from karamelo_py.kernels import totals
 from karamelo_py.kernels.passes import sweep_all, sweep_blocks
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sweep_points, sweep_shares
-from karamelo_py.kernels.totals import (
-    agree_on_heat,
-    agree_on_reports,
-    collect,
-    counts,
-    number_of_all,
-    take_over,
-)
 
 CALL = types.int64(types.int64, types.int64, types.int64)
 SWEEP, NEXT, GIVE, TAKE, TOTALS, LARGEST, NUMBER = range(7)
@@ -55,17 +48,17 @@ def _ask(address, what, a, b):
     return _call(address, what, a, b)
 
 
-@collect.on(Linked)
+@totals.collect.on(Linked)
 def _collect_linked(ranks, control, first, count):
     _ask(ranks.address, TOTALS, first, count)
 
 
-@counts.on(Linked)
+@totals.counts.on(Linked)
 def _counts_linked(ranks, n):
     return ranks.foreign[n] == 0
 
 
-@number_of_all.on(Linked)
+@totals.number_of_all.on(Linked)
 def _number_of_all_linked(ranks, control, number):
     return _ask(ranks.address, NUMBER, number, 0)
 
@@ -80,7 +73,7 @@ def _agree_on_reports(address, control):
     clock.wrong = int(answer[3])
 
 
-@agree_on_reports.on(Linked)
+@totals.agree_on_reports.on(Linked)
 def _agree_on_reports_linked(ranks, control):
     _agree_on_reports(ranks.address, control)
 
@@ -99,7 +92,7 @@ def _agree_on_heat(address, control):
     clock.set_high, clock.rise, clock.own_heat = answer[6], answer[7], answer[8]
 
 
-@agree_on_heat.on(Linked)
+@totals.agree_on_heat.on(Linked)
 def _agree_on_heat_linked(ranks, control):
     _agree_on_heat(ranks.address, control)
 
@@ -110,7 +103,7 @@ def _ask_if(due, address, what, a, b):
         _call(address, what, a, b)
 
 
-@take_over.on(Linked)
+@totals.take_over.on(Linked)
 def _take_over_linked(ranks, due):
     _ask_if(due, ranks.address, TAKE, 0, 0)
 

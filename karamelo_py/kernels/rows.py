@@ -7,20 +7,7 @@ from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import clear_first
-from karamelo_py.kernels import table
-from karamelo_py.kernels.arrays import (
-    DT,
-    MASS,
-    ON_SUMS,
-    ON_UPDATE,
-    POST_ADVANCE_PARTICLES,
-    POST_GRID_TO_POINT,
-    POST_PARTICLES_TO_GRID,
-    POST_UPDATE_GRID_STATE,
-    of_change,
-    of_force,
-    of_momentum,
-)
+from karamelo_py.kernels import arrays, p2g, table
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.g2p import AverageStress, Move, SeriesTerm
@@ -37,15 +24,6 @@ from karamelo_py.kernels.nodes import (
     TakeMeanStress,
     Update,
     UpdateToVelocity,
-)
-from karamelo_py.kernels.p2g import (
-    AveragedForce,
-    InternalForce,
-    MassMomentum,
-    MomentumAgain,
-    Normal,
-    SeriesBack,
-    Volumes,
 )
 from karamelo_py.kernels.passes import visit_here
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
@@ -81,13 +59,13 @@ def _clear_radial(kin, nodes, grids):
         if abs(grids.x0[g]) > grids.slack[g] * grids.h[g]:
             continue
         for n in range(grids.first[g], grids.first[g] + grids.step_x[g]):
-            if nodes.sums[n, MASS] > 0:
-                nodes.sums[n, of_momentum(kin)] = 0
-                nodes.sums[n, of_force(kin)] = 0
+            if nodes.sums[n, arrays.MASS] > 0:
+                nodes.sums[n, arrays.of_momentum(kin)] = 0
+                nodes.sums[n, arrays.of_force(kin)] = 0
                 nodes.update[n, 0] = 0
-                nodes.update[n, of_change(kin)] = 0
+                nodes.update[n, arrays.of_change(kin)] = 0
                 nodes.velocity[n, 0] = 0
-                clear_first(field(nodes.fields, Normal), n)
+                clear_first(field(nodes.fields, p2g.Normal), n)
 
 
 @point_function(otherwise=True)
@@ -113,7 +91,7 @@ def _sum_series_xpic(transfer, s, mode):
     dt = step_size(s)
     sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.ranges, dt)
     for k in range(transfer.order - 1):
-        visit = Visit((SeriesTerm(k),), (SeriesBack(),), OldWeights())
+        visit = Visit((SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
         visit_here(s, mode, visit, dt, True, True)
         sweep_nodes(mode, ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
     hold_axis(s.kin, s)
@@ -129,7 +107,7 @@ def average_volumes(averaging, s, mode, dt, trial):
 
 @average_volumes.on(FBar)
 def _average_volumes_f_bar(averaging, s, mode, dt, trial):
-    visit_here(s, mode, Visit((trial,), (Volumes(),), OldWeights()), dt, True, True)
+    visit_here(s, mode, Visit((trial,), (p2g.Volumes(),), OldWeights()), dt, True, True)
     sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.ranges, dt)
 
 
@@ -142,7 +120,9 @@ def average_stress(averaging, s, mode):
 def _average_stress_f_bar(averaging, s, mode):
     dt = step_size(s)
     sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
-    visit_here(s, mode, Visit((AverageStress(),), (AveragedForce(),), OldWeights()), dt, True, True)
+    visit_here(
+        s, mode, Visit((AverageStress(),), (p2g.AveragedForce(),), OldWeights()), dt, True, True
+    )
 
 
 @shared
@@ -162,9 +142,9 @@ def light_node(s):
     points' velocities, and the strain of the node would run ahead of its stress.
     """
     clock = s.control.clock[0]
-    courant = clock.rate * s.control.values[DT] / clock.spacing
+    courant = clock.rate * s.control.values[arrays.DT] / clock.spacing
     masses = min(dimension(s.kin) * courant * courant, 1.0)
-    return UpdateToVelocity(real(masses, s.nodes.sums[0, MASS]))
+    return UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
 
 
 light_node.goes_through = UpdateToVelocity.goes_through
@@ -216,32 +196,32 @@ SERIES = _call(
     lambda s: "series of XPIC" if isinstance(s.transfer, XPIC) else None,
 )
 
-SUMS = table.Scatter((MassMomentum(), InternalForce()))
-MASS_AND_MOMENTUM = table.Scatter((MassMomentum(),))
+SUMS = table.Scatter((p2g.MassMomentum(), p2g.InternalForce()))
+MASS_AND_MOMENTUM = table.Scatter((p2g.MassMomentum(),))
 # For schemes that strain first.
 VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.Nodes(SumsToVelocity()))
-FORCE = table.Scatter((InternalForce(),), OldWeights())
+FORCE = table.Scatter((p2g.InternalForce(),), OldWeights())
 # v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
 ACCELERATE = (
     LOSS,
     AVERAGED,
     HEAT,
-    table.AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS),
+    table.AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
     AXIS,
     table.Nodes(Update()),
-    table.AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE),
+    table.AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
     CONTACT,
     WORK_OF_LOADS,
 )
 MOVE = (
     table.Gather(Move()),
-    table.AtPoints(POST_GRID_TO_POINT, 1),
-    table.AtPoints(POST_ADVANCE_PARTICLES, 1),
+    table.AtPoints(arrays.POST_GRID_TO_POINT, 1),
+    table.AtPoints(arrays.POST_ADVANCE_PARTICLES, 1),
     table.Check(),
 )
 # The velocity of the moved points, at the nodes once more.
 MOMENTUM_AGAIN = (
-    table.Scatter((MomentumAgain(),), OldWeights()),
+    table.Scatter((p2g.MomentumAgain(),), OldWeights()),
     table.Nodes(MomentumToVelocity()),
     AXIS,
 )

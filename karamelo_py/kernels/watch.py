@@ -17,9 +17,9 @@ from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws
 from karamelo_py.kernels.searching import first_from
-from karamelo_py.kernels.totals import KINETIC, STORED, WORK, add_to, agree_on_heat, collect
 from karamelo_py.kernels.width import lanes_of_law, points_from, width_of
 from karamelo_py.points.kinematics import dimension, free_from
 from karamelo_py.points.laws import (
@@ -116,8 +116,8 @@ _look_at_shares = shared_out(_look_at_share, "kin, points, laws, tiling, firsts"
 def _sum_energies(mode, kin, points, laws, tiling, control):
     _look_at_shares(mode, tiling.count[1], kin, points, laws, tiling, control.firsts)
     for t in range(tiling.count[0]):
-        add_to(control.totals, KINETIC, tiling.report[t, ENERGIES])
-        add_to(control.totals, STORED, tiling.report[t, ENERGIES + 1])
+        totals.add_to(control.totals, totals.KINETIC, tiling.report[t, ENERGIES])
+        totals.add_to(control.totals, totals.STORED, tiling.report[t, ENERGIES + 1])
 
 
 @over_blocks
@@ -128,16 +128,16 @@ def _sum_blocks(block, s, mode):
 
 @entered
 def _clear(control):
-    control.totals[KINETIC] = 0
-    control.totals[STORED] = 0
+    control.totals[totals.KINETIC] = 0
+    control.totals[totals.STORED] = 0
 
 
 @entered
 def _take_sums(control):
     clock, answer = control.clock[0], control.answer
-    clock.kinetic = answer[KINETIC]
-    clock.stored = answer[STORED] + clock.born_with
-    clock.work = answer[WORK]
+    clock.kinetic = answer[totals.KINETIC]
+    clock.stored = answer[totals.STORED] + clock.born_with
+    clock.work = answer[totals.WORK]
 
 
 @shared
@@ -145,7 +145,7 @@ def sum_energies(s, mode):
     """Energies of all points, kinetic and stored plus dissipated, and the work into the clock."""
     _clear(s.control)
     _sum_blocks(s, mode)
-    collect(s.control.ranks, s.control, KINETIC, 3)
+    totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
     _take_sums(s.control)
 
 
@@ -182,7 +182,7 @@ def _behind(firsts, solid):
 def _add_momentum(control, solid, d):
     row = control.values.size + solid * (1 + d)
     for k in range(1 + d):
-        add_to(control.totals, row + k, control.answer[k])
+        totals.add_to(control.totals, row + k, control.answer[k])
         control.answer[k] = 0
 
 
@@ -214,7 +214,7 @@ def _sum_drift(s):
     _clear_momenta(s.control)
     _add_blocks(s)
     own = s.control.values.size
-    collect(s.control.ranks, s.control, own, s.control.totals.shape[0] - own)
+    totals.collect(s.control.ranks, s.control, own, s.control.totals.shape[0] - own)
     _take_drift(s.kin, s.control)
 
 
@@ -320,7 +320,7 @@ def look_at_heat(s):
     if clock.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
         return True
     measure_heat(s)
-    agree_on_heat(s.control.ranks, s.control)
+    totals.agree_on_heat(s.control.ranks, s.control)
     largest = max(abs(clock.coldest), abs(clock.hottest))
     room = OVERSHOOT * (clock.hottest - clock.coldest + clock.own_heat) + HEAT_NOISE * largest
     above = clock.hottest + clock.own_heat + room

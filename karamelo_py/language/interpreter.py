@@ -14,21 +14,12 @@ from karamelo_py.language.meanings import Meanings
 from karamelo_py.language.presets import Presets
 from karamelo_py.language.replay import Record, Replay, spelled
 from karamelo_py.language.unknown import check_name, unknown_call, unknown_statement
+from karamelo_py.script import syntax
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
 from karamelo_py.script.expressions import Value
 from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.parser import parse, parse_expression
 from karamelo_py.script.reading import read_script
-from karamelo_py.script.syntax import (
-    Assignment,
-    Binary,
-    Call,
-    Evaluation,
-    Name,
-    Node,
-    Raw,
-    Statement,
-)
 
 
 @runtime_checkable
@@ -45,7 +36,7 @@ class Rehearsed(Protocol):
 class _Frame:
     """A script in progress: its statements and which comes next."""
 
-    statements: list[Statement]
+    statements: list[syntax.Statement]
     path: Path | None
     next: int = 0
 
@@ -80,7 +71,7 @@ class Interpreter(Meanings):
         hub.interpreter = self
         self.files: list[Path] = []
         self.frames: list[_Frame] = []
-        self.statement: Statement | None = None  # the last that was begun
+        self.statement: syntax.Statement | None = None  # the last that was begun
         self.record = Record()
         self.replay: Replay | None = None
         self.presets = Presets(self, presets or {})
@@ -103,7 +94,7 @@ class Interpreter(Meanings):
         """Run a script that is in memory."""
         self._run(self._parsed(text, name), None)
 
-    def _parsed(self, text: str, name: str) -> list[Statement]:
+    def _parsed(self, text: str, name: str) -> list[syntax.Statement]:
         try:
             return parse(text, name)
         except ScriptError as error:
@@ -192,7 +183,7 @@ class Interpreter(Meanings):
     def _working_folder(self) -> Path:
         return getattr(self.hub, "folder", None) or Path.cwd()
 
-    def _run(self, statements: list[Statement], path: Path | None) -> None:
+    def _run(self, statements: list[syntax.Statement], path: Path | None) -> None:
         self.frames.append(_Frame(statements, path))
         try:
             self.presets.refuse_unused(statements)
@@ -237,7 +228,7 @@ class Interpreter(Meanings):
                     frame.next -= 1
                 raise
 
-    def next_statement(self) -> Statement | None:
+    def next_statement(self) -> syntax.Statement | None:
         """The statement that comes next, in whichever file; it counts as carried out."""
         while self.frames:
             frame = self.frames[-1]
@@ -247,7 +238,7 @@ class Interpreter(Meanings):
             self.frames.pop()
         return None
 
-    def execute(self, statement: Statement) -> None:
+    def execute(self, statement: syntax.Statement) -> None:
         """Carry out one statement; errors know its place, and which scripts include it."""
         self.statement = statement
         self.hub.place = statement.place
@@ -271,8 +262,8 @@ class Interpreter(Meanings):
                 "this is nested too deeply", place=statement.place, hint="use more names"
             ) from None
 
-    def _execute_recorded(self, statement: Statement) -> None:
-        if isinstance(statement, Call) and registry.knows("command", statement.name):
+    def _execute_recorded(self, statement: syntax.Statement) -> None:
+        if isinstance(statement, syntax.Call) and registry.knows("command", statement.name):
             command = registry.find("command", statement.name)
             if getattr(command, "may_differ", False):
                 self._execute(statement)
@@ -294,19 +285,23 @@ class Interpreter(Meanings):
         frames = self.frames[:depth]
         return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
 
-    def _execute(self, statement: Statement) -> None:
-        if isinstance(statement, Assignment):
+    def _execute(self, statement: syntax.Statement) -> None:
+        if isinstance(statement, syntax.Assignment):
             self._assign(statement)
-        elif isinstance(statement, Call):
+        elif isinstance(statement, syntax.Call):
             self._call(statement)
         else:
-            assert isinstance(statement, Evaluation)
+            assert isinstance(statement, syntax.Evaluation)
             node = statement.node
-            if isinstance(node, Name) and node.name == "quit":
+            if isinstance(node, syntax.Name) and node.name == "quit":
                 raise Quit
-            if isinstance(node, Name) and not self.means_something(node.name):
+            if isinstance(node, syntax.Name) and not self.means_something(node.name):
                 raise unknown_statement(self, node.name)
-            if isinstance(node, Binary) and node.operator == "==" and isinstance(node.left, Name):
+            if (
+                isinstance(node, syntax.Binary)
+                and node.operator == "=="
+                and isinstance(node.left, syntax.Name)
+            ):
                 right = statement.raw.code[node.right.start : node.right.end]
                 raise ScriptError(
                     "this compares and does nothing with the result",
@@ -317,7 +312,7 @@ class Interpreter(Meanings):
 
     # -- assignments ------------------------------------------------------------------------------
 
-    def _assign(self, statement: Assignment) -> None:
+    def _assign(self, statement: syntax.Assignment) -> None:
         name = statement.name
         check_name(name)
         if name in self.presets:
@@ -338,7 +333,7 @@ class Interpreter(Meanings):
         self.variables[name] = self._right_hand_side(statement.node, statement.right)
         self.presets.follow(statement)
 
-    def _right_hand_side(self, node: Node, raw: Raw) -> Value:
+    def _right_hand_side(self, node: syntax.Node, raw: syntax.Raw) -> Value:
         try:
             return self.evaluate(node, raw)
         except ScriptError as error:
@@ -354,7 +349,7 @@ class Interpreter(Meanings):
 
     # -- calls ------------------------------------------------------------------------------------
 
-    def _call(self, statement: Call) -> None:
+    def _call(self, statement: syntax.Call) -> None:
         name = statement.name
         if self.hides(name):
             raise unknown_call(self, name, statement.place, statement=True)

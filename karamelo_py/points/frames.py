@@ -11,20 +11,7 @@ from karamelo_py.compiler.compile import point_function, real
 from karamelo_py.compiler.fields import Field, tensor
 from karamelo_py.compiler.powers import power
 from karamelo_py.compiler.tuples import add, add_scaled, leading, scale, subtract
-from karamelo_py.points.kinematics import (
-    add_symmetric_dot,
-    add_tensor_dot,
-    columns,
-    identity,
-    increment_of,
-    inverse,
-    largest_row_sum,
-    left_cauchy_green,
-    nominal,
-    planar,
-    symmetric_columns,
-    zero_tensor,
-)
+from karamelo_py.points import kinematics
 from karamelo_py.points.kinematics.components import Number, formula
 from karamelo_py.points.laws import deformation
 
@@ -43,7 +30,7 @@ class DeformationGradient(Field):
     @staticmethod
     def start(kin: Any) -> tuple[float, ...]:
         """The unit tensor."""
-        return identity(kin, 1.0)
+        return kinematics.identity(kin, 1.0)
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
@@ -78,7 +65,7 @@ def spatial_increment(frame, kin, dl, f):
 @spatial_increment.on(Total)
 def _spatial_increment_total(frame, kin, dl, f):
     # F + dt Fdot = (I + dt Fdot F^-1) F exactly
-    return increment_of(kin, dl, f)
+    return kinematics.increment_of(kin, dl, f)
 
 
 @point_function(otherwise=True)
@@ -86,7 +73,7 @@ def of_places_before(frame, kin, dl):
     """`dl` of the places before a motion, from that of the places after it."""
     # grad v there is grad v here (I - dl)^-1, so that F grows by (I - dl)^-1 exactly. As a product
     # it keeps its digits where dl is small.
-    return increment_of(kin, dl, subtract(identity(kin, dl[0]), dl))
+    return kinematics.increment_of(kin, dl, subtract(kinematics.identity(kin, dl[0]), dl))
 
 
 @of_places_before.on(Total)
@@ -113,29 +100,29 @@ def force_stress(frame, kin, tau, f):
 
 @force_stress.on(Total)
 def _force_stress_total(frame, kin, tau, f):
-    return nominal(kin, tau, f)
+    return kinematics.nominal(kin, tau, f)
 
 
 @point_function(otherwise=True)
 def add_force(frame, kin, total, stress, gradient):
     """total + stress . gradient of a basis function."""
-    return add_symmetric_dot(kin, total, stress, gradient)
+    return kinematics.add_symmetric_dot(kin, total, stress, gradient)
 
 
 @add_force.on(Total)
 def _add_force_total(frame, kin, total, stress, gradient):
-    return add_tensor_dot(kin, total, stress, gradient)
+    return kinematics.add_tensor_dot(kin, total, stress, gradient)
 
 
 @point_function(otherwise=True)
 def force_columns(frame, kin, stress):
     """The columns of a stress that makes nodal forces, vectors."""
-    return symmetric_columns(kin, stress)
+    return kinematics.symmetric_columns(kin, stress)
 
 
 @force_columns.on(Total)
 def _force_columns_total(frame, kin, stress):
-    return columns(kin, stress)
+    return kinematics.columns(kin, stress)
 
 
 @point_function(otherwise=True)
@@ -150,9 +137,11 @@ def pulled_back(frame, kin, g, f):
 
 @pulled_back.on(Total)
 def _pulled_back_total(frame, kin, g, f):
-    flat = planar(kin)
-    inside = inverse(flat, leading(f, zero_tensor(flat, g[0])))
-    return add_symmetric_dot(flat, subtract(g, g), left_cauchy_green(flat, inside), g)
+    flat = kinematics.planar(kin)
+    inside = kinematics.inverse(flat, leading(f, kinematics.zero_tensor(flat, g[0])))
+    return kinematics.add_symmetric_dot(
+        flat, subtract(g, g), kinematics.left_cauchy_green(flat, inside), g
+    )
 
 
 @point_function(otherwise=True)
@@ -160,7 +149,7 @@ def scaled_increment(frame, kin, dl, f, ratio):
     """`dl` changed such that the volume after it is `ratio` times what it would be."""
     # (I + dl) s - I
     s = power(ratio, stretched_share(kin, ratio))
-    return add_scaled(scale(s, dl), s - real(1, s), identity(kin, s))
+    return add_scaled(scale(s, dl), s - real(1, s), kinematics.identity(kin, s))
 
 
 @scaled_increment.on(Total)
@@ -185,4 +174,6 @@ def inverse_stretch_squared(frame, kin, f, like):
 @inverse_stretch_squared.on(Total)
 def _inverse_stretch_squared_total(frame, kin, f, like):
     # 1 / (smallest stretch)^2 is the largest eigenvalue of F^-1 F^-T.
-    return largest_row_sum(kin, left_cauchy_green(kin, inverse(kin, f)))
+    return kinematics.largest_row_sum(
+        kin, kinematics.left_cauchy_green(kin, kinematics.inverse(kin, f))
+    )

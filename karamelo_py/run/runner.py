@@ -14,15 +14,7 @@ from karamelo_py.run.advice.report import bytes_per_point, report
 from karamelo_py.run.advice.resting import warn_about_length
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.rollback import Marks
-from karamelo_py.run.diagnosis import explain
-from karamelo_py.run.diagnosis.energy import (
-    change_of_energy,
-    forget_growth,
-    grown_little,
-    growth,
-    not_watched,
-    unknown_work,
-)
+from karamelo_py.run.diagnosis import energy, explain
 from karamelo_py.run.lower.build import check_scene
 from karamelo_py.run.mpi.crew import heeding
 from karamelo_py.run.simulation import Simulation
@@ -259,7 +251,7 @@ class Runner:
             if self.condition is not None:
                 target = step + 1
             due = step != self.kept and (step % CHUNK == 0 or step == first_step + 1)
-            if due and not self._keeps_start(simulation) and grown_little(simulation):
+            if due and not self._keeps_start(simulation) and energy.grown_little(simulation):
                 self._keep(simulation)
             elif not self._keeps_start(simulation):  # whose rows are not gone back to
                 self.marks.note(always=self.condition is not None)
@@ -280,11 +272,11 @@ class Runner:
                     explain.stop(hub, simulation, status, good, self.place)
                 chunk = 1
                 continue
-            found = None if simulation.told_of_growth else growth(hub, simulation)
+            found = None if simulation.told_of_growth else energy.growth(hub, simulation)
             if found is not None:
                 if self.returns < RETURNS and self._try_half(simulation, found[0]):
                     self.returns += 1
-                    forget_growth(simulation)
+                    energy.forget_growth(simulation)
                     chunk = 1
                     continue
                 hub.warn(found[0], hint=found[1])
@@ -371,7 +363,7 @@ class Runner:
             self.hub.console.leave()
 
     def _banner(self, simulation: Simulation, going_on: bool) -> None:
-        hub, why = self.hub, unknown_work(self.hub)
+        hub, why = self.hub, energy.unknown_work(self.hub)
         own = words_of_own_step(hub, simulation)
         hub.console.banner(
             f"Run, continued from step {simulation.step}" if going_on else "Run",
@@ -384,7 +376,7 @@ class Runner:
                 "stable dt": simulation.limit,
                 **({"own dt": own} if own else {}),
                 "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
-                **({"energy": not_watched(why)} if why else {}),
+                **({"energy": energy.not_watched(why)} if why else {}),
                 **simulation.processes,
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,
@@ -403,7 +395,7 @@ class Runner:
                 "wall time": f"{wall:.3g} s",
                 "steps": steps,
                 "time": simulation.time,
-                **change_of_energy(simulation),
+                **energy.change_of_energy(simulation),
                 "particle-steps/s": f"{rate:.3g}",
                 "processor time": f"{worked:.3g} s in steps, of all threads",
                 **boundary.counted(self.hub, simulation),

@@ -10,17 +10,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.fields import field, name_of
-from karamelo_py.kernels.arrays import (
-    MASS,
-    POST_PARTICLES_TO_GRID,
-    POST_UPDATE_GRID_HEAT,
-    POST_UPDATE_GRID_STATE,
-    POST_VELOCITIES_TO_GRID,
-    known_to_laws,
-    of_change,
-    of_force,
-    of_momentum,
-)
+from karamelo_py.kernels import arrays
 from karamelo_py.kernels.export import export_velocity_moment, impose_stress
 from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.laws import elastic_law
@@ -51,7 +41,7 @@ class NodesView(View):
         self._nodes = s.nodes
         self._grids = s.grids
         self._stage = stage
-        self._on_velocity = stage == POST_VELOCITIES_TO_GRID or before_update
+        self._on_velocity = stage == arrays.POST_VELOCITIES_TO_GRID or before_update
         self._d = s.kin.dimension
         self._kin = s.kin
         self._take_times(s.control)
@@ -60,7 +50,7 @@ class NodesView(View):
             members = np.concatenate([np.arange(a, b) for a, b in spans] or [np.empty(0, int)])
         else:
             members = group.nodes
-        self.index = members[s.nodes.sums[members, MASS] > 0]
+        self.index = members[s.nodes.sums[members, arrays.MASS] > 0]
 
     def total(self, terms: Any) -> np.ndarray:
         """The sum of terms (n,) or (n, k) over all nodes of the group, those of all processes."""
@@ -86,7 +76,7 @@ class NodesView(View):
     @Shown
     def mass(self) -> np.ndarray:
         """(n,) nodal mass; read only."""
-        return self._nodes.sums[self.index, MASS]
+        return self._nodes.sums[self.index, arrays.MASS]
 
     @Shown
     def force(self) -> np.ndarray:
@@ -98,7 +88,7 @@ class NodesView(View):
         self._nodes.sums[self._at_force()] = value
 
     def _at_force(self) -> tuple:
-        return self._part(self._nodes.sums, of_force(self._kin))
+        return self._part(self._nodes.sums, arrays.of_force(self._kin))
 
     @Shown
     def velocity(self) -> np.ndarray:
@@ -106,10 +96,10 @@ class NodesView(View):
         nodes = self._nodes
         if self._on_velocity:
             return nodes.velocity[self._part(nodes.velocity, 0)]
-        if self._stage == POST_PARTICLES_TO_GRID:
-            momentum = nodes.sums[self._part(nodes.sums, of_momentum(self._kin))]
-            return momentum / nodes.sums[self.index, MASS][:, None]
-        change = nodes.update[self._part(nodes.update, of_change(self._kin))]
+        if self._stage == arrays.POST_PARTICLES_TO_GRID:
+            momentum = nodes.sums[self._part(nodes.sums, arrays.of_momentum(self._kin))]
+            return momentum / nodes.sums[self.index, arrays.MASS][:, None]
+        change = nodes.update[self._part(nodes.update, arrays.of_change(self._kin))]
         return nodes.update[self._part(nodes.update, 0)] - change
 
     @velocity.writer
@@ -117,12 +107,12 @@ class NodesView(View):
         nodes = self._nodes
         if self._on_velocity:
             nodes.velocity[self._part(nodes.velocity, 0)] = value
-        elif self._stage in (POST_UPDATE_GRID_STATE, POST_UPDATE_GRID_HEAT):
+        elif self._stage in (arrays.POST_UPDATE_GRID_STATE, arrays.POST_UPDATE_GRID_HEAT):
             star = nodes.update[self._part(nodes.update, 0)]
-            nodes.update[self._part(nodes.update, of_change(self._kin))] = star - value
+            nodes.update[self._part(nodes.update, arrays.of_change(self._kin))] = star - value
         else:
-            mass = nodes.sums[self.index, MASS][:, None]
-            nodes.sums[self._part(nodes.sums, of_momentum(self._kin))] = mass * value
+            mass = nodes.sums[self.index, arrays.MASS][:, None]
+            nodes.sums[self._part(nodes.sums, arrays.of_momentum(self._kin))] = mass * value
 
     @Shown
     def velocity_update(self) -> np.ndarray:
@@ -138,7 +128,7 @@ class NodesView(View):
             nodes.velocity[self._part(nodes.velocity, 0)] = value
             return
         star = self._part(nodes.update, 0)
-        change = self._part(nodes.update, of_change(self._kin))
+        change = self._part(nodes.update, arrays.of_change(self._kin))
         old = nodes.update[star] - nodes.update[change]
         nodes.update[star] = value
         nodes.update[change] = nodes.update[star] - old
@@ -332,13 +322,13 @@ class PointsView(View):
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
         s = self._simulation.stepped
-        names, like = s.kin.symmetric_names, s.nodes.sums[0, MASS]
+        names, like = s.kin.symmetric_names, s.nodes.sums[0, arrays.MASS]
         flags = np.array([name in given for name in names])
         values = np.stack(
             [np.broadcast_to(given.get(name, 0.0), len(self.ids)) for name in names], axis=1
         ).astype(s.nodes.sums.dtype)
         for block, rows, own in self._at_hand():
-            points = known_to_laws(block.points)
+            points = arrays.known_to_laws(block.points)
             if len(rows) and can(elastic_law(block.laws), with_stress):
                 chosen = np.zeros(len(points.id), np.bool_)
                 chosen[rows] = True

@@ -4,27 +4,27 @@ import math
 from functools import partial
 from typing import Any, Protocol
 
+from karamelo_py.script import syntax
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import FUNCTIONS, TAIL, compute
-from karamelo_py.script.syntax import Binary, Function, Name, Node, Number, Raw, Text, Unary
 from karamelo_py.script.terms import REWRITTEN, applied
 
 
 class Scope(Protocol):
     """Where names and calls of commands get their meaning: the interpreter."""
 
-    def name(self, name: str, node: Name, raw: Raw) -> Value:
+    def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value:
         """What a name stands for."""
 
-    def command(self, node: Function, raw: Raw) -> Value:
+    def command(self, node: syntax.Function, raw: syntax.Raw) -> Value:
         """The value of a call that is not a function."""
 
     def hides(self, name: str) -> bool:
         """Whether the script uses the name of a function for something else."""
 
 
-def evaluate(node: Node, raw: Raw, scope: Scope) -> Value:
+def evaluate(node: syntax.Node, raw: syntax.Raw, scope: Scope) -> Value:
     """What the tree of `raw` stands for: a number, a text or a formula.
 
     Raises
@@ -32,29 +32,29 @@ def evaluate(node: Node, raw: Raw, scope: Scope) -> Value:
     ScriptError
         With the place of the operand to blame.
     """
-    if isinstance(node, (Number, Text)):
+    if isinstance(node, (syntax.Number, syntax.Text)):
         return node.value
-    if isinstance(node, Name):
+    if isinstance(node, syntax.Name):
         return scope.name(node.name, node, raw)
-    if isinstance(node, Unary):
+    if isinstance(node, syntax.Unary):
         operand = _numeric(node.operand, raw, scope, f"'{node.operator}'")
         if node.operator == "+":
             return operand
         return _apply("not" if node.operator == "!" else "neg", node, (operand,), raw)
-    if isinstance(node, Binary):
+    if isinstance(node, syntax.Binary):
         return _binary(node, raw, scope)
-    assert isinstance(node, Function)
+    assert isinstance(node, syntax.Function)
     if node.name not in FUNCTIONS or scope.hides(node.name):
         return scope.command(node, raw)
     return _function(node, raw, scope)
 
 
-def mark(raw: Raw, node: Node) -> Any:
+def mark(raw: syntax.Raw, node: syntax.Node) -> Any:
     """The place of `node`, a part of `raw`."""
     return raw.source.place(raw.start + node.start, raw.start + node.end)
 
 
-def _binary(node: Binary, raw: Raw, scope: Scope) -> Value:
+def _binary(node: syntax.Binary, raw: syntax.Raw, scope: Scope) -> Value:
     left = evaluate(node.left, raw, scope)
     logical = node.operator in ("&&", "||") and isinstance(left, float) and not math.isnan(left)
     if logical and (left != 0) == (node.operator == "||"):
@@ -66,7 +66,7 @@ def _binary(node: Binary, raw: Raw, scope: Scope) -> Value:
     return _apply(node.operator, node, (left, right), raw)
 
 
-def _texts(node: Binary, left: Value, right: Value, raw: Raw) -> Value:
+def _texts(node: syntax.Binary, left: Value, right: Value, raw: syntax.Raw) -> Value:
     if isinstance(left, str) and isinstance(right, str):
         if node.operator == "+":
             return left + right
@@ -82,7 +82,7 @@ def _texts(node: Binary, left: Value, right: Value, raw: Raw) -> Value:
     )
 
 
-def _numeric(node: Node, raw: Raw, scope: Scope, user: str) -> float | Expression:
+def _numeric(node: syntax.Node, raw: syntax.Raw, scope: Scope, user: str) -> float | Expression:
     value = evaluate(node, raw, scope)
     if isinstance(value, str):
         raise ScriptError(
@@ -93,7 +93,7 @@ def _numeric(node: Node, raw: Raw, scope: Scope, user: str) -> float | Expressio
     return value
 
 
-def _function(node: Function, raw: Raw, scope: Scope) -> Value:
+def _function(node: syntax.Function, raw: syntax.Raw, scope: Scope) -> Value:
     signature = FUNCTIONS[node.name]
     count = len(node.operands)
     if not signature.least <= count <= signature.most:
@@ -131,7 +131,7 @@ def usage(name: str) -> str:
     return f"{name}({operands.get(name) or ('a, b' if FUNCTIONS[name].least == 2 else 'a')})"
 
 
-def _apply(operation: str, node: Node, values: tuple, raw: Raw) -> float | Expression:
+def _apply(operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw) -> float | Expression:
     """The operation on numbers, or a formula if one of the values is."""
     if any(isinstance(value, Expression) for value in values):
         terms = [Expression(value)._term for value in values]
@@ -147,7 +147,7 @@ def _apply(operation: str, node: Node, values: tuple, raw: Raw) -> float | Expre
 
 
 def _impossible(
-    operation: str, node: Node, values: tuple, raw: Raw, error: Exception
+    operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw, error: Exception
 ) -> ScriptError:
     """The error for an operation on constants that has no result."""
     operands = _operands(node)
@@ -156,7 +156,7 @@ def _impossible(
         guilty = operands[0] if operation in ("^", "pow") else operands[-1]
         code = raw.code[guilty.start : guilty.end]
         return ScriptError(
-            "division by zero" + ("" if isinstance(guilty, Number) else f": {code} is 0"),
+            "division by zero" + ("" if isinstance(guilty, syntax.Number) else f": {code} is 0"),
             place=mark(raw, guilty),
             expected="a number other than 0",
         )
@@ -194,10 +194,10 @@ def _spelled(operation: str, shown: str) -> str:
     return f" {operation} ".join(shown.split(", "))
 
 
-def _operands(node: Node) -> tuple[Node, ...]:
-    if isinstance(node, Unary):
+def _operands(node: syntax.Node) -> tuple[syntax.Node, ...]:
+    if isinstance(node, syntax.Unary):
         return (node.operand,)
-    if isinstance(node, Binary):
+    if isinstance(node, syntax.Binary):
         return node.left, node.right
-    assert isinstance(node, Function)
+    assert isinstance(node, syntax.Function)
     return node.operands

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.formula import BLOCK, GLOBAL, POINT, ROWS, Program, evaluate_all
+from karamelo_py.compiler import formula
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import compute_quietly
 from karamelo_py.script.programs import in_order, program
@@ -110,19 +110,19 @@ class Expression:
             )
         return _evaluate(self._term, values)
 
-    def program(self, values: Values) -> Program:
+    def program(self, values: Values) -> formula.Program:
         """The formula for :func:`karamelo_py.compiler.formula.evaluate`."""
 
         def place(name: str) -> tuple[int, int]:
             if name in POINT_SEEDS:
-                return POINT, POINT_SEEDS.index(name)
-            return GLOBAL, values.slot(_published(name, values))
+                return formula.POINT, POINT_SEEDS.index(name)
+            return formula.GLOBAL, values.slot(_published(name, values))
 
         return program(self._term, place)
 
-    def program_of(self, seeds: Sequence[str], depth: int) -> Program:
+    def program_of(self, seeds: Sequence[str], depth: int) -> formula.Program:
         """The formula of numbers that are not published, for a stack of this depth alone."""
-        return program(self._term, lambda name: (POINT, seeds.index(name)), depth=depth)
+        return program(self._term, lambda name: (formula.POINT, seeds.index(name)), depth=depth)
 
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
@@ -144,14 +144,14 @@ class Expression:
             return np.full(len(x), self.evaluate(values))
 
         out = np.empty(len(x))
-        scratch = np.empty((6 + ROWS, BLOCK))
+        scratch = np.empty((6 + formula.ROWS, formula.BLOCK))
         program = self.program(values)
         # Some at a time: copies with three columns of millions of points would take much memory.
         for first in range(0, len(x), CHUNK):
             some = slice(first, first + CHUNK)
             here = _three_columns(x[some])
             before = here if x0 is None else _three_columns(x0[some])
-            evaluate_all(program, values.array, here, before, out[some], scratch)
+            formula.evaluate_all(program, values.array, here, before, out[some], scratch)
         return out
 
 

@@ -7,25 +7,10 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.script import expression_mistakes, mistakes
+from karamelo_py.script import expression_mistakes, mistakes, syntax
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.kept import kept_parser
 from karamelo_py.script.mistakes import Mistake
-from karamelo_py.script.syntax import (
-    Assignment,
-    Binary,
-    Call,
-    Evaluation,
-    Function,
-    Name,
-    Node,
-    Number,
-    Raw,
-    Source,
-    Statement,
-    Text,
-    Unary,
-)
 
 # Trees are walked by recursion; this keeps well below Python's limit.
 MAX_DEPTH = 150
@@ -34,7 +19,7 @@ _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
 _SPELLINGS = {"**": "^", "and": "&&", "or": "||", "not": "!"}
 
 
-def parse(text: str, file: str = "<text>") -> list[Statement]:
+def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
     """The statements of a script.
 
     Arguments of calls stay as they are written; everything else is checked.
@@ -47,7 +32,7 @@ def parse(text: str, file: str = "<text>") -> list[Statement]:
     """
     # A byte order mark and the line ends of other systems mean nothing.
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    source = Source(text, file)
+    source = syntax.Source(text, file)
     try:
         mistakes.check_characters(text)
         spans = _lark("script").parse(text)
@@ -55,7 +40,7 @@ def parse(text: str, file: str = "<text>") -> list[Statement]:
         raise mistakes.in_script(text).error(source) from None
     except Mistake as mistake:
         raise mistake.error(source) from None
-    statements: list[Statement] = []
+    statements: list[syntax.Statement] = []
     errors: list[ScriptError] = []
     for span in spans:
         try:
@@ -69,7 +54,7 @@ def parse(text: str, file: str = "<text>") -> list[Statement]:
     return statements
 
 
-def parse_expression(raw: Raw) -> Node:
+def parse_expression(raw: syntax.Raw) -> syntax.Node:
     """The tree of an expression.
 
     Raises
@@ -83,23 +68,23 @@ def parse_expression(raw: Raw) -> Node:
         raise mistake.error(raw.source, raw.start) from None
 
 
-def parse_text(text: str, file: str = "<text>") -> tuple[Raw, Node]:
+def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node]:
     """An expression that stands in no script, such as one from the command line."""
-    raw = Raw(Source(text, file), 0, len(text))
+    raw = syntax.Raw(syntax.Source(text, file), 0, len(text))
     return raw, parse_expression(raw)
 
 
 @lru_cache(maxsize=4096)
-def _tree(code: str) -> Node:
+def _tree(code: str) -> syntax.Node:
     """The tree of `code`; its offsets count from the start of `code`."""
     word = code.strip()
     # Most arguments and many right-hand sides are one name or one whole number.
     if word.isascii() and word.isidentifier() and word not in _SPELLINGS:
         start = code.index(word)
-        return Name(start, start + len(word), 1, word)
+        return syntax.Name(start, start + len(word), 1, word)
     if word.isascii() and word.isdigit():
         start = code.index(word)
-        return Number(start, start + len(word), 1, _number(word, start))
+        return syntax.Number(start, start + len(word), 1, _number(word, start))
     if not word:
         raise Mistake("there is nothing here", 0, len(code), expected="an expression")
     try:
@@ -117,13 +102,15 @@ def _number(word: str, start: int) -> float:
     return value
 
 
-def _statement(source: Source, kind: str, name: str, start: int, end: int, parts: Any) -> Statement:
+def _statement(
+    source: syntax.Source, kind: str, name: str, start: int, end: int, parts: Any
+) -> syntax.Statement:
     """The statement that lies at `start` to `end`."""
     place = source.place(start, start + max(len(name), 1))
-    whole = Raw(source, start, end)
+    whole = syntax.Raw(source, start, end)
     if kind == "assignment":
         begin, stop = parts
-        right = Raw(source, begin, max(stop, begin))
+        right = syntax.Raw(source, begin, max(stop, begin))
         if not right.code.strip():
             raise ScriptError(
                 f"nothing is assigned to '{name}'",
@@ -131,14 +118,14 @@ def _statement(source: Source, kind: str, name: str, start: int, end: int, parts
                 expected="a number, a text in quotes or an expression after the =",
                 hint=f"{name} = 1",
             )
-        return Assignment(place, whole, name, right, parse_expression(right))
+        return syntax.Assignment(place, whole, name, right, parse_expression(right))
     if kind == "call":
-        return Call(place, whole, name, tuple(_arguments(source, name, parts)))
+        return syntax.Call(place, whole, name, tuple(_arguments(source, name, parts)))
     node = parse_expression(whole)
-    return Evaluation(source.place(start, end), whole, node)
+    return syntax.Evaluation(source.place(start, end), whole, node)
 
 
-def _arguments(source: Source, name: str, parts: list) -> list[Raw]:
+def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw]:
     """Raw arguments of a call; `parts` are spans (None where empty) and the commas between."""
     if parts == [None]:
         return []
@@ -163,7 +150,7 @@ def _arguments(source: Source, name: str, parts: list) -> list[Raw]:
                 hint=f'write "{single[1]}"'
                 + (", or the word without quotes" if single[1].isidentifier() else ""),
             )
-        raws.append(Raw(source, *part))
+        raws.append(syntax.Raw(source, *part))
     return raws
 
 
@@ -204,7 +191,7 @@ def _around(parts: list) -> tuple[int, int]:
     return _span(parts[0])[0], _span(parts[-1])[1]
 
 
-def _deeper(start: int, end: int, *below: Node) -> int:
+def _deeper(start: int, end: int, *below: syntax.Node) -> int:
     depth = 1 + max((node.depth for node in below), default=0)
     if depth > MAX_DEPTH:
         raise Mistake(
@@ -249,36 +236,36 @@ class _Builder:
         parts = [p for p in parts if isinstance(p, tuple) or p.type != "NEWLINE"]
         return _around(parts) if parts else None
 
-    def number(self, parts: list) -> Node:
+    def number(self, parts: list) -> syntax.Node:
         start, end = _span(parts[0])
-        return Number(start, end, 1, _number(str(parts[0]), start))
+        return syntax.Number(start, end, 1, _number(str(parts[0]), start))
 
-    def text(self, parts: list) -> Node:
-        return Text(*_span(parts[0]), 1, str(parts[0])[1:-1])
+    def text(self, parts: list) -> syntax.Node:
+        return syntax.Text(*_span(parts[0]), 1, str(parts[0])[1:-1])
 
-    def name(self, parts: list) -> Node:
-        return Name(*_span(parts[0]), 1, str(parts[0]))
+    def name(self, parts: list) -> syntax.Node:
+        return syntax.Name(*_span(parts[0]), 1, str(parts[0]))
 
-    def unary(self, parts: list) -> Node:
+    def unary(self, parts: list) -> syntax.Node:
         sign, operand = parts
         operator = _SPELLINGS.get(str(sign), str(sign))
         start, end = sign.start_pos, operand.end
-        return Unary(start, end, _deeper(start, end, operand), operator, operand)
+        return syntax.Unary(start, end, _deeper(start, end, operand), operator, operand)
 
-    def binary(self, parts: list) -> Node:
+    def binary(self, parts: list) -> syntax.Node:
         left, sign, right = parts
         operator = _SPELLINGS.get(str(sign), str(sign))
         start, end = left.start, right.end
-        return Binary(start, end, _deeper(start, end, left, right), operator, left, right)
+        return syntax.Binary(start, end, _deeper(start, end, left, right), operator, left, right)
 
     def operands(self, parts: list) -> list:
         return parts[::2]
 
-    def function(self, parts: list) -> Node:
+    def function(self, parts: list) -> syntax.Node:
         operands = tuple(parts[2]) if len(parts) == 4 else ()
         start, end = parts[0].start_pos, parts[-1].end_pos
-        return Function(start, end, _deeper(start, end, *operands), str(parts[0]), operands)
+        return syntax.Function(start, end, _deeper(start, end, *operands), str(parts[0]), operands)
 
-    def parenthesis(self, parts: list) -> Node:
+    def parenthesis(self, parts: list) -> syntax.Node:
         # The same tree, but marked and quoted with its parentheses.
         return replace(parts[1], start=parts[0].start_pos, end=parts[2].end_pos)

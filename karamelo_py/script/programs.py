@@ -10,17 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.formula import (
-    CONSTANT,
-    KEEP,
-    KEPT,
-    MAX_DEPTH,
-    MAX_KEPT,
-    POINT,
-    SPREAD,
-    UNIFORM,
-    Program,
-)
+from karamelo_py.compiler import formula
 from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.script.errors import ScriptError
 
@@ -69,7 +59,7 @@ class _Writer:
 
     def __init__(self, root: Any, place: Callable[[str], tuple[int, int]], depth: int | None):
         self.bare = depth is not None
-        self.depth = depth or MAX_DEPTH
+        self.depth = depth or formula.MAX_DEPTH
         self.place = place
         self.terms: list[tuple[str, tuple[int, ...], Any]] = []
         self.uses: list[int] = []
@@ -77,7 +67,7 @@ class _Writer:
         self.code: list[tuple[int, int]] = []
         self.constants: dict[_Exact, int] = {}
         self.rows: dict[int, int] = {}  # of terms that are kept now
-        self.free = list(range(MAX_KEPT))[::-1]
+        self.free = list(range(formula.MAX_KEPT))[::-1]
         self.root = self._number(root)
         self.kept = self._chosen()
 
@@ -101,7 +91,7 @@ class _Writer:
 
     def _is_uniform(self, operation: str, operands: tuple[int, ...], value: Any) -> bool:
         if operation == "name":
-            return self.place(value)[0] != POINT
+            return self.place(value)[0] != formula.POINT
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
@@ -133,24 +123,24 @@ class _Writer:
                 if not self.free:
                     raise ScriptError(
                         "the formula is too long",
-                        expected=f"at most {MAX_KEPT} results that wait for their use",
+                        expected=f"at most {formula.MAX_KEPT} results that wait for their use",
                     )
                 self.rows[k] = self.free.pop()
-                self._append(KEEP, self.rows[k], self.uniform[k])
+                self._append(formula.KEEP, self.rows[k], self.uniform[k])
         self._write_or_take(self.root)
-        return Program(
+        return formula.Program(
             np.array(self.code, dtype=np.int64).reshape(-1, 2),
             np.array(list(self.constants), dtype=np.float64),
         )
 
     def _append(self, operation: int, operand: int, uniform: bool) -> None:
-        self.code.append((operation + (UNIFORM if uniform else 0), operand))
+        self.code.append((operation + (formula.UNIFORM if uniform else 0), operand))
 
     def _write_or_take(self, k: int) -> None:
         if k not in self.rows:
             self._write(k)
             return
-        self._append(KEPT, self.rows[k], self.uniform[k])
+        self._append(formula.KEPT, self.rows[k], self.uniform[k])
         self.uses[k] -= 1
         if self.uses[k] == 0:
             self.free.append(self.rows.pop(k))
@@ -160,7 +150,7 @@ class _Writer:
         same = self.uniform[k]
         if operation == "number":
             slot = self.constants.setdefault(value, len(self.constants))
-            self._append(CONSTANT, slot, same)
+            self._append(formula.CONSTANT, slot, same)
             return
         if operation == "name":
             self._append(*self.place(value), same)
@@ -170,7 +160,7 @@ class _Writer:
         if not same:
             for i, operand in enumerate(operands):
                 if self.uniform[operand]:
-                    self.code.append((SPREAD, len(operands) - 1 - i))
+                    self.code.append((formula.SPREAD, len(operands) - 1 - i))
         self._append(OPERATIONS[operation], 0, same)
 
 

@@ -8,12 +8,12 @@ from karamelo_py.compiler.compile import Weighted, choose, index, real, shared
 from karamelo_py.compiler.powers import power
 from karamelo_py.compiler.symbols import Symbol, call
 from karamelo_py.compiler.tuples import scale
+from karamelo_py.points import kinematics
 from karamelo_py.points.basis import carried, carrier, carry, deformed, mapped_again
 from karamelo_py.points.basis.product import along, node_number, register
 from karamelo_py.points.basis.ugimp import averaged_hats, box
 from karamelo_py.points.frames import stretched_share
 from karamelo_py.points.grid import cells_along
-from karamelo_py.points.kinematics import deform, diagonal, dimension, planar, stretch, volume_ratio
 from karamelo_py.points.kinematics.components import Number, Tensor, Vector, formula
 
 # Half sizes that weights are made with, in cells.
@@ -215,21 +215,23 @@ def _stretched_box(kin, place: Vector, factors: Vector, f: Tensor):
 
 @deformed.on(CPGIMPDet)
 def _deformed_cpgimp_det(basis, kin, place, dl):
-    return _scaled_box(kin, place, power(volume_ratio(kin, dl), stretched_share(kin, dl[0])))
+    return _scaled_box(
+        kin, place, power(kinematics.volume_ratio(kin, dl), stretched_share(kin, dl[0]))
+    )
 
 
 @deformed.on(CPGIMPDiagonal)
 def _deformed_cpgimp_diagonal(basis, kin, place, dl):
-    flat = planar(kin)
-    f = deform(flat, dl, _deformation(flat, place))
-    return _stretched_box(flat, place, diagonal(flat, f), f)
+    flat = kinematics.planar(kin)
+    f = kinematics.deform(flat, dl, _deformation(flat, place))
+    return _stretched_box(flat, place, kinematics.diagonal(flat, f), f)
 
 
 @deformed.on(CPGIMPStretch)
 def _deformed_cpgimp_stretch(basis, kin, place, dl):
-    flat = planar(kin)
-    f = deform(flat, dl, _deformation(flat, place))
-    return _stretched_box(flat, place, stretch(flat, f), f)
+    flat = kinematics.planar(kin)
+    f = kinematics.deform(flat, dl, _deformation(flat, place))
+    return _stretched_box(flat, place, kinematics.stretch(flat, f), f)
 
 
 # --- corners ----------------------------------------------------------------------------------
@@ -239,7 +241,7 @@ def _deformed_cpgimp_stretch(basis, kin, place, dl):
 
 @carried.on(CPGIMPCorners)
 def _carried_cpgimp_corners(basis, kin):
-    return 1 << dimension(kin)
+    return 1 << kinematics.dimension(kin)
 
 
 @shared

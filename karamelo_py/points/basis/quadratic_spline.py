@@ -3,15 +3,7 @@
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, in_all, real, shared
-from karamelo_py.points.basis import first_node
-from karamelo_py.points.basis.product import (
-    Along,
-    affine_along,
-    along,
-    evenly,
-    inverse_spread,
-    register,
-)
+from karamelo_py.points.basis import first_node, product
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -36,7 +28,7 @@ class QuadraticSpline(NamedTuple):
     courant_still = 1.25
 
 
-@along.on(QuadraticSpline)
+@product.along.on(QuadraticSpline)
 def _along_quadratic_spline(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
@@ -47,7 +39,7 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
     left, right = half - t, half + t
     weights = (half * left * left, real(0.75, a) - t * t, half * right * right)
     gradients = (-left * grid.inv_h, -(t + t) * grid.inv_h, right * grid.inv_h)
-    line = Along(nearest - 1, real(1, a) + t, weights, gradients, ())
+    line = product.Along(nearest - 1, real(1, a) + t, weights, gradients, ())
     if in_all(bulk):
         return line
     return choose(bulk, line, _at_wall(grid, a, last))
@@ -67,7 +59,7 @@ def _at_wall(grid, a, last):
         choose(second, -grid.inv_h, grid.inv_h),
         choose(second, grid.inv_h, zero),
     )
-    return Along(first, a - real(first, a), weights, gradients, ())
+    return product.Along(first, a - real(first, a), weights, gradients, ())
 
 
 @shared
@@ -76,7 +68,7 @@ def _in_bulk(grid, line, direction):
     return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
 
 
-@affine_along.on(QuadraticSpline)
+@product.affine_along.on(QuadraticSpline)
 def _affine_along_quadratic_spline(basis, grid, line, direction):
     # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
     four, r = real(4, line.r) * grid.inv_h, line.r
@@ -84,12 +76,12 @@ def _affine_along_quadratic_spline(basis, grid, line, direction):
     return choose(_in_bulk(grid, line, direction), affine, line.gradients)
 
 
-@inverse_spread.on(QuadraticSpline)
+@product.inverse_spread.on(QuadraticSpline)
 def _inverse_spread_quadratic_spline(basis, grid):
     return (4 * grid.inv_h * grid.inv_h,)
 
 
-@evenly.on(QuadraticSpline)
+@product.evenly.on(QuadraticSpline)
 def _evenly_quadratic_spline(basis, grid, stencil):
     first, *rest = (_in_bulk(grid, line, d) for d, line in enumerate(stencil.lines))
     for bulk in rest:
@@ -102,4 +94,4 @@ def _first_node_quadratic_spline(basis, like):
     return real(0.5, like)
 
 
-register(QuadraticSpline, 3)
+product.register(QuadraticSpline, 3)

@@ -13,21 +13,13 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import choose, real, shared
 from karamelo_py.compiler.tuples import added, increased, plus, scale
-from karamelo_py.points.kinematics import (
-    add_pressure,
-    deviator,
-    leading_symmetric,
-    spin,
-    symmetric_part,
-    trace,
-    volume_ratio,
-    zero_symmetric,
-)
+from karamelo_py.points import kinematics
 from karamelo_py.points.laws import (
     Absent,
     advance,
     cauchy_stress,
     column,
+    composed,
     conductivity,
     damage,
     damage_initiation,
@@ -41,24 +33,12 @@ from karamelo_py.points.laws import (
     plastic_strain,
     shown,
     specific_volume,
+    strengths,
     temperature,
     warmed,
     wave_speed_squared,
     with_stress,
     with_temperature,
-)
-from karamelo_py.points.laws.composed import (
-    Memory,
-    borne_share,
-    broken_further,
-    full_pressure,
-    intact_pressure,
-    lossless,
-    memory_of,
-    released,
-    slowed_by_viscosity,
-    state_of,
-    viscous_after,
 )
 from karamelo_py.points.laws.damages import initial_damage, initiation
 from karamelo_py.points.laws.eos import (
@@ -77,17 +57,6 @@ from karamelo_py.points.laws.further import (
     initial_further,
 )
 from karamelo_py.points.laws.named import Eos, Option, Strength
-from karamelo_py.points.laws.strengths import (
-    Remembered,
-    damped_speed_squared,
-    elastic_ratio,
-    equivalent_plastic_strain,
-    initial_memory,
-    respond,
-    shear_energy,
-    shear_modulus,
-    shear_strain,
-)
 from karamelo_py.points.laws.temperatures import heat_from, heated, initial_heat, thermal_pressure
 from karamelo_py.points.laws.viscosity import initial_viscous_pressure
 from karamelo_py.script.errors import ScriptError
@@ -157,61 +126,65 @@ column(EosStrength, "dissipated", dissipated_energy)
 
 @initial_state.on(EosStrength)
 def _initial_state_eos_strength(law, kin, like):
-    m = Memory(
+    m = composed.Memory(
         initial_energy(law.eos, like),
         initial_viscous_pressure(law.viscosity, like),
         initial_damage(law.damage, like),
         initial_heat(law.temperature, like),
-        lossless(law, like),
-        initial_memory(law.strength, like),
+        composed.lossless(law, like),
+        strengths.initial_memory(law.strength, like),
         initial_further(law.further, like),
     )
-    return state_of(real(1, like), zero_symmetric(kin, like), m)
+    return composed.state_of(real(1, like), kinematics.zero_symmetric(kin, like), m)
 
 
 @advance.on(EosStrength)
 def _advance_eos_strength(law, kin, state, dl, dt):
-    m = memory_of(law, kin, state)
+    m = composed.memory_of(law, kin, state)
     before = state[0]
-    j = before * volume_ratio(kin, dl)
-    strain = symmetric_part(kin, dl)
-    old = spin(kin, dl, leading_symmetric(kin, state[1:]))
-    s, memory, work = respond(law.strength, law, kin, old, strain, j, m, dt)
-    work = j * work * borne_share(law.damage, m.damage, work)
-    viscous = viscous_after(law.viscosity, law, j, m, trace(strain) / dt)
+    j = before * kinematics.volume_ratio(kin, dl)
+    strain = kinematics.symmetric_part(kin, dl)
+    old = kinematics.spin(kin, dl, kinematics.leading_symmetric(kin, state[1:]))
+    s, memory, work = strengths.respond(law.strength, law, kin, old, strain, j, m, dt)
+    work = j * work * composed.borne_share(law.damage, m.damage, work)
+    viscous = composed.viscous_after(law.viscosity, law, j, m, kinematics.trace(strain) / dt)
     viscous_work = plus(j - j, viscous) * (before - j)
     energy = compressed(law.eos, m.energy, before, j, work + viscous_work)
-    flow = equivalent_plastic_strain(law.strength, memory)
-    flow -= equivalent_plastic_strain(law.strength, m.strength)
-    now = Memory(energy, viscous, m.damage, m.heat, m.loss, memory, m.further)
-    broken = broken_further(law.damage, law, kin, now, flow, s, j, dt)
+    flow = strengths.equivalent_plastic_strain(law.strength, memory)
+    flow -= strengths.equivalent_plastic_strain(law.strength, m.strength)
+    now = composed.Memory(energy, viscous, m.damage, m.heat, m.loss, memory, m.further)
+    broken = composed.broken_further(law.damage, law, kin, now, flow, s, j, dt)
     heat = heated(law.temperature, m.heat, work * specific_volume(law.eos))
-    gone = work + viscous_work + released(law.damage, law, kin, j, s, now, broken)
+    gone = work + viscous_work + composed.released(law.damage, law, kin, j, s, now, broken)
     loss = increased(m.loss, gone)
     further = further_after(law.further, m.further, law, kin, j, s, now, dt)
-    return state_of(j, s, Memory(energy, viscous, broken, heat, loss, memory, further))
+    return composed.state_of(
+        j, s, composed.Memory(energy, viscous, broken, heat, loss, memory, further)
+    )
 
 
 @shared
 def stress_left(law, kin, m, state):
     """The deviatoric stress that damage leaves, (1 - D) s."""
-    s = leading_symmetric(kin, state[1:])
-    return scale(borne_share(law.damage, m.damage, s[0]), s)
+    s = kinematics.leading_symmetric(kin, state[1:])
+    return scale(composed.borne_share(law.damage, m.damage, s[0]), s)
 
 
 @cauchy_stress.on(EosStrength)
 def _cauchy_stress_eos_strength(law, kin, state):
-    m = memory_of(law, kin, state)
+    m = composed.memory_of(law, kin, state)
     s = stress_left(law, kin, m, state)
-    return add_pressure(kin, real(1, state[0]), s, -full_pressure(law, state[0], m))
+    return kinematics.add_pressure(
+        kin, real(1, state[0]), s, -composed.full_pressure(law, state[0], m)
+    )
 
 
 @kirchhoff_stress.on(EosStrength)
 def _kirchhoff_stress_eos_strength(law, kin, state):
     j = state[0]
-    m = memory_of(law, kin, state)
+    m = composed.memory_of(law, kin, state)
     s = stress_left(law, kin, m, state)
-    return add_pressure(kin, j, s, -j * full_pressure(law, j, m))
+    return kinematics.add_pressure(kin, j, s, -j * composed.full_pressure(law, j, m))
 
 
 @jacobian.on(EosStrength)
@@ -223,67 +196,71 @@ def _jacobian_eos_strength(law, kin, state):
 def _wave_speed_squared_eos_strength(law, kin, state):
     # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower.
     j = state[0]
-    m = memory_of(law, kin, state)
-    elastic = elastic_ratio(law.strength, m.strength, j)
+    m = composed.memory_of(law, kin, state)
+    elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     modulus = bulk_modulus(law.eos, elastic, m.energy, m.heat)
     volume = specific_volume(law.eos) * j
-    squared = (modulus + real(4 / 3, j) * shear_modulus(law.strength)) * volume
+    squared = (modulus + real(4 / 3, j) * strengths.shear_modulus(law.strength)) * volume
     density = real(1, j) / volume
-    squared = damped_speed_squared(law.strength, squared, density)
-    return slowed_by_viscosity(law.viscosity, law, j, m, squared, density)
+    squared = strengths.damped_speed_squared(law.strength, squared, density)
+    return composed.slowed_by_viscosity(law.viscosity, law, j, m, squared, density)
 
 
 @energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
     """What unloading gives back at this temperature: plastic work is not stored."""
     j = state[0]
-    m = memory_of(law, kin, state)
-    elastic = elastic_ratio(law.strength, m.strength, j)
+    m = composed.memory_of(law, kin, state)
+    elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     volume = compression_energy(law.eos, elastic, m.energy)
     volume -= stored_heat(law.eos, plus(j - j, m.loss))
     volume += plus(j - j, thermal_pressure(law.temperature, m.heat)) * (real(1, j) - j)
-    tension = intact_pressure(law, j, m) < 0
-    share = borne_share(law.damage, m.damage, j)
+    tension = composed.intact_pressure(law, j, m) < 0
+    share = composed.borne_share(law.damage, m.damage, j)
     volume = choose(tension, share * volume, volume)
-    shear = shear_energy(law.strength, kin, leading_symmetric(kin, state[1:]))
+    shear = strengths.shear_energy(law.strength, kin, kinematics.leading_symmetric(kin, state[1:]))
     return volume + j * (share * shear)
 
 
 @dissipated_energy.on(EosStrength)
 def _dissipated_energy_eos_strength(law, kin, state):
-    return plus(state[0] - state[0], memory_of(law, kin, state).loss)
+    return plus(state[0] - state[0], composed.memory_of(law, kin, state).loss)
 
 
 @elastic_strain.on(EosStrength)
 def _elastic_strain_eos_strength(law, kin, state):
     """ln J / 3, the mean of the elastic strain increments, and the elastic shear."""
-    m = memory_of(law, kin, state)
-    strain = shear_strain(law.strength, kin, leading_symmetric(kin, state[1:]))
-    elastic = elastic_ratio(law.strength, m.strength, state[0])
-    return add_pressure(kin, real(1, state[0]), strain, real(1 / 3, state[0]) * log(elastic))
+    m = composed.memory_of(law, kin, state)
+    strain = strengths.shear_strain(law.strength, kin, kinematics.leading_symmetric(kin, state[1:]))
+    elastic = strengths.elastic_ratio(law.strength, m.strength, state[0])
+    return kinematics.add_pressure(
+        kin, real(1, state[0]), strain, real(1 / 3, state[0]) * log(elastic)
+    )
 
 
 @plastic_strain.on(EosStrength)
 def _plastic_strain_eos_strength(law, kin, state):
-    return equivalent_plastic_strain(law.strength, memory_of(law, kin, state).strength)
+    return strengths.equivalent_plastic_strain(
+        law.strength, composed.memory_of(law, kin, state).strength
+    )
 
 
-@shown.on(Remembered)
+@shown.on(strengths.Remembered)
 def _shown_remembered(what, law, kin, state):
-    return memory_of(law, kin, state).strength[what.place]
+    return composed.memory_of(law, kin, state).strength[what.place]
 
 
 @with_stress.on(EosStrength)
 def _with_stress_eos_strength(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
-    m = memory_of(law, kin, state)
-    elastic = elastic_ratio(law.strength, m.strength, state[0])
+    m = composed.memory_of(law, kin, state)
+    elastic = strengths.elastic_ratio(law.strength, m.strength, state[0])
     beside = plus(plus(elastic - elastic, thermal_pressure(law.temperature, m.heat)), m.viscous)
     beside = further_pressure(law.further, m.further, beside)
-    p = -trace(stress) * real(1 / 3, elastic) - beside
+    p = -kinematics.trace(stress) * real(1 / 3, elastic) - beside
     after, energy = at_pressure(law.eos, elastic, m.energy, p, m.heat)
-    now = Memory(energy, m.viscous, m.damage, m.heat, m.loss, m.strength, m.further)
-    return state_of(state[0] * (after / elastic), deviator(kin, stress), now)
+    now = composed.Memory(energy, m.viscous, m.damage, m.heat, m.loss, m.strength, m.further)
+    return composed.state_of(state[0] * (after / elastic), kinematics.deviator(kin, stress), now)
 
 
 @specific_volume.on(EosStrength)
@@ -294,25 +271,25 @@ def _specific_volume_eos_strength(law):
 @damage.on(EosStrength)
 def _damage_eos_strength(law, kin, state):
     one = real(1, state[0])
-    return one - borne_share(law.damage, memory_of(law, kin, state).damage, one)
+    return one - composed.borne_share(law.damage, composed.memory_of(law, kin, state).damage, one)
 
 
 @damage_initiation.on(EosStrength)
 def _damage_initiation_eos_strength(law, kin, state):
-    return initiation(law.damage, memory_of(law, kin, state).damage)
+    return initiation(law.damage, composed.memory_of(law, kin, state).damage)
 
 
 @temperature.on(EosStrength)
 def _temperature_eos_strength(law, kin, state):
-    return plus(state[0] - state[0], memory_of(law, kin, state).heat)
+    return plus(state[0] - state[0], composed.memory_of(law, kin, state).heat)
 
 
 @with_temperature.on(EosStrength)
 def _with_temperature_eos_strength(law, kin, state, T):
-    m = memory_of(law, kin, state)
+    m = composed.memory_of(law, kin, state)
     heat = heat_from(m.heat, (T,))
-    now = Memory(m.energy, m.viscous, m.damage, heat, m.loss, m.strength, m.further)
-    return state_of(state[0], leading_symmetric(kin, state[1:]), now)
+    now = composed.Memory(m.energy, m.viscous, m.damage, heat, m.loss, m.strength, m.further)
+    return composed.state_of(state[0], kinematics.leading_symmetric(kin, state[1:]), now)
 
 
 @heat_capacity.on(EosStrength)
@@ -322,12 +299,12 @@ def _heat_capacity_eos_strength(law, like):
 
 @warmed.on(EosStrength)
 def _warmed_eos_strength(law, kin, state, heat):
-    m = memory_of(law, kin, state)
+    m = composed.memory_of(law, kin, state)
     taken = taken_heat(law.eos, m.energy, heat)
     energy = added(m.energy, taken)
     loss = added(m.loss, taken)
-    now = Memory(energy, m.viscous, m.damage, m.heat, loss, m.strength, m.further)
-    return state_of(state[0], leading_symmetric(kin, state[1:]), now)
+    now = composed.Memory(energy, m.viscous, m.damage, m.heat, loss, m.strength, m.further)
+    return composed.state_of(state[0], kinematics.leading_symmetric(kin, state[1:]), now)
 
 
 @conductivity.on(EosStrength)

@@ -8,26 +8,7 @@ from typing import Annotated, Literal, NamedTuple
 from karamelo_py.compiler.compile import point_function, real
 from karamelo_py.compiler.tuples import add, scale
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics import (
-    add_pressure,
-    contract,
-    spin,
-    symmetric_part,
-    trace,
-    volume_ratio,
-    zero_symmetric,
-)
-from karamelo_py.points.laws import (
-    advance,
-    cauchy_stress,
-    elastic_strain,
-    energy_density,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    wave_speed_squared,
-    with_stress,
-)
+from karamelo_py.points import kinematics, laws
 from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
@@ -114,7 +95,7 @@ def turned(law, kin, dl, stress):
 
 @turned.on(LinearElastic)
 def _turned_linear_elastic(law, kin, dl, stress):
-    return spin(kin, dl, stress)
+    return kinematics.spin(kin, dl, stress)
 
 
 @turned.on(FixedFrame)
@@ -122,65 +103,65 @@ def _turned_fixed_frame(law, kin, dl, stress):
     return stress
 
 
-@initial_state.on(LinearElastic)
-@initial_state.on(FixedFrame)
+@laws.initial_state.on(LinearElastic)
+@laws.initial_state.on(FixedFrame)
 def _initial_state_fixed_frame(law, kin, like):
-    return (real(1, like),) + zero_symmetric(kin, like)
+    return (real(1, like),) + kinematics.zero_symmetric(kin, like)
 
 
-@advance.on(LinearElastic)
-@advance.on(FixedFrame)
+@laws.advance.on(LinearElastic)
+@laws.advance.on(FixedFrame)
 def _advance_fixed_frame(law, kin, state, dl, dt):
-    strain = symmetric_part(kin, dl)
+    strain = kinematics.symmetric_part(kin, dl)
     old = turned(law, kin, dl, state[1:])
-    pressure = law.lam * trace(strain)
-    increment = add_pressure(kin, real(2, law.G) * law.G, strain, pressure)
-    return (state[0] * volume_ratio(kin, dl),) + add(old, increment)
+    pressure = law.lam * kinematics.trace(strain)
+    increment = kinematics.add_pressure(kin, real(2, law.G) * law.G, strain, pressure)
+    return (state[0] * kinematics.volume_ratio(kin, dl),) + add(old, increment)
 
 
-@kirchhoff_stress.on(LinearElastic)
-@kirchhoff_stress.on(FixedFrame)
+@laws.kirchhoff_stress.on(LinearElastic)
+@laws.kirchhoff_stress.on(FixedFrame)
 def _kirchhoff_stress_fixed_frame(law, kin, state):
     return scale(state[0], state[1:])
 
 
-@cauchy_stress.on(LinearElastic)
-@cauchy_stress.on(FixedFrame)
+@laws.cauchy_stress.on(LinearElastic)
+@laws.cauchy_stress.on(FixedFrame)
 def _cauchy_stress_fixed_frame(law, kin, state):
     return state[1:]
 
 
-@jacobian.on(LinearElastic)
-@jacobian.on(FixedFrame)
+@laws.jacobian.on(LinearElastic)
+@laws.jacobian.on(FixedFrame)
 def _jacobian_fixed_frame(law, kin, state):
     return state[0]
 
 
-@wave_speed_squared.on(LinearElastic)
-@wave_speed_squared.on(FixedFrame)
+@laws.wave_speed_squared.on(LinearElastic)
+@laws.wave_speed_squared.on(FixedFrame)
 def _wave_speed_squared_fixed_frame(law, kin, state):
     # (lam + 2 G) / rho: the moduli are constant, the volume per mass has grown by det F
     return (law.lam + real(2, law.G) * law.G) * law.specific_volume * state[0]
 
 
-@elastic_strain.on(LinearElastic)
-@elastic_strain.on(FixedFrame)
+@laws.elastic_strain.on(LinearElastic)
+@laws.elastic_strain.on(FixedFrame)
 def _elastic_strain_fixed_frame(law, kin, state):
     # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
     stress = state[1:]
     half = real(0.5, law.G)
-    mean = law.lam / (real(3, law.G) * law.lam + real(2, law.G) * law.G) * trace(stress)
-    return scale(half / law.G, add_pressure(kin, real(1, law.G), stress, -mean))
+    mean = law.lam / (real(3, law.G) * law.lam + real(2, law.G) * law.G) * kinematics.trace(stress)
+    return scale(half / law.G, kinematics.add_pressure(kin, real(1, law.G), stress, -mean))
 
 
-@energy_density.on(LinearElastic)
-@energy_density.on(FixedFrame)
+@laws.energy_density.on(LinearElastic)
+@laws.energy_density.on(FixedFrame)
 def _energy_density_fixed_frame(law, kin, state):
-    strain = elastic_strain(law, kin, state)
-    return real(0.5, law.G) * state[0] * contract(kin, state[1:], strain)
+    strain = laws.elastic_strain(law, kin, state)
+    return real(0.5, law.G) * state[0] * kinematics.contract(kin, state[1:], strain)
 
 
-@with_stress.on(LinearElastic)
-@with_stress.on(FixedFrame)
+@laws.with_stress.on(LinearElastic)
+@laws.with_stress.on(FixedFrame)
 def _with_stress_fixed_frame(law, kin, state, stress):
     return (state[0],) + stress

@@ -10,28 +10,7 @@ from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.powers import logarithm_near_one
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics import (
-    add_pressure,
-    deform,
-    determinant,
-    identity,
-    largest_row_sum,
-    left_cauchy_green,
-    right_cauchy_green,
-    trace,
-)
-from karamelo_py.points.laws import (
-    advance,
-    cauchy_stress,
-    deformation,
-    elastic_strain,
-    energy_density,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    wave_speed_bound,
-    wave_speed_squared,
-)
+from karamelo_py.points import kinematics, laws
 from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
@@ -93,51 +72,51 @@ class NeoHookean(NamedTuple):
         return expanding(cls(1 / rho, *moduli), moduli, cp, kappa, alpha)
 
 
-@initial_state.on(NeoHookean)
+@laws.initial_state.on(NeoHookean)
 def _initial_state_neo_hookean(law, kin, like):
-    return identity(kin, like)
+    return kinematics.identity(kin, like)
 
 
-@advance.on(NeoHookean)
+@laws.advance.on(NeoHookean)
 def _advance_neo_hookean(law, kin, state, dl, dt):
-    return deform(kin, dl, state)
+    return kinematics.deform(kin, dl, state)
 
 
-@kirchhoff_stress.on(NeoHookean)
+@laws.kirchhoff_stress.on(NeoHookean)
 def _kirchhoff_stress_neo_hookean(law, kin, state):
     # P = G (F - F^-T) + lam ln J F^-T, so tau = P F^T = G (b - I) + lam ln J I
-    pressure = law.lam * logarithm_near_one(determinant(kin, state)) - law.G
-    return add_pressure(kin, law.G, left_cauchy_green(kin, state), pressure)
+    pressure = law.lam * logarithm_near_one(kinematics.determinant(kin, state)) - law.G
+    return kinematics.add_pressure(kin, law.G, kinematics.left_cauchy_green(kin, state), pressure)
 
 
-@cauchy_stress.on(NeoHookean)
+@laws.cauchy_stress.on(NeoHookean)
 def _cauchy_stress_neo_hookean(law, kin, state):
-    inverse = real(1, law.G) / determinant(kin, state)
-    return scale(inverse, kirchhoff_stress(law, kin, state))
+    inverse = real(1, law.G) / kinematics.determinant(kin, state)
+    return scale(inverse, laws.kirchhoff_stress(law, kin, state))
 
 
-@deformation.on(NeoHookean)
+@laws.deformation.on(NeoHookean)
 def _deformation_neo_hookean(law, kin, state):
     return state
 
 
-@jacobian.on(NeoHookean)
+@laws.jacobian.on(NeoHookean)
 def _jacobian_neo_hookean(law, kin, state):
-    return determinant(kin, state)
+    return kinematics.determinant(kin, state)
 
 
-@wave_speed_squared.on(NeoHookean)
+@laws.wave_speed_squared.on(NeoHookean)
 def _wave_speed_squared_neo_hookean(law, kin, state):
     # Along a principal direction of stretch a, the tangent of P gives
     # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
-    ln_j = logarithm_near_one(determinant(kin, state))
+    ln_j = logarithm_near_one(kinematics.determinant(kin, state))
     return _speed_squared(law, kin, state, law.lam * (real(1, law.G) - ln_j))
 
 
-@wave_speed_bound.on(NeoHookean)
+@laws.wave_speed_bound.on(NeoHookean)
 def _wave_speed_bound_neo_hookean(law, kin, state):
     # Without a series: 1 / J is above 1 - ln J (by 2 % at J = 0.8), and J / e^2 above its negative.
-    j = determinant(kin, state)
+    j = kinematics.determinant(kin, state)
     bulk = max(law.lam / j, -law.lam * j * real(exp(-2), j))
     return _speed_squared(law, kin, state, bulk)
 
@@ -145,20 +124,20 @@ def _wave_speed_bound_neo_hookean(law, kin, state):
 @shared
 def _speed_squared(law, kin, state, bulk):
     zero, one = real(0, law.G), real(1, law.G)
-    stretch = largest_row_sum(kin, left_cauchy_green(kin, state))
+    stretch = kinematics.largest_row_sum(kin, kinematics.left_cauchy_green(kin, state))
     return (law.G * (one + stretch) + max(bulk, zero)) * law.specific_volume
 
 
-@energy_density.on(NeoHookean)
+@laws.energy_density.on(NeoHookean)
 def _energy_density_neo_hookean(law, kin, state):
     half = real(0.5, law.G)
-    ln_j = logarithm_near_one(determinant(kin, state))
-    excess = trace(left_cauchy_green(kin, state)) - real(3, law.G)
+    ln_j = logarithm_near_one(kinematics.determinant(kin, state))
+    excess = kinematics.trace(kinematics.left_cauchy_green(kin, state)) - real(3, law.G)
     return half * law.G * excess - law.G * ln_j + half * law.lam * ln_j * ln_j
 
 
-@elastic_strain.on(NeoHookean)
+@laws.elastic_strain.on(NeoHookean)
 def _elastic_strain_neo_hookean(law, kin, state):
     """Green-Lagrange strain (F^T F - I) / 2."""
     half = real(0.5, law.G)
-    return add_pressure(kin, half, right_cauchy_green(kin, state), -half)
+    return kinematics.add_pressure(kin, half, kinematics.right_cauchy_green(kin, state), -half)

@@ -4,14 +4,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, real
-from karamelo_py.points.laws import (
-    Absent,
-    column,
-    columns_of,
-    initial_state,
-    shown,
-    wave_speed_squared,
-)
+from karamelo_py.points import laws
 from karamelo_py.points.laws.composed import memory_of
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.further import Further, initial_part, part_after
@@ -33,7 +26,7 @@ class Smoothed(NamedTuple):
     """Tag of the smoothed rate."""
 
 
-column(PlasticRate, "epdot", Smoothed())
+laws.column(PlasticRate, "epdot", Smoothed())
 
 
 @initial_part.on(PlasticRate)
@@ -49,7 +42,7 @@ def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
     return (max(memory[0] + change, real(0, j)), ep)
 
 
-@shown.on(Smoothed)
+@laws.shown.on(Smoothed)
 def _shown_smoothed(what, law, kin, state):
     further = memory_of(law, kin, state).further
     return further[len(further) - 2]
@@ -57,14 +50,14 @@ def _shown_smoothed(what, law, kin, state):
 
 def has_rate(law: NamedTuple) -> bool:
     """Whether a law has plastic strain, so that it has a rate."""
-    return isinstance(law, EosStrength) and "ep" in columns_of(law)
+    return isinstance(law, EosStrength) and "ep" in laws.columns_of(law)
 
 
 def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
     """A law that keeps its rate behind all that it keeps else; `h` is the cell size."""
     if not has_rate(law):
         return law
-    speed = sqrt(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))
+    speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))
     return law._replace(further=_behind(law.further, PlasticRate(CELLS * h / speed)))
 
 
@@ -77,6 +70,6 @@ def without_rate(kinds: tuple[type, ...]) -> tuple[type, ...]:
 
 
 def _behind(parts: NamedTuple, part: NamedTuple) -> NamedTuple:
-    if isinstance(parts, Absent):
+    if isinstance(parts, laws.Absent):
         return Further(part, parts)
     return parts._replace(rest=_behind(parts.rest, part))

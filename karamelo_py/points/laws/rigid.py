@@ -4,18 +4,8 @@ from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import real
 from karamelo_py.language.signature import Positive
+from karamelo_py.points import laws
 from karamelo_py.points.kinematics import zero_symmetric
-from karamelo_py.points.laws import (
-    advance,
-    cauchy_stress,
-    constrained_velocity,
-    elastic_strain,
-    energy_density,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    wave_speed_squared,
-)
 
 
 class Rigid(NamedTuple):
@@ -59,34 +49,34 @@ class Rigid(NamedTuple):
         return cls(1 / rho)
 
 
-@initial_state.on(Rigid)
+@laws.initial_state.on(Rigid)
 def _initial_state_rigid(law, kin, like):
     return ()
 
 
-@advance.on(Rigid)
+@laws.advance.on(Rigid)
 def _advance_rigid(law, kin, state, dl, dt):
     return ()
 
 
-@constrained_velocity.on(Rigid)
+@laws.constrained_velocity.on(Rigid)
 def _constrained_velocity_rigid(law, own, given):
     return own
 
 
-@cauchy_stress.on(Rigid)
-@kirchhoff_stress.on(Rigid)
-@elastic_strain.on(Rigid)
+@laws.cauchy_stress.on(Rigid)
+@laws.kirchhoff_stress.on(Rigid)
+@laws.elastic_strain.on(Rigid)
 def _elastic_strain_rigid(law, kin, state):
     return zero_symmetric(kin, law.specific_volume)
 
 
-@jacobian.on(Rigid)
+@laws.jacobian.on(Rigid)
 def _jacobian_rigid(law, kin, state):
     return real(1, law.specific_volume)
 
 
-@wave_speed_squared.on(Rigid)
-@energy_density.on(Rigid)
+@laws.wave_speed_squared.on(Rigid)
+@laws.energy_density.on(Rigid)
 def _energy_density_rigid(law, kin, state):
     return real(0, law.specific_volume)

@@ -4,26 +4,8 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.tuples import following, leading
+from karamelo_py.points import laws
 from karamelo_py.points.kinematics import add_pressure
-from karamelo_py.points.laws import (
-    advance,
-    cauchy_stress,
-    column,
-    conductivity,
-    deformation,
-    elastic_strain,
-    energy_density,
-    heat_capacity,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    specific_volume,
-    temperature,
-    wave_speed_bound,
-    wave_speed_squared,
-    with_stress,
-    with_temperature,
-)
 from karamelo_py.points.laws.elasticity import LameParameters
 from karamelo_py.points.laws.temperatures import Warm, initial_heat, thermal_pressure
 from karamelo_py.script.errors import ScriptError
@@ -66,7 +48,7 @@ def expanding(
     return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, 0.0))
 
 
-column(Expansion, "T", temperature)
+laws.column(Expansion, "T", laws.temperature)
 
 
 @initial_heat.on(Expansion)
@@ -82,7 +64,7 @@ def _thermal_pressure_expansion(heat, T):
 @shared
 def mechanical(law, kin, state):
     """The state of the elastic law."""
-    return leading(state, initial_state(law.elastic, kin, law.heat.alpha))
+    return leading(state, laws.initial_state(law.elastic, kin, law.heat.alpha))
 
 
 @shared
@@ -97,93 +79,93 @@ def thermal_pressure_of(law, kin, state):
     return thermal_pressure(law.heat, heat_of(law, kin, state))[0]
 
 
-@initial_state.on(Thermoelastic)
+@laws.initial_state.on(Thermoelastic)
 def _initial_state_thermoelastic(law, kin, like):
-    return initial_state(law.elastic, kin, like) + (initial_heat(law.heat, like).T,)
+    return laws.initial_state(law.elastic, kin, like) + (initial_heat(law.heat, like).T,)
 
 
-@advance.on(Thermoelastic)
+@laws.advance.on(Thermoelastic)
 def _advance_thermoelastic(law, kin, state, dl, dt):
-    new = advance(law.elastic, kin, mechanical(law, kin, state), dl, dt)
+    new = laws.advance(law.elastic, kin, mechanical(law, kin, state), dl, dt)
     return new + heat_of(law, kin, state)
 
 
-@cauchy_stress.on(Thermoelastic)
+@laws.cauchy_stress.on(Thermoelastic)
 def _cauchy_stress_thermoelastic(law, kin, state):
-    elastic = cauchy_stress(law.elastic, kin, mechanical(law, kin, state))
+    elastic = laws.cauchy_stress(law.elastic, kin, mechanical(law, kin, state))
     return add_pressure(kin, real(1, elastic[0]), elastic, -thermal_pressure_of(law, kin, state))
 
 
-@kirchhoff_stress.on(Thermoelastic)
+@laws.kirchhoff_stress.on(Thermoelastic)
 def _kirchhoff_stress_thermoelastic(law, kin, state):
-    elastic = kirchhoff_stress(law.elastic, kin, mechanical(law, kin, state))
-    p = jacobian(law, kin, state) * thermal_pressure_of(law, kin, state)
+    elastic = laws.kirchhoff_stress(law.elastic, kin, mechanical(law, kin, state))
+    p = laws.jacobian(law, kin, state) * thermal_pressure_of(law, kin, state)
     return add_pressure(kin, real(1, p), elastic, -p)
 
 
-@jacobian.on(Thermoelastic)
+@laws.jacobian.on(Thermoelastic)
 def _jacobian_thermoelastic(law, kin, state):
-    return jacobian(law.elastic, kin, mechanical(law, kin, state))
+    return laws.jacobian(law.elastic, kin, mechanical(law, kin, state))
 
 
-@deformation.on(Thermoelastic)
+@laws.deformation.on(Thermoelastic)
 def _deformation_thermoelastic(law, kin, state):
-    return deformation(law.elastic, kin, mechanical(law, kin, state))
+    return laws.deformation(law.elastic, kin, mechanical(law, kin, state))
 
 
-@wave_speed_squared.on(Thermoelastic)
+@laws.wave_speed_squared.on(Thermoelastic)
 def _wave_speed_squared_thermoelastic(law, kin, state):
-    return wave_speed_squared(law.elastic, kin, mechanical(law, kin, state))
+    return laws.wave_speed_squared(law.elastic, kin, mechanical(law, kin, state))
 
 
-@wave_speed_bound.on(Thermoelastic)
+@laws.wave_speed_bound.on(Thermoelastic)
 def _wave_speed_bound_thermoelastic(law, kin, state):
-    return wave_speed_bound(law.elastic, kin, mechanical(law, kin, state))
+    return laws.wave_speed_bound(law.elastic, kin, mechanical(law, kin, state))
 
 
-@energy_density.on(Thermoelastic)
+@laws.energy_density.on(Thermoelastic)
 def _energy_density_thermoelastic(law, kin, state):
     """What unloading gives back at this temperature."""
-    j = jacobian(law, kin, state)
-    elastic = energy_density(law.elastic, kin, mechanical(law, kin, state))
+    j = laws.jacobian(law, kin, state)
+    elastic = laws.energy_density(law.elastic, kin, mechanical(law, kin, state))
     return elastic + thermal_pressure_of(law, kin, state) * (real(1, j) - j)
 
 
-@elastic_strain.on(Thermoelastic)
+@laws.elastic_strain.on(Thermoelastic)
 def _elastic_strain_thermoelastic(law, kin, state):
-    strain = elastic_strain(law.elastic, kin, mechanical(law, kin, state))
+    strain = laws.elastic_strain(law.elastic, kin, mechanical(law, kin, state))
     warmer = heat_of(law, kin, state)[0] - law.heat.initial_temperature
     return add_pressure(kin, real(1, warmer), strain, -law.heat.alpha * warmer)
 
 
-@with_stress.on(Thermoelastic)
+@laws.with_stress.on(Thermoelastic)
 def _with_stress_thermoelastic(law, kin, state, stress):
     p = thermal_pressure_of(law, kin, state)
     elastic = add_pressure(kin, real(1, p), stress, p)
-    new = with_stress(law.elastic, kin, mechanical(law, kin, state), elastic)
+    new = laws.with_stress(law.elastic, kin, mechanical(law, kin, state), elastic)
     return new + heat_of(law, kin, state)
 
 
-@specific_volume.on(Thermoelastic)
+@laws.specific_volume.on(Thermoelastic)
 def _specific_volume_thermoelastic(law):
-    return specific_volume(law.elastic)
+    return laws.specific_volume(law.elastic)
 
 
-@temperature.on(Thermoelastic)
+@laws.temperature.on(Thermoelastic)
 def _temperature_thermoelastic(law, kin, state):
     return heat_of(law, kin, state)[0]
 
 
-@with_temperature.on(Thermoelastic)
+@laws.with_temperature.on(Thermoelastic)
 def _with_temperature_thermoelastic(law, kin, state, T):
     return mechanical(law, kin, state) + (T,)
 
 
-@heat_capacity.on(Thermoelastic)
+@laws.heat_capacity.on(Thermoelastic)
 def _heat_capacity_thermoelastic(law, like):
     return law.heat.cp
 
 
-@conductivity.on(Thermoelastic)
+@laws.conductivity.on(Thermoelastic)
 def _conductivity_thermoelastic(law, like):
     return law.heat.kappa

@@ -11,17 +11,10 @@ from karamelo_py.output.fields import Fields
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.run import timestep
 from karamelo_py.run.advice.facts import Foreseen
 from karamelo_py.run.advice.noise import noises
 from karamelo_py.run.lower.build import warms_by_friction
-from karamelo_py.run.timestep import (
-    USUAL,
-    fastest_wave,
-    keeping_share,
-    lone_point,
-    own_step_of_waves,
-    sparse,
-)
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.fixes.pairs import PairContact
 from karamelo_py.styles.fixes.velocity_particles import VelocityParticles
@@ -73,21 +66,21 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     functions = f"{method.basis_name} functions"
     moves, jumps = method.frame.moves, getattr(method.basis, "gradient_jumps", False)
     share = simulation.dt / simulation.limit
-    keeping = keeping_share(hub)
+    keeping = timestep.keeping_share(hub)
     smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
     if share > 1 + 1e-9:
         return (
             f"the step is {share:.3g} times the stable one",
             "leave set_dt and dt_factor out, or make them smaller",
         )
-    courant, _ = own_step_of_waves(hub, still=False)
+    courant, _ = timestep.own_step_of_waves(hub, still=False)
     borne = courant * _time_across(simulation)
     if update.fixed_dt is not None and simulation.dt > borne * (1 + 1e-9):
-        alone = " of a point that has its nodes for itself" * (courant == lone_point(hub))
+        alone = " of a point that has its nodes for itself" * (courant == timestep.lone_point(hub))
         return (
             f"the step is {simulation.dt / borne:.3g} times the stable one{alone} when nothing has "
             f"moved yet, {borne:.4g}",
-            f"set_dt({USUAL * borne:.3g}) or less, or leave set_dt out",
+            f"set_dt({timestep.USUAL * borne:.3g}) or less, or leave set_dt out",
         )
     if moves and jumps and update.transfer.inverts_spread:
         return f"{transfer} with {functions} in the updated frame", f"FLIP, or {smooth}"
@@ -95,8 +88,8 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
         return "TPIC with linear functions grows where a body moves through the grid", smooth
     if update.anti_locking and moves:
         return "averaged volumes (F-bar) in the updated frame", "leave anti_volumetric_locking out"
-    if keeping < USUAL and share > keeping * (1 + 1e-9):
-        points = " with one point a cell" if sparse(hub) else ""
+    if keeping < timestep.USUAL and share > keeping * (1 + 1e-9):
+        points = " with one point a cell" if timestep.sparse(hub) else ""
         return (
             f"points that go from cell to cell: {transfer}, {functions} and {scheme}{points} at "
             f"{share:.2g} of the stable step",
@@ -131,7 +124,7 @@ def _time_across(simulation: Any) -> float:
 
     Infinite where all are rigid.
     """
-    fastest = fastest_wave(simulation)
+    fastest = timestep.fastest_wave(simulation)
     return float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
 
 

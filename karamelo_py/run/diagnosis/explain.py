@@ -16,14 +16,7 @@ from karamelo_py.points.basis import carried, extent
 from karamelo_py.run.advice.steps import step_was_told
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.rollback import Mark, Marks
-from karamelo_py.run.diagnosis.energy import (
-    IN_ALL,
-    WHOLE,
-    cause_of_gain,
-    grown_little,
-    has_grown,
-    swelling,
-)
+from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.diagnosis.nonfinite import culprit
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import own_step_instead
@@ -77,8 +70,8 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
         return Trouble(message, _smaller_step(hub, simulation) if too_large else hint)
     message, hint, place = Trouble(*_wrong_point(hub, simulation))
     message = f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}"
-    if place is None and has_grown(simulation):
-        cause, cure = cause_of_gain(hub, simulation)
+    if place is None and energy.has_grown(simulation):
+        cause, cure = energy.cause_of_gain(hub, simulation)
         message += f", after energy had come from nowhere. Known to do that here: {cause}"
         hint = _smaller_step(hub, simulation) if too_large else cure
     return Trouble(message, hint, place)
@@ -130,7 +123,7 @@ def _keep_start(hub: Hub, simulation: Simulation, status: int, good: Good) -> st
 def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str:
     """Return to the last good state, write it, end the outputs, and say how to go on from it."""
     step, present = simulation.step, Mark.of_outputs(hub)
-    grown = not grown_little(simulation)
+    grown = not energy.grown_little(simulation)
     if grown:
         _go_back(simulation, good, step)
     else:
@@ -143,7 +136,7 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str
     if status not in (GAINED, HEATED) and step > simulation.step:
         before = simulation.energy()
         good.marks.again(simulation.advance, step)
-        if path is None and simulation.energy() - before > IN_ALL * max(
+        if path is None and simulation.energy() - before > energy.IN_ALL * max(
             abs(before), float(simulation.control.clock[0].energy_floor)
         ):
             # The watch looks at means of a hundred steps, and has not seen it yet.
@@ -175,7 +168,7 @@ def _go_back(simulation: Simulation, good: Good, end: int) -> None:
     while clock.watch_energy and simulation.step + LOOK < end:
         look = simulation.step + LOOK - (simulation.step - 1) % LOOK
         healthy = marks.again(simulation.advance, look) == DONE
-        if not (healthy and grown_little(simulation)):
+        if not (healthy and energy.grown_little(simulation)):
             break
         if clock.balance - before < GROWTH * unit_of(clock):
             snapshot, kept = simulation.snapshot(snapshot), look
@@ -190,7 +183,7 @@ def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
     No smaller step keeps these. Where nobody watches energy, who knows.
     """
     moves = hub.update.method.frame.moves
-    if not (moves and len(simulation.leaving()) and grown_little(simulation)):
+    if not (moves and len(simulation.leaving()) and energy.grown_little(simulation)):
         return False
     step = simulation.step
     simulation.restore(snapshot)
@@ -199,7 +192,7 @@ def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
         simulation.advance(steps)
     gain = simulation.energy() - before
     floor = float(simulation.control.clock[0].energy_floor)
-    healthy = gain <= IN_ALL * max(abs(before), floor) and not simulation.above_limit()
+    healthy = gain <= energy.IN_ALL * max(abs(before), floor) and not simulation.above_limit()
     simulation.advance(1)  # which goes wrong again, for others to look at
     return healthy
 
@@ -233,7 +226,7 @@ def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         )
         return message, "look at the parameters of its material, and at what acts on it from Python"
     given = abs(clock.first_balance) + clock.supplied
-    cause, cure = cause_of_gain(hub, simulation)
+    cause, cure = energy.cause_of_gain(hub, simulation)
     times = (clock.balance - clock.first_balance) / given if given > 0 else np.inf
     message = (
         f"step {simulation.step}, time {simulation.time:.6g}: {times:.3g} times the energy that "
@@ -258,7 +251,7 @@ def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 
 
 def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    (speed, fastest), (volume, widest) = map(simulation.largest, (_speeds, swelling))
+    (speed, fastest), (volume, widest) = map(simulation.largest, (_speeds, energy.swelling))
     message = (
         f"step {simulation.step}, time {simulation.time:.6g}: the stable step has fallen to "
         f"{simulation.limit:.3g}, less than a millionth of the first "
@@ -341,7 +334,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
             return f"{name} at {_place(old)} is thrown out of the domain", smaller
         loose = _loose(simulation, number, old, LOOSE * h)
         why = f", come loose from its solid ({APART}: numerical fracture)," if loose else ""
-        keep = f"; against fracture, {WHOLE}" if loose else ""
+        keep = f"; against fracture, {energy.WHOLE}" if loose else ""
         return (
             f"{name}{why} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",

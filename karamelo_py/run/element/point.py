@@ -6,16 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.points import laws
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.laws import (
-    advance,
-    cauchy_stress,
-    energy_density,
-    initial_state,
-    jacobian,
-    specific_volume,
-    wave_speed_squared,
-)
 from karamelo_py.run.element.load_path import COMPONENTS, LoadPath
 
 # Where the components of the velocity gradient lie in the flat tuples of each kinematics.
@@ -76,7 +68,7 @@ class Point:
 
     def __init__(self, law: NamedTuple, kin: NamedTuple):
         self.law, self.kin = law, kin
-        self.state = initial_state(law, kin, 1.0)
+        self.state = laws.initial_state(law, kin, 1.0)
         self.strain = np.zeros(6)
         self.time = 0.0
         self.work = 0.0
@@ -92,7 +84,7 @@ class Point:
         return self._stress(self.state)
 
     def _stress(self, state: tuple) -> np.ndarray:
-        found = cauchy_stress(self.law, self.kin, state)
+        found = laws.cauchy_stress(self.law, self.kin, state)
         return np.pad(found, (0, 6 - len(found)))
 
     def follow(self, path: LoadPath, observe: Callable[[], None]) -> None:
@@ -147,12 +139,12 @@ class Point:
         def state_after(unknown: np.ndarray) -> tuple:
             increment[prescribed] = unknown
             dl = self._flat(self._strained(increment, motion) + rigid)
-            return advance(self.law, self.kin, self.state, dl, dt)
+            return laws.advance(self.law, self.kin, self.state, dl, dt)
 
         def misfit(unknown: np.ndarray) -> np.ndarray:
             try:
                 state = state_after(unknown)
-                if jacobian(self.law, self.kin, state) > 0:
+                if laws.jacobian(self.law, self.kin, state) > 0:
                     return self._stress(state)[prescribed] - target
             except (ArithmeticError, ValueError):
                 pass  # a logarithm of what is turned inside out, an overflow
@@ -161,7 +153,9 @@ class Point:
         unknown = self._newton(misfit, rate * (b - a), increment, target)
         try:
             new = state_after(unknown)
-            sound = jacobian(self.law, self.kin, new) > 0 and np.isfinite(self._stress(new)).all()
+            sound = (
+                laws.jacobian(self.law, self.kin, new) > 0 and np.isfinite(self._stress(new)).all()
+            )
         except (ArithmeticError, ValueError):
             sound = False
         if not sound:
@@ -212,8 +206,8 @@ class Point:
 
     def _modulus(self) -> float:
         """Density times the square of the speed of waves."""
-        volume = specific_volume(self.law) * jacobian(self.law, self.kin, self.state)
-        return wave_speed_squared(self.law, self.kin, self.state) / volume
+        volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
+        return laws.wave_speed_squared(self.law, self.kin, self.state) / volume
 
     def _strained(self, increment: np.ndarray, motion: Motion) -> np.ndarray:
         """(3, 3) dt grad v of a strain increment: pure, or simple where the motion says so."""
@@ -239,11 +233,11 @@ class Point:
         same_volume = float(roots[np.argmin(np.abs(roots - 1))].real) - 1
         exact = np.sin(angle) / angle * skew + (np.cos(angle) - 1) * np.diag([1, 1, 0])
         forms = [skew, skew + same_volume * np.eye(3), exact]
-        before = energy_density(self.law, self.kin, self.state)
+        before = laws.energy_density(self.law, self.kin, self.state)
 
         def stored(form: np.ndarray) -> float:
-            state = advance(self.law, self.kin, self.state, self._flat(form), dt)
-            return abs(energy_density(self.law, self.kin, state) - before)
+            state = laws.advance(self.law, self.kin, self.state, self._flat(form), dt)
+            return abs(laws.energy_density(self.law, self.kin, state) - before)
 
         return min(forms, key=stored)
 
@@ -254,8 +248,8 @@ class Point:
     def _accept(self, state: tuple, increment: np.ndarray) -> None:
         """Take the new state; the work is that of the mean Kirchhoff stress."""
         weights = np.where(np.arange(6) < 3, 1, 2)
-        before = jacobian(self.law, self.kin, self.state) * self.stress
+        before = laws.jacobian(self.law, self.kin, self.state) * self.stress
         self.state = state
-        after = jacobian(self.law, self.kin, self.state) * self.stress
+        after = laws.jacobian(self.law, self.kin, self.state) * self.stress
         self.work += float(weights * (before + after) / 2 @ increment)
         self.strain = self.strain + increment

@@ -13,27 +13,16 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_on
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.language.faults import fault
+from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
 from karamelo_py.points.kinematics import zero_symmetric
-from karamelo_py.points.laws import (
-    advance,
-    cauchy_stress,
-    elastic_strain,
-    energy_density,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    law_kind,
-    specific_volume,
-    wave_speed_squared,
-)
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.blame import Part, blamed, foreign_parts, is_foreign, part_of_law
 from karamelo_py.scene.hub import Hub
 
-TENSORS = (cauchy_stress, kirchhoff_stress, elastic_strain)
-NUMBERS = (jacobian, wave_speed_squared, energy_density)
+TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
+NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 
 def try_parts(hub: Hub, setup: Any) -> None:
@@ -45,7 +34,7 @@ def try_parts(hub: Hub, setup: Any) -> None:
         Naming the part, its package and its place in the script.
     """
     for solid in hub.solids.values():
-        if any(is_foreign(kind) for kind in law_kind(solid.material.law)):
+        if any(is_foreign(kind) for kind in laws.law_kind(solid.material.law)):
             _try_law(hub, setup, solid)
     basis, transfer = setup.basis, setup.transfer
     if is_foreign(type(basis)):
@@ -86,8 +75,8 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
     for strain in (0, 1e-3):
         dl = (type(one)(strain),) * kin.tensor_size
         with _trial(hub, part):
-            state = initial_state(law, kin, one)
-            after = advance(law, kin, state, dl, one)
+            state = laws.initial_state(law, kin, one)
+            after = laws.advance(law, kin, state, dl, one)
             if len(after) != len(state):
                 what = (
                     f"what a point remembers is {len(state)} numbers at first and {len(after)} "
@@ -98,7 +87,7 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
                 _expect(part, function, function(law, kin, after), size)
             for function in NUMBERS:
                 function(law, kin, after)
-            specific_volume(law)
+            laws.specific_volume(law)
 
 
 def _try_basis(hub: Hub, setup: Any) -> None:

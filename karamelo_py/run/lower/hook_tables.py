@@ -7,16 +7,7 @@ import numpy as np
 from karamelo_py.compiler.addresses import address_of
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 from karamelo_py.compiler.threads import Serial
-from karamelo_py.kernels.arrays import (
-    CLOCK,
-    HELD,
-    HOOK,
-    POST_PARTICLES_TO_GRID,
-    PROGRAM,
-    Apart,
-    Hooks,
-    NoHooks,
-)
+from karamelo_py.kernels import arrays
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
@@ -28,7 +19,9 @@ from karamelo_py.script.expressions import FIRST, POINT_SEEDS
 NO_PROGRAM = (-1, -1, -1, -1)
 
 
-def lower_hooks(hub: Hub, fixes: list, mode: Any = None, threads: int = 1) -> Hooks | NoHooks:
+def lower_hooks(
+    hub: Hub, fixes: list, mode: Any = None, threads: int = 1
+) -> arrays.Hooks | arrays.NoHooks:
     """Tables of the compiled hooks of `fixes`, in their order; by one thread, or several."""
     dimension = hub.domain.dimension
     count = sum(s.count for s in hub.solids.values())
@@ -38,33 +31,33 @@ def lower_hooks(hub: Hub, fixes: list, mode: Any = None, threads: int = 1) -> Ho
             if isinstance(hook, CompiledHook):
                 builder.add(fix, name, hook)
     if not builder.rows:
-        return NoHooks()
+        return arrays.NoHooks()
     solids = hub.solids.values() if builder.uses_first else ()
-    return Hooks(
+    return arrays.Hooks(
         evaluate=address_of(evaluate_in_table, EVALUATE),
-        table=np.array(builder.rows, HOOK).view(np.recarray),
-        programs=np.array(builder.programs, PROGRAM).view(np.recarray),
+        table=np.array(builder.rows, arrays.HOOK).view(np.recarray),
+        programs=np.array(builder.programs, arrays.PROGRAM).view(np.recarray),
         members=np.concatenate([np.empty(0, np.int64), *builder.members]),
         code=np.concatenate([np.empty((0, 2), np.int64), *builder.code]),
         constants=np.concatenate([np.empty(0), *builder.constants]),
         x0=np.concatenate([np.empty((0, dimension)), *(s.x0 for s in solids)]),
         chosen=np.zeros(BLOCK, np.int64),
         scratch=np.zeros((STACK + ROWS, BLOCK)),
-        held=np.zeros((builder.shared_nodes(), dimension), HELD).view(np.recarray),
+        held=np.zeros((builder.shared_nodes(), dimension), arrays.HELD).view(np.recarray),
         loads=np.zeros((builder.loaded_nodes, dimension)),
         mode=mode or Serial(),
         apart=_apart(threads if threads > 1 else 0, len(hub.values.array)),
     )
 
 
-def _apart(threads: int, values: int) -> Apart:
+def _apart(threads: int, values: int) -> arrays.Apart:
     """Room for what threads have of their own, with space between the values of two."""
-    return Apart(
+    return arrays.Apart(
         chosen=np.zeros((threads, BLOCK), np.int64),
         scratch=np.zeros((threads, STACK + ROWS, BLOCK)),
         values=np.zeros((threads, values + 16)),
         totals=np.zeros((threads, values, LIMBS), np.int64),
-        clock=np.zeros((threads, 1), CLOCK).view(np.recarray),
+        clock=np.zeros((threads, 1), arrays.CLOCK).view(np.recarray),
     )
 
 
@@ -108,7 +101,7 @@ class _Builder:
         self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
         if hook.holds and hook.on_nodes:
             self.holding.append(fix)
-        if STAGES[moment] == POST_PARTICLES_TO_GRID:
+        if STAGES[moment] == arrays.POST_PARTICLES_TO_GRID:
             self.loaded_nodes = fix.group.total()
 
     def shared_nodes(self) -> int:

@@ -7,8 +7,8 @@ import numpy as np
 
 from karamelo_py.compiler.addresses import address_of_python
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
+from karamelo_py.kernels import ranks
 from karamelo_py.kernels.arrays import DT, Control
-from karamelo_py.kernels.ranks import CALL, GIVE, LARGEST, NEXT, NUMBER, SWEEP, TAKE, TOTALS
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.mpi.crew import Crew
 from karamelo_py.run.mpi.load import Work
@@ -35,17 +35,17 @@ class Answers:
     def __init__(self, crew: Crew, control: Control, work: Work):
         self.crew, self.control, self.work = crew, control, work
         self.due: set[int] = set()
-        self.address = address_of_python(self.answer, CALL)
+        self.address = address_of_python(self.answer, ranks.CALL)
 
     def answer(self, what: int, a: int, b: int) -> int:
         """What kernels ask of the other processes (karamelo_py.kernels.ranks)."""
         try:
             self.work.note()
             found = self._answers[what](self, a, b) or 0
-            if what == NEXT:
+            if what == ranks.NEXT:
                 self.work.next_block()
             else:
-                self.work.resume(0 if what in {SWEEP, GIVE} else None)
+                self.work.resume(0 if what in {ranks.SWEEP, ranks.GIVE} else None)
             return found
         except BaseException as error:
             # Nothing can be raised through a kernel, and the others wait.
@@ -88,8 +88,8 @@ class Answers:
         return int(self.crew.added(np.array([number]))[0])
 
     _answers: ClassVar[dict[int, Callable]] = {
-        SWEEP: _go_on, NEXT: _go_on, GIVE: _give, TAKE: _take, TOTALS: _totals,
-        LARGEST: _largest, NUMBER: _number,
+        ranks.SWEEP: _go_on, ranks.NEXT: _go_on, ranks.GIVE: _give, ranks.TAKE: _take,
+        ranks.TOTALS: _totals, ranks.LARGEST: _largest, ranks.NUMBER: _number,
     }  # fmt: skip
 
 

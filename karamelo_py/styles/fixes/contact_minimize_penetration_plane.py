@@ -9,18 +9,11 @@ from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes import tools
 from karamelo_py.styles.fixes.friction import judge_friction
-from karamelo_py.styles.fixes.tools import (
-    Bodies,
-    PointForceFix,
-    apart,
-    place,
-    rubbed,
-    unit,
-)
 
 
-class ContactMinimizePenetrationPlane(PointForceFix):
+class ContactMinimizePenetrationPlane(tools.PointForceFix):
     """Let a solid touch a fixed plane, as stiffly as the step allows, with friction.
 
     Parameters
@@ -67,14 +60,14 @@ class ContactMinimizePenetrationPlane(PointForceFix):
         super().__init__(hub, ParticleGroup.of(hub, solid))
         self.mu = mu
         judge_friction(hub, mu)
-        self.origin = place(hub, x, y, z)
-        self.normal = place(hub, nx, ny, nz, "n")
+        self.origin = tools.place(hub, x, y, z)
+        self.normal = tools.place(hub, nx, ny, nz, "n")
         if not hub.rehearsing:  # which does not know all numbers
-            unit(self.now(self.normal))
+            tools.unit(self.now(self.normal))
 
-    def push(self, bodies: Bodies) -> np.ndarray:
+    def push(self, bodies: tools.Bodies) -> np.ndarray:
         """See `PointForceFix.push`."""
-        normal = unit(self.now(self.normal))[None, :]
+        normal = tools.unit(self.now(self.normal))[None, :]
         depth = bodies.side / 2 - (bodies.x - self.now(self.origin)) @ normal[0]
-        push = apart(bodies, depth, normal)
-        return push + rubbed(bodies, push, normal, np.zeros(len(normal[0])), self.mu)
+        push = tools.apart(bodies, depth, normal)
+        return push + tools.rubbed(bodies, push, normal, np.zeros(len(normal[0])), self.mu)

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.fields import field
+from karamelo_py.kernels import pairs
 from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.kernels.pairs import Bodies, cells_for, collect, extend, pick, push_apart
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -93,7 +93,7 @@ class PairContact(Fix):
         extents = np.full((2, 7), -np.inf)
         for block in s.blocks:
             x = block.points.x[simulation.now]
-            extend(s.kin, x, block.points, block.laws, *self._ranges, extents)
+            pairs.extend(s.kin, x, block.points, block.laws, *self._ranges, extents)
         extents = simulation.most(extents)
         width = min(extents[:, 6].sum(), self._reach)
         low, high = -extents[:, :d].min(axis=0) - width, extents[:, 3 : 3 + d].min(axis=0) + width
@@ -103,14 +103,14 @@ class PairContact(Fix):
         """Rows of the points of a block that lie between two corners."""
         points, rows = block.points, np.empty(block.points.id.size, np.int64)
         x = points.x[simulation.now]
-        return rows[: pick(simulation.kin, x, points, *self._ranges, *corners, rows)].copy()
+        return rows[: pairs.pick(simulation.kin, x, points, *self._ranges, *corners, rows)].copy()
 
     @staticmethod
     def _known(simulation: Any, block: Block, rows: np.ndarray) -> np.ndarray:
         """Numbers, masses, radii, positions and velocities of some points."""
         kin, x = simulation.kin, block.points.x[simulation.now]
         found = np.empty((len(rows), 3 + 2 * kin.dimension))
-        collect(kin, x, block.points, block.laws, rows, found)
+        pairs.collect(kin, x, block.points, block.laws, rows, found)
         return found
 
     def _push(self, kin: Any, dt: float, kick: float, found: list[np.ndarray]) -> list[tuple]:
@@ -122,8 +122,8 @@ class PairContact(Fix):
         n, total = len(order), np.zeros(3)
         _, mass, radius, *both = np.ascontiguousarray(of_all[order].T)
         x, v = (np.stack(part, axis=1) for part in (both[:d], both[d:]))
-        bodies = Bodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
-        push_apart(self.law(), kin, bodies, cells_for(n), self._reach, dt, kick, total)
+        bodies = pairs.Bodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
+        pairs.push_apart(self.law(), kin, bodies, pairs.cells_for(n), self._reach, dt, kick, total)
         force = np.empty((n, d))
         force[order] = bodies.force
         ends = np.cumsum([len(one) for one in found])[:-1]

@@ -6,16 +6,9 @@ import numpy as np
 
 from karamelo_py.language.by_dimension import Forms, place_of
 from karamelo_py.language.signature import Argument
+from karamelo_py.scene import region
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.region import (
-    Region,
-    below,
-    check_order,
-    check_radius,
-    split_exterior,
-    within,
-)
 
 FORMS = Forms(
     "region(ID, cylinder, {names}[, exterior])",
@@ -25,7 +18,7 @@ FORMS = Forms(
 )
 
 
-class Cylinder(Region):
+class Cylinder(region.Region):
     """A disk in 2D, a cylinder along one of the axes in 3D; its surface belongs to it.
 
     Parameters
@@ -52,12 +45,12 @@ class Cylinder(Region):
     syntax = "xc, yc, R | axis, c1, c2, R, lo, hi[, exterior]"
 
     def __init__(self, hub: Hub, *shape: Argument):
-        given, exterior = split_exterior(shape)
+        given, exterior = region.split_exterior(shape)
         dimension = require_domain(hub).dimension
         values = FORMS.read(hub, given, dimension)
         names = FORMS.names[dimension]
         self.radius = values["R"]
-        check_radius(self.radius, place_of(names, given, "R"))
+        region.check_radius(self.radius, place_of(names, given, "R"))
         if dimension == 2:
             self.along = None
             self.across = (0, 1)
@@ -68,7 +61,7 @@ class Cylinder(Region):
             self.across = tuple(axis for axis in range(3) if axis != self.along)
             self.centre = (values["c1"], values["c2"])
             self.ends = (values["lo"], values["hi"])
-            check_order(*self.ends, ("lo", "hi"), place_of(names, given, "lo"))
+            region.check_order(*self.ends, ("lo", "hi"), place_of(names, given, "lo"))
         lo, hi = np.empty(dimension), np.empty(dimension)
         for axis, middle in zip(self.across, self.centre, strict=True):
             lo[axis], hi[axis] = middle - self.radius, middle + self.radius
@@ -78,7 +71,7 @@ class Cylinder(Region):
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Which positions lie in the cylinder, see `Region.contains`."""
-        inside = within(x, self.centre, self.across, self.radius + self.tolerance)
+        inside = region.within(x, self.centre, self.across, self.radius + self.tolerance)
         if self.along is not None:
             inside &= x[:, self.along] >= self.ends[0] - self.tolerance
             inside &= x[:, self.along] <= self.ends[1] + self.tolerance
@@ -86,7 +79,7 @@ class Cylinder(Region):
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         """How far positions lie below the surface, see `Region.distance`."""
-        depth = below(x, self.centre, self.across, self.radius)
+        depth = region.below(x, self.centre, self.across, self.radius)
         if self.along is not None:
             depth = np.minimum(depth, x[:, self.along] - self.ends[0])
             depth = np.minimum(depth, self.ends[1] - x[:, self.along])

@@ -6,14 +6,7 @@ from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.kinematics import contract, deviator, zero_symmetric
-from karamelo_py.points.laws.strengths import (
-    damped_speed_squared,
-    initial_loss,
-    shear_energy,
-    shear_modulus,
-    shear_response,
-    shear_strain,
-)
+from karamelo_py.points.laws import strengths
 from karamelo_py.points.laws.viscosity import damped
 
 
@@ -51,33 +44,33 @@ class Viscous(NamedTuple):
         return cls(mu, 0.0)
 
 
-@initial_loss.on(Viscous)
+@strengths.initial_loss.on(Viscous)
 def _initial_loss_viscous(strength, like):
     return (real(0, like),)
 
 
-@shear_response.on(Viscous)
+@strengths.shear_response.on(Viscous)
 def _shear_response_viscous(strength, kin, s, strain, memory, heat, dt):
     new = scale(real(2, dt) * strength.mu / dt, deviator(kin, strain))
     return new, memory, contract(kin, new, strain)
 
 
-@damped_speed_squared.on(Viscous)
+@strengths.damped_speed_squared.on(Viscous)
 def _damped_speed_squared_viscous(strength, squared, density):
     # nu = 4/3 mu/rho
     return damped(squared, real(4 / 3, density) * strength.mu / (density * strength.cell_size))
 
 
-@shear_modulus.on(Viscous)
+@strengths.shear_modulus.on(Viscous)
 def _shear_modulus_viscous(strength):
     return real(0, strength.mu)
 
 
-@shear_strain.on(Viscous)
+@strengths.shear_strain.on(Viscous)
 def _shear_strain_viscous(strength, kin, s):
     return zero_symmetric(kin, strength.mu)
 
 
-@shear_energy.on(Viscous)
+@strengths.shear_energy.on(Viscous)
 def _shear_energy_viscous(strength, kin, s):
     return real(0, strength.mu)
