@@ -52,7 +52,7 @@ class Meanings:
     def means_something(self, name: str) -> bool:
         """Whether a name can stand in a script here, be it as a call or further down."""
         known = self.knows(name) or name in WORDS or name in FUNCTIONS
-        return known or registry.knows("command", name) or defined_later(self, name) is not None
+        return known or registry.knows("command", name) or bool(defined_later(self, name, None))
 
     def command(self, node: Function, raw: Raw) -> Value:
         """The value of a call inside an expression that is not a function."""

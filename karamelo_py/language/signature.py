@@ -39,7 +39,7 @@ from karamelo_py.language.kinds import (
 )
 from karamelo_py.language.own_words import longer
 from karamelo_py.script.errors import Place, ScriptError, meant, nearest
-from karamelo_py.script.other_programs import OTHERWISE, SURPLUS
+from karamelo_py.script.other_programs import table
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
@@ -220,11 +220,13 @@ def _bind(
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
         gap = with_gap(given)
-        hint = longer(name, given) or OTHERWISE.get(name) if len(given) < needed else None
+        hint = (
+            longer(name, given) or table()["otherwise"].get(name) if len(given) < needed else None
+        )
         if surplus is not None:
             values = {word: f"{p.name}={word}" for p in by_name.values() for word in p.kind.words}
             word = surplus.text if surplus.text in values else nearest(surplus.text, values)
-            hint = values.get(word or "", hint) or SURPLUS.get(name)
+            hint = values.get(word or "", hint) or table()["surplus"].get(name)
         if gap:
             hint = f"is a comma missing in '{gap.text}'?"
         left_out = _left_out(slots[:needed], given) if len(given) < needed and not gap else []

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.script.lammps import line_of, with_name
 from karamelo_py.script.mistakes import CLOSES_NOTHING, Mistake, open_parenthesis, open_quote
-from karamelo_py.script.other_programs import OTHERWISE, instead
+from karamelo_py.script.other_programs import instead, table
 
 _REMEDIES = {
     ";": "one statement per line, without ;",
@@ -267,7 +267,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
         return NO_BLOCKS
     if own := line_of(name, words):
         return own
-    if other := OTHERWISE.get(name) or instead("command", name):
+    if other := table()["otherwise"].get(name) or instead("command", name):
         return other
     if name in ("fix", "compute") and len(words) > 2:
         other = instead(name, words[2]) or ""
