@@ -22,7 +22,7 @@ from typing import Any, Literal, get_type_hints
 
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import NULL, NUMBER, Argument, with_gap
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.kinds import (
     AtLeast,
     Constraint,
@@ -181,9 +181,9 @@ def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> A
     if not inspect.isclass(target):
         if target.__module__.startswith(registry.PREFIX):
             return target(hub, *values, **named)
-        with told(name, "it", target, getattr(hub, "place", None)):
+        with as_script_error(name, "it", target, getattr(hub, "place", None)):
             return target(hub, *values, **named)
-    with told(name, "__init__", target, getattr(hub, "place", None)):
+    with as_script_error(name, "__init__", target, getattr(hub, "place", None)):
         if not is_record(target):
             return target(hub, *values, **named)
         made = getattr(target, "given", target)(*values, **named)

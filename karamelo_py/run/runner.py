@@ -26,8 +26,8 @@ from karamelo_py.run.timestep import (
 )
 from karamelo_py.run.timings import Spent
 from karamelo_py.scene import boundary
-from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import attributed
 from karamelo_py.script.errors import Pause, Quit, ScriptError, render_message
 
 CHUNK = 100  # steps between two looks at the run, and between two snapshots, at most
@@ -102,7 +102,7 @@ class Runner:
             if hub.simulation.follows:
                 hub.simulation.follow()
             else:
-                with self.spent.telling_of_compilation(), blamed(hub), hub.simulation.leading():
+                with self.spent.telling_of_compilation(), attributed(hub), hub.simulation.leading():
                     self._run(hub.simulation)
         finally:
             hub.running = None
