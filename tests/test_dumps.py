@@ -21,7 +21,7 @@ from karamelo_py.styles.dumps.grid_gz import GridGz
 from karamelo_py.styles.dumps.movie import Movie
 from karamelo_py.styles.dumps.particle import Particle
 from karamelo_py.styles.dumps.particle_gz import ParticleGz
-from karamelo_py.styles.dumps.pyplot import PyPlot, Scene
+from karamelo_py.styles.dumps.pyplot import PyPlot
 
 
 @pytest.fixture(params=[1, 2, 3])
@@ -414,11 +414,11 @@ def test_a_ball_is_lit_where_it_faces_the_light(tmp_path):
 def test_points_have_the_size_of_what_they_stand_for(plane):
     """Rings of an axisymmetric scene, too, whose volume is that per radian."""
     dump = PyPlot(plane, 1, "p.png", 4, 3)
-    assert Scene(dump).side == pytest.approx(np.sqrt(0.5 / 40))
+    assert dump.side(dump.snapshot()) == pytest.approx(np.sqrt(0.5 / 40))
     plane.domain.axisymmetric = True
     x = np.linspace(1e-4, 1e-2, 40)
     plane.fields.points |= {"x": x, "volume": x * 0.05**2}
-    assert Scene(dump).side == pytest.approx(0.05)
+    assert dump.side(dump.snapshot()) == pytest.approx(0.05)
 
 
 def test_legend_of_solids_and_units(plane):
@@ -490,7 +490,7 @@ def test_pyplot_refuses_other_formats_and_fields(plane):
 
 
 def test_limits_grow_and_stay():
-    from karamelo_py.styles.dumps.picture import grown
+    from karamelo_py.output.pictures import grown
 
     limits = grown(None, np.array([0.0, 0.9]))
     assert limits[0] <= 0 and limits[1] >= 0.9
