@@ -1,4 +1,4 @@
-"""What a simulation in Python shows: columns by name, and pictures."""
+"""Columns by name, and pictures, as a simulation in Python shows them."""
 
 from collections.abc import Callable, Iterator, Mapping
 from os import PathLike

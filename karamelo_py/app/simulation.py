@@ -202,7 +202,7 @@ class Simulation:
         return [*super().__dir__(), *registry.names("command")]
 
     def _word(self, value: Any) -> str:
-        """What a script would say for `value`."""
+        """Write a value as a script would."""
         if callable(value) and not isinstance(value, type):
             name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
             self.hub.functions[name] = value
@@ -265,7 +265,7 @@ class Simulation:
 
     @property
     def values(self) -> Table:
-        """What fixes and computes publish, now: numbers by name."""
+        """Values that fixes and computes publish, now: numbers by name."""
 
         def read(name: str) -> float:
             if self.hub.solids and self.hub.update.method is not None:

@@ -1,4 +1,4 @@
-"""Where the program begins."""
+"""The begin of the program."""
 
 import sys
 

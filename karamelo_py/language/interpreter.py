@@ -103,12 +103,12 @@ class Interpreter(Meanings):
 
     @property
     def waits(self) -> bool:
-        """Whether a script is in the midst of its statements."""
+        """Tell if a script is in the midst of its statements."""
         return bool(self.frames)
 
     @property
     def has_more(self) -> bool:
-        """Whether statements come behind the present one."""
+        """Tell if statements come behind the present one."""
         return any(frame.next < len(frame.statements) for frame in self.frames)
 
     def include(self, name: str) -> None:

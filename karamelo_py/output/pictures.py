@@ -38,7 +38,7 @@ LIT = 8  # points, from which on they have a surface
 
 
 class Options(NamedTuple):
-    """What a picture shows and how.
+    """Options of a picture.
 
     Attributes
     ----------
@@ -448,7 +448,7 @@ class Space(Plane):
         return colours
 
     def _light(self, counts: np.ndarray) -> np.ndarray:
-        """How much light falls on each cell: a surface looks where there are fewer points."""
+        """Measure the light on each cell: a surface looks where there are fewer points."""
         density = counts.astype(float)
         for axis in range(3):
             for _ in range(2):

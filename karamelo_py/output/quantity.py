@@ -1,4 +1,4 @@
-"""What a log line or a plot reads at each output: anything with a name."""
+"""Quantities that a log line or a plot reads at each output: anything with a name."""
 
 from __future__ import annotations
 

@@ -203,7 +203,7 @@ def _located(error: ScriptError, item: Any) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Whether `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
+    """Tell if `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

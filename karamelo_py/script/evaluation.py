@@ -12,20 +12,20 @@ from karamelo_py.script.terms import REWRITTEN, applied
 
 
 class Scope(Protocol):
-    """Where names and calls of commands get their meaning: the interpreter."""
+    """The scope that gives names and calls of commands their meaning: the interpreter."""
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value:
-        """What a name stands for."""
+        """Find the value of a name."""
 
     def command(self, node: syntax.Function, raw: syntax.Raw) -> Value:
         """The value of a call that is not a function."""
 
     def hides(self, name: str) -> bool:
-        """Whether the script uses the name of a function for something else."""
+        """Tell if the script uses the name of a function for something else."""
 
 
 def evaluate(node: syntax.Node, raw: syntax.Raw, scope: Scope) -> Value:
-    """What the tree of `raw` stands for: a number, a text or a formula.
+    """Evaluate the tree of `raw`: to a number, a text or a formula.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def _function(node: syntax.Function, raw: syntax.Raw, scope: Scope) -> Value:
 
 
 def usage(name: str) -> str:
-    """How a function is called."""
+    """Write how a function is called."""
     operands = {"if": "condition, a, b", "atan2": "y, x", "min": "a, b, ...", "max": "a, b, ..."}
     return f"{name}({operands.get(name) or ('a, b' if FUNCTIONS[name].least == 2 else 'a')})"
 

@@ -1,4 +1,4 @@
-"""What a script looks like once it is read: statements, raw arguments, expression trees."""
+"""A script once it is read: statements, raw arguments, expression trees."""
 
 import re
 from bisect import bisect_right
@@ -118,7 +118,7 @@ class Raw:
 
     @property
     def place(self) -> Place:
-        """Where it stands."""
+        """The place in the script."""
         return self.source.place(self.start, self.end)
 
 
