@@ -88,7 +88,7 @@ def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
 
 
 def _rendered(error: BaseException) -> str:
-    """Write an exception for the user: no traceback, also where the fault is ours or of a plug-in."""
+    """Write an exception for the user: no traceback, also where the fault is not the user's."""
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, MemoryError):

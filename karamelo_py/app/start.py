@@ -1,4 +1,4 @@
-"""The begin of the program."""
+"""The start of the program."""
 
 import sys
 
