@@ -16,7 +16,7 @@ from karamelo_py.output.rhythm import ByTime, is_due, next_step
 from karamelo_py.output.units import Units
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.dumps import lammps
-from karamelo_py.styles.dumps.grid import Grid
+from karamelo_py.styles.dumps.grid import GridDump
 from karamelo_py.styles.dumps.grid_gz import GridGz
 from karamelo_py.styles.dumps.movie import Movie
 from karamelo_py.styles.dumps.particle import Particle
@@ -89,7 +89,7 @@ def test_ovito_reads_particles(hub, style, name):
         assert data.cell.volume > 0
 
 
-@pytest.mark.parametrize("style", [Grid, GridGz])
+@pytest.mark.parametrize("style", [GridDump, GridGz])
 def test_ovito_reads_grid(hub, style):
     io = pytest.importorskip("ovito.io", exc_type=ImportError)
     ending = "gz" if style is GridGz else "dump"
@@ -101,7 +101,7 @@ def test_ovito_reads_grid(hub, style):
 
 
 def test_grid_without_empty_nodes(plane):
-    Grid(plane, 1, "g.dump", "mass", occupied=True).write()
+    GridDump(plane, 1, "g.dump", "mass", occupied=True).write()
     table = np.loadtxt((plane.folder / "g.dump").read_text().splitlines()[11:])
     keep = plane.fields.node("mass") > 0
     np.testing.assert_array_equal(table[:, 0], np.flatnonzero(keep))

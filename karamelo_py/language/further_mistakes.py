@@ -15,7 +15,7 @@ from karamelo_py.language.unknown import unknown_call
 from karamelo_py.script.errors import Quit, ScriptError, nearest, plural
 from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.other_programs import instead
-from karamelo_py.script.syntax import Assignment, Call, Statement
+from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MOST = 9
 MOST_OF_TEXT = 200  # a script of another program is wrong in every line
@@ -43,7 +43,7 @@ class Dependents:
         """Note what `statement` would have defined; False where nothing can be said any more."""
         if isinstance(statement, Assignment):
             self.names.add(statement.name)
-        if not isinstance(statement, Call):
+        if not isinstance(statement, CommandCall):
             return True
         name = statement.name
         if not registry.knows("command", name):
@@ -56,7 +56,7 @@ class Dependents:
             self.names.add(statement.arguments[0].code.strip())
         return True
 
-    def _meant(self, name: str, statement: Call) -> str:
+    def _meant(self, name: str, statement: CommandCall) -> str:
         """Guess the command that an unknown one stands for; else note what it may have made."""
         other = instead("command", name)
         if other is None and (close := nearest(name, registry.names("command"))):
@@ -151,7 +151,7 @@ def misnamed(interpreter: Any, statements: Iterable[Statement]) -> list[ScriptEr
     variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}
     found = []
     for statement in statements:
-        if not isinstance(statement, Call) or statement.name in variables:
+        if not isinstance(statement, CommandCall) or statement.name in variables:
             continue
         try:
             _look_up(interpreter, statement, variables)
@@ -161,7 +161,7 @@ def misnamed(interpreter: Any, statements: Iterable[Statement]) -> list[ScriptEr
     return found
 
 
-def _look_up(interpreter: Any, statement: Call, variables: set[str]) -> None:
+def _look_up(interpreter: Any, statement: CommandCall, variables: set[str]) -> None:
     name, arguments = statement.name, statement.arguments
     if name not in FUNCTIONS and not registry.knows("command", name):
         raise unknown_call(interpreter, name, statement.place, statement=True)

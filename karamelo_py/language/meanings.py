@@ -8,7 +8,7 @@ from karamelo_py.script import evaluation
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import SEEDS, Expression, Value
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
-from karamelo_py.script.syntax import Function, Name, Node, Raw
+from karamelo_py.script.syntax import FunctionCall, Name, Node, Raw
 from karamelo_py.script.terms import number_text
 
 
@@ -54,7 +54,7 @@ class Meanings:
         known = self.knows(name) or name in WORDS or name in FUNCTIONS
         return known or registry.knows("command", name) or bool(defined_later(self, name, None))
 
-    def command(self, node: Function, raw: Raw) -> Value:
+    def command(self, node: FunctionCall, raw: Raw) -> Value:
         """The value of a call inside an expression that is not a function."""
         name = node.name
         begin = raw.start + node.start

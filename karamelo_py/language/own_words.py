@@ -5,7 +5,7 @@ from typing import Any
 
 from karamelo_py.language import registry
 from karamelo_py.script.other_programs import table
-from karamelo_py.script.syntax import Call
+from karamelo_py.script.syntax import CommandCall
 
 # Words that stood in the place of the style region in 2020, and what fills the same.
 SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
@@ -17,15 +17,15 @@ FLIPS = ("FLIP", "AFLIP", "ASFLIP")
 
 def words_of(statement: Any) -> list[str]:
     """List the arguments of a call, as they are written."""
-    arguments = statement.arguments if isinstance(statement, Call) else ()
+    arguments = statement.arguments if isinstance(statement, CommandCall) else ()
     return [" ".join(argument.code.split()) for argument in arguments]
 
 
 def in_own_words(script: Any, name: str) -> str | None:
     """Write the line for a command of Karamelo that a script calls and that is not one here."""
-    calls = [s for frame in script.frames for s in frame.statements if isinstance(s, Call)]
+    calls = [s for frame in script.frames for s in frame.statements if isinstance(s, CommandCall)]
     own = next((call for call in calls if call.name == "method"), None)
-    asked = [c for c in (script.statement, *calls) if isinstance(c, Call) and c.name == name]
+    asked = [c for c in (script.statement, *calls) if isinstance(c, CommandCall) and c.name == name]
     before, rest = words_of(own), words_of(asked[0] if asked else None)
     where = f"in the place of line {own.place.line}" if own else "before the first solid"
     if name == "method_modify" and rest:

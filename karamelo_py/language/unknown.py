@@ -14,7 +14,7 @@ from karamelo_py.script.expression_mistakes import BLOCKS, NO_BLOCKS
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.other_programs import instead, of_karamelo, table
-from karamelo_py.script.syntax import Assignment, Call, Statement
+from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 if TYPE_CHECKING:
     from karamelo_py.language.interpreter import Interpreter as Script
@@ -165,7 +165,7 @@ def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, in
             line = statement.place.line
             if isinstance(statement, Assignment):
                 yield statement, "", statement.name, line
-            elif isinstance(statement, Call) and statement.arguments:
+            elif isinstance(statement, CommandCall) and statement.arguments:
                 yield statement, statement.name, statement.arguments[0].code.strip(), line
 
 

@@ -74,7 +74,7 @@ class Options(NamedTuple):
     lengths: str = ""
 
 
-class Marks(Artist):
+class DrawnPoints(Artist):
     """The points of one state: some of them are drawn after others."""
 
     def __init__(self, picture: Picture):
@@ -119,7 +119,7 @@ class Picture:
         self.axes.tick_params(labelsize=8)
         self.title = self.axes.set_title("step 0, time 0", fontsize=9)
         self.artist = self._prepare()
-        self.marks = Marks(self)
+        self.marks = DrawnPoints(self)
         self.axes.add_artist(self.marks)
         if not options.axes:
             self.axes.set_axis_off()
@@ -284,7 +284,7 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
 
 def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> Picture:
     """The picture that suits the domain's dimension."""
-    kind = {1: Line, 2: Plane, 3: Space}[domain.dimension]
+    kind = {1: LinePicture, 2: PlanePicture, 3: SpacePicture}[domain.dimension]
     return kind(domain, size, dpi, options)
 
 
@@ -306,7 +306,7 @@ def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
     ]
 
 
-class Plane(Picture):
+class PlanePicture(Picture):
     """2D: the points where they are."""
 
     def _prepare(self) -> Any:
@@ -364,7 +364,7 @@ class Plane(Picture):
         return colormaps[self.options.cmap](rows[2])
 
 
-class Space(Plane):
+class SpacePicture(PlanePicture):
     """3D: the points seen from outside, the farthest first, in the frame of the domain."""
 
     def _prepare(self) -> Any:
@@ -465,7 +465,7 @@ class Space(Plane):
         return light
 
 
-class Line(Picture):
+class LinePicture(Picture):
     """1D: the field over x."""
 
     def _prepare(self) -> Any:

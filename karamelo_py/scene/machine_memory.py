@@ -135,7 +135,7 @@ def in_words(count: float) -> str:
     return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
 
 
-class TooLarge(NamedTuple):
+class MemoryShortage(NamedTuple):
     """A scene that needs more than is there.
 
     Attributes

@@ -66,7 +66,7 @@ def _name(ID: str) -> str:
     return f"n{ID}" if re.fullmatch(r"\d\w*", ID) else ID
 
 
-class _Words(str):
+class _WordList(str):
     """Words that a template writes with commas between them, as IDs where it asks for these."""
 
     def __format__(self, spec: str) -> str:
@@ -87,7 +87,7 @@ def _filled(template: str, match: re.Match) -> str | None:
         more["pull"] = _pull(*(float(word) for word in found["pull"].split() if word != "vector"))
     if more.get("pull", "") is None:
         return None
-    return template.format(*map(_Words, match.groups(default="")), **more) or None
+    return template.format(*map(_WordList, match.groups(default="")), **more) or None
 
 
 def _pull(size: float, *direction: float) -> str | None:
@@ -174,15 +174,15 @@ def _one_order(node: syntax.Node) -> bool:
     """
 
     def power(operand: syntax.Node) -> bool:
-        bare = isinstance(operand, syntax.Binary) and operand.end == operand.right.end
+        bare = isinstance(operand, syntax.BinaryOperation) and operand.end == operand.right.end
         return bare and operand.operator == "^"
 
-    if isinstance(node, syntax.Unary):
+    if isinstance(node, syntax.UnaryOperation):
         return not power(node.operand) and _one_order(node.operand)
-    if isinstance(node, syntax.Binary):
+    if isinstance(node, syntax.BinaryOperation):
         chained = node.operator == "^" and power(node.right)
         return not chained and _one_order(node.left) and _one_order(node.right)
-    if isinstance(node, syntax.Function):
+    if isinstance(node, syntax.FunctionCall):
         takes, given = FUNCTIONS[node.name], len(node.operands)
         return takes.least <= given <= takes.most and all(map(_one_order, node.operands))
     return True

@@ -12,7 +12,7 @@ from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, p
 from karamelo_py.run.lower.sizes import point_fields
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import (
-    TooLarge,
+    MemoryShortage,
     machine_memory,
     on_machine,
     share_of_machine,
@@ -50,7 +50,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         there = machine_memory(on_machine(hub)) or there
     if need <= there.free:
         return
-    found = TooLarge(
+    found = MemoryShortage(
         plural(count, "point"),
         need,
         hub.domain.dimension,
