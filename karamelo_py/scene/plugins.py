@@ -11,8 +11,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import Undefined
 from karamelo_py.compiler.fields import columns_of
+from karamelo_py.compiler.trace import Undefined, places_of
 from karamelo_py.kernels import table
 from karamelo_py.kernels.hooks import ACTS_ON, STAGES, CompiledHook
 from karamelo_py.language import faults, registry
@@ -268,9 +268,7 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
         if isinstance(error, Undefined):
             found = [(part, "") for part in own if part.kind in error.classes]
         else:
-            places = [
-                (_owner(own, f), f" ({Path(f).name}:{k})") for f, k in faults.places_of(error)
-            ]
+            places = [(_owner(own, f), f" ({Path(f).name}:{k})") for f, k in places_of(error)]
             found = [(part, place) for part, place in places if part is not None]
         found += [(usual, "")] if usual else []
         if not found:
