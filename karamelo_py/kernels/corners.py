@@ -8,7 +8,7 @@ what the nodes around it have, and shares out among them what it is given.
 from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import g2p, p2g
-from karamelo_py.kernels.loss import Lost
+from karamelo_py.kernels.loss import DissipatedEnergy
 from karamelo_py.points.basis import carried, support
 from karamelo_py.points.basis.cpdi.block import InBlock
 from karamelo_py.points.basis.cpdi.corners import AtCorners
@@ -42,7 +42,7 @@ for _part in (
 
 @by_corners.on(p2g.MassMomentum)
 def _by_corners_mass_momentum(part, w):
-    return _without_moments(part, w) and field(w.nodes.fields, Lost) is None
+    return _without_moments(part, w) and field(w.nodes.fields, DissipatedEnergy) is None
 
 
 @shared

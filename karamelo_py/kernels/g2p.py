@@ -12,7 +12,7 @@ from karamelo_py.compiler.fields import field, increase, load_vector, store, sto
 from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
 from karamelo_py.kernels import averaging, visit
 from karamelo_py.kernels.arrays import of_change
-from karamelo_py.kernels.loss import Rubbed, in_company, reflect, warm, warm_by_friction
+from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
 from karamelo_py.points import frames, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi.corners import AtCorners
@@ -355,7 +355,7 @@ def _move(w, stencil, p, dt, total):
     displacing = transfers.displacing_velocity(w.transfer, v, total[0], j)
     step = scale(dt, constrained_velocity(law, v, displacing))
     y = add_scaled(x, real(1, dt), step)
-    warm_by_friction(field(w.nodes.fields, Rubbed), w, stencil, p, v[0])
+    warm_by_friction(field(w.nodes.fields, FrictionalHeat), w, stencil, p, v[0])
     warm(w, stencil, p, subtract(total[0], total[1]))
     moment = in_company(w, stencil, p, total[2])
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)

@@ -11,10 +11,10 @@ from karamelo_py.kernels import arrays, p2g, table
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.g2p import AverageStress, Move, SeriesTerm
-from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.loss import DissipatedEnergy, FrictionalHeat
 from karamelo_py.kernels.moments import add_work
 from karamelo_py.kernels.nodes import (
-    ClearRubbed,
+    ClearFrictionalHeat,
     ExtendSeries,
     KeepLoss,
     MomentumToVelocity,
@@ -128,9 +128,9 @@ def _average_stress_f_bar(averaging, s, mode):
 @shared
 def sum_loss(s, mode):
     """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
-    if field(s.nodes.fields, Rubbed) is not None:
-        sweep_nodes(mode, ClearRubbed(), s.kin, s.nodes, s.ranges, step_size(s))
-    if field(s.nodes.fields, Lost) is not None:
+    if field(s.nodes.fields, FrictionalHeat) is not None:
+        sweep_nodes(mode, ClearFrictionalHeat(), s.kin, s.nodes, s.ranges, step_size(s))
+    if field(s.nodes.fields, DissipatedEnergy) is not None:
         sweep_nodes(mode, KeepLoss(), s.kin, s.nodes, s.ranges, step_size(s))
 
 
@@ -168,7 +168,7 @@ LOSS = _call(
     lambda s, mode, hooks: sum_loss(s, mode),
     lambda s: (
         None
-        if field(s.nodes.fields, Lost) is None
+        if field(s.nodes.fields, DissipatedEnergy) is None
         else "kinetic energy that the nodes do not keep, as heat to the points"
     ),
 )

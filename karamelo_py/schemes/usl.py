@@ -6,7 +6,7 @@ from karamelo_py.compiler.compile import real, shared
 from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
-from karamelo_py.kernels.p2g import SeenMass
+from karamelo_py.kernels.p2g import SquaredMass
 from karamelo_py.kernels.rows import ACCELERATE, MOVE, SERIES, SUMS, light_node
 from karamelo_py.kernels.table import AtPoints, Gather, Nodes
 
@@ -30,7 +30,7 @@ class USL(NamedTuple):
     """
 
     courant = (0.65, 0.4)
-    node_fields = (SeenMass,)
+    node_fields = (SquaredMass,)
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),
         SUMS,
