@@ -6,7 +6,7 @@ node: half of the work of a scatter, in space two thirds.
 
 from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.lanes import Eights, Fours
+from karamelo_py.compiler.lanes import EightLanes, FourLanes
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.tuples import add, add_scaled, nested_as, scale
 from karamelo_py.kernels import p2g
@@ -101,8 +101,8 @@ def joined(width, kin, parts):
     return parts
 
 
-@joined.on(Fours)
-@joined.on(Eights)
+@joined.on(FourLanes)
+@joined.on(EightLanes)
 def _joined_eights(width, kin, parts):
     if len(parts) != 2 or of_force(kin) != 4:
         return parts

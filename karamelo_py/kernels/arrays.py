@@ -5,8 +5,10 @@ Arrays of points have the shape (components, n), those of nodes (N, components).
 every scene has are declared by their owners (:mod:`karamelo_py.compiler.fields`).
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -14,6 +16,13 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.kinematics import dimension
+
+# A NamedTuple, often empty, whose class selects the implementation of point functions.
+Tag: TypeAlias = Any
+# A double or single, lanes of these, or a number with slopes.
+Number: TypeAlias = Any
+# A number of a point or node, or of those in lanes.
+Index: TypeAlias = Any
 
 
 class Nodes(NamedTuple):

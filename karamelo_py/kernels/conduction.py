@@ -34,10 +34,10 @@ from karamelo_py.kernels.heat import (
 )
 from karamelo_py.kernels.node_hooks import node_hooks
 from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
-from karamelo_py.kernels.passes import read_reports, visit_here
 from karamelo_py.kernels.point_hooks import Warmth, clear_totals, point_hooks, publish_totals
+from karamelo_py.kernels.reports import read_reports
 from karamelo_py.kernels.rows import conduct
-from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
+from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.points.kinematics import Line
 
@@ -97,7 +97,7 @@ def _at_heated_points_hooks(hooks, s):
 def visit_for_heat(heat, s, mode, visit, gathers, scatters):
     """Visit the points for heat: the nodes are those of heat."""
     here = arrays.with_nodes(s, heat.nodes, heat.buffers)
-    visit_here(here, mode, visit, step_size(s), gathers, scatters)
+    sweep(here, mode, visit, step_size(s), gathers, scatters, False)
 
 
 @shared

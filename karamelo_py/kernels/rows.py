@@ -25,8 +25,7 @@ from karamelo_py.kernels.nodes import (
     Update,
     UpdateToVelocity,
 )
-from karamelo_py.kernels.passes import visit_here
-from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
+from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
 from karamelo_py.points.kinematics import Axisymmetric, dimension
 from karamelo_py.points.transfers.xpic import XPIC
 
@@ -92,7 +91,7 @@ def _sum_series_xpic(transfer, s, mode):
     sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.ranges, dt)
     for k in range(transfer.order - 1):
         visit = Visit((SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
-        visit_here(s, mode, visit, dt, True, True)
+        sweep(s, mode, visit, dt, True, True, False)
         sweep_nodes(mode, ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
     hold_axis(s.kin, s)
 
@@ -107,7 +106,8 @@ def average_volumes(averaging, s, mode, dt, trial):
 
 @average_volumes.on(FBar)
 def _average_volumes_f_bar(averaging, s, mode, dt, trial):
-    visit_here(s, mode, Visit((trial,), (p2g.Volumes(),), OldWeights()), dt, True, True)
+    visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
+    sweep(s, mode, visit, dt, True, True, False)
     sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.ranges, dt)
 
 
@@ -120,9 +120,8 @@ def average_stress(averaging, s, mode):
 def _average_stress_f_bar(averaging, s, mode):
     dt = step_size(s)
     sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
-    visit_here(
-        s, mode, Visit((AverageStress(),), (p2g.AveragedForce(),), OldWeights()), dt, True, True
-    )
+    visit = Visit((AverageStress(),), (p2g.AveragedForce(),), OldWeights())
+    sweep(s, mode, visit, dt, True, True, False)
 
 
 @shared

@@ -65,13 +65,13 @@ class _BesideModel(models.StructModel):
         super().__init__(manager, beside, [("nodes", beside.nodes), ("steps", types.intp)])
 
 
-class Fours(NamedTuple):
+class FourLanes(NamedTuple):
     """Four points at once."""
 
     width = 4
 
 
-class Eights(NamedTuple):
+class EightLanes(NamedTuple):
     """Eight points at once."""
 
     width = 8
@@ -79,7 +79,7 @@ class Eights(NamedTuple):
 
 def lanes_for(bits: int) -> type:
     """How many points are visited at once, of numbers with so many bits; kept sorted for that."""
-    return {64: Fours, 32: Eights}[bits]
+    return {64: FourLanes, 32: EightLanes}[bits]
 
 
 @intrinsic
