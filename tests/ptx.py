@@ -20,7 +20,7 @@ from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
 from karamelo_py.kernels.averaging import FBar
-from karamelo_py.kernels.g2p import AverageStress, SeriesTerm, TrialStrain, empty_all, settled_all
+from karamelo_py.kernels.g2p import SeriesTerm, SetMeanStress, TrialStrain, empty_all, settled_all
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.lanes import OneByOne, zero_of
 from karamelo_py.kernels.nodes import at_node
@@ -104,7 +104,7 @@ def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]
         visits.append(Visit((SeriesTerm(0),), (SeriesBack(),), OldWeights()))
     if isinstance(setup.averaging, FBar):
         visits.append(Visit((TrialStrain(),), (Volumes(),), OldWeights()))
-        visits.append(Visit((AverageStress(),), (AveragedForce(),), OldWeights()))
+        visits.append(Visit((SetMeanStress(),), (AveragedForce(),), OldWeights()))
     if not isinstance(setup.heat, Insulated):
         visits.append(Visit((Warming(),), (HeatContent(),), OldWeights()))
         visits.append(Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights()))

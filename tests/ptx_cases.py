@@ -14,7 +14,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import nodes
 from karamelo_py.kernels.contact import stay_node, touch_node
 from karamelo_py.kernels.hooks import CompiledHook
-from karamelo_py.kernels.loss import DissipatedEnergy, FrictionalHeat
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.nodes import KeepLoss
 from karamelo_py.language import registry
 from karamelo_py.language.docstrings import sections
@@ -193,7 +193,7 @@ def test_loss(kinematics):
     script = scene(kinematics, "ulmpm", "linear", "", "TPIC", "usl")
     gas = "\n".join(LAWS["eos ideal-gas 0"]).replace(STRENGTH, "strength(s, fluid, 0)")
     script = re.sub(r"^material\(.*$", gas, script, flags=re.MULTILINE)
-    assert field(setup_of(script)[0].nodes.fields, DissipatedEnergy) is not None
+    assert field(setup_of(script)[0].nodes.fields, EnergyLoss) is not None
     visits_stay_in_registers(script)
 
 
@@ -221,7 +221,7 @@ def test_nodes(kinematics):
     script = scene(kinematics, "ulmpm", "linear", "", "XPIC", "usl")
     script = script.replace("region(", "anti_volumetric_locking(true)\nregion(")
     setup, _ = setup_of(script)
-    lost = DissipatedEnergy(np.zeros((len(setup.nodes.sums), 2)))  # of gases
+    lost = EnergyLoss(np.zeros((len(setup.nodes.sums), 2)))  # of gases
     setup = setup._replace(nodes=setup.nodes._replace(fields=(*setup.nodes.fields, lost)))
     tasks = [kind for kind in vars(nodes).values() if hasattr(kind, "goes_through")]
     assert KeepLoss in tasks

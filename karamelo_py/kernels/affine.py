@@ -13,7 +13,7 @@ from karamelo_py.kernels import p2g
 from karamelo_py.kernels.arrays import MASS, of_force
 from karamelo_py.kernels.averaging import NodalStress
 from karamelo_py.kernels.g2p import Move, update_at, zero_vector
-from karamelo_py.kernels.loss import DissipatedEnergy
+from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.kernels.visit import for_tags
 from karamelo_py.points.basis import entry, reach, support
 from karamelo_py.points.basis.product import inverse_spread, spacing
@@ -65,7 +65,7 @@ def _affine_part_mass_momentum(quantity, w, stencil, load):
     given = _momentum(w, stencil, mass, v, moment)
     if not (
         len(given)
-        and _lacks(w, (DissipatedEnergy, p2g.RigidSums, p2g.Centre, p2g.Normal, p2g.SquaredMass))
+        and _lacks(w, (EnergyLoss, p2g.RigidSums, p2g.Centre, p2g.Normal, p2g.SquaredMass))
     ):
         return ()
     momentum, growths = given

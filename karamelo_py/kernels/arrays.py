@@ -5,8 +5,6 @@ Arrays of points have the shape (components, n), those of nodes (N, components).
 every scene has are declared by their owners (:mod:`karamelo_py.compiler.fields`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, TypeAlias
 

@@ -25,15 +25,15 @@ from karamelo_py.kernels.heat import (
     Conducting,
     HeatContent,
     HeatFlow,
-    Share,
     Supply,
     Temperature,
     TemperatureGradient,
+    TemperatureShare,
     Volume,
     Warming,
 )
 from karamelo_py.kernels.node_hooks import node_hooks
-from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
+from karamelo_py.kernels.nodes import NodalUpdate, SumsToVelocity, TakeMean
 from karamelo_py.kernels.point_hooks import Warmth, clear_totals, point_hooks, publish_totals
 from karamelo_py.kernels.reports import read_reports
 from karamelo_py.kernels.rows import conduct
@@ -69,7 +69,7 @@ def _supply_blocks(block, s, hooks):
         field(fields, Temperature),
         field(fields, Volume),
         field(fields, Supply),
-        field(fields, Share),
+        field(fields, TemperatureShare),
         points.mass,
         points.x[s.control.clock[0].now],
     )
@@ -131,7 +131,7 @@ def _conduct_conducting(heat, s, mode, hooks):
     at_heated_points(hooks, s)
     flow = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
     visit_for_heat(heat, s, mode, flow, True, True)
-    sweep_nodes(mode, Update(), kin, nodes, s.ranges, dt)
+    sweep_nodes(mode, NodalUpdate(), kin, nodes, s.ranges, dt)
     at_heat_nodes(hooks, arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, s)
     map_heat(heat, s, mode, True, False)
     # What `Warming` reports as a rate is by what factor conduction has become faster.

@@ -103,7 +103,7 @@ class TrialStrainOfLastStep(NamedTuple):
     writes = TrialStrain.writes
 
 
-class AverageStress(NamedTuple):
+class SetMeanStress(NamedTuple):
     """Gather the averaged mean stress of F-bar."""
 
     in_lanes = True
@@ -156,7 +156,7 @@ def _empty_trial_strain_of_last_step(task, w, x):
     return zero_tensor(w.kin, x[0])
 
 
-@empty.on(AverageStress)
+@empty.on(SetMeanStress)
 def _empty_average_stress(task, w, x):
     return real(0, x[0])
 
@@ -250,7 +250,7 @@ def _gathered_trial_strain_of_last_step(task, w, stencil, k, total):
     return _gradient(w, stencil, k, total)
 
 
-@gathered.on(AverageStress)
+@gathered.on(SetMeanStress)
 def _gathered_average_stress(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     return fma(weight, row(field(w.nodes.fields, averaging.NodalStress), i, 0, (total,))[0], total)
@@ -318,7 +318,7 @@ def _keep_ratio(w, p, dt, dl):
     field(w.points.fields, averaging.VolumeRatio)[0, p] = volume_ratio(w.kin, increment)
 
 
-@settled.on(AverageStress)
+@settled.on(SetMeanStress)
 def _settled_average_stress(task, w, stencil, p, dt, total, totals, fastest):
     field(w.points.fields, averaging.AveragedStress)[0, p] = total
     return real(0, dt), fastest

@@ -3,8 +3,6 @@
 One by one, or in lanes: four or eight, where all parts of the visit know them.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

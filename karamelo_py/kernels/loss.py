@@ -48,7 +48,7 @@ from karamelo_py.points.transfers.xpic import Reflected, Series
 ALONE = 0.6
 
 
-class DissipatedEnergy(fields.SummedField):
+class EnergyLoss(fields.SummedField):
     """Kinetic energy brought to a node; the part that it dissipates, per mass; and its mass.
 
     A fused step brings the energy and mass of the next step while points take back the loss.
@@ -134,7 +134,7 @@ def warm(w, stencil, p, v):
 
     `v` is the velocity of the nodes at the point, before the update.
     """
-    lost = fields.field(w.nodes.fields, DissipatedEnergy)
+    lost = fields.field(w.nodes.fields, EnergyLoss)
     reflected = fields.field(w.points.fields, Reflected)
     if lost is not None:
         moment = _moment_before(w, stencil, v, zero_moment(w.transfer, w.kin, v[0]))
@@ -154,7 +154,7 @@ def in_company(w, stencil, p, moment):
     its own pressure, and its volume grow without bounds, whatever the room around it. The energy of
     what it does not keep heats it.
     """
-    lost = fields.field(w.nodes.fields, DissipatedEnergy)
+    lost = fields.field(w.nodes.fields, EnergyLoss)
     if lost is None or len(moment) == 0:
         return moment
     mass = w.points.mass[p]

@@ -7,7 +7,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.averaging import NodalMean, NodalStress
-from karamelo_py.kernels.loss import DissipatedEnergy, FrictionalHeat, keep_loss
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat, keep_loss
 from karamelo_py.kernels.p2g import SquaredMass
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
@@ -40,7 +40,7 @@ class ExtendSeries(NamedTuple):
 class KeepLoss(NamedTuple):
     """What a node does not keep of the kinetic energy that it was brought."""
 
-    goes_through = ("sums", "dissipated energy", "dissipated energy")
+    goes_through = ("sums", "energy loss", "energy loss")
 
 
 class ClearFrictionalHeat(NamedTuple):
@@ -49,7 +49,7 @@ class ClearFrictionalHeat(NamedTuple):
     goes_through = ("frictional heat",)
 
 
-class Update(NamedTuple):
+class NodalUpdate(NamedTuple):
     """v* = v + dt f / m from the sums."""
 
     says = "update v*"
@@ -98,7 +98,7 @@ def per_mass(nodes, n, like):
 
 @at_node.on(KeepLoss)
 def _at_node_keep_loss(task, kin, nodes, n, dt):
-    keep_loss(field(nodes.fields, DissipatedEnergy), kin, nodes.sums, n)
+    keep_loss(field(nodes.fields, EnergyLoss), kin, nodes.sums, n)
 
 
 @at_node.on(ClearFrictionalHeat)
@@ -106,7 +106,7 @@ def _at_node_clear_rubbed(task, kin, nodes, n, dt):
     clear_first(field(nodes.fields, FrictionalHeat), n)
 
 
-@at_node.on(Update)
+@at_node.on(NodalUpdate)
 def _at_node_update(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
     for k in range(dimension(kin)):

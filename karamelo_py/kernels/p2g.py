@@ -8,7 +8,7 @@ from karamelo_py.compiler.tuples import add_optional, leading, scale, subtract
 from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, VELOCITY_WIDTH, of_force
 from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.g2p import zero_vector
-from karamelo_py.kernels.loss import DissipatedEnergy, bring_energy
+from karamelo_py.kernels.loss import EnergyLoss, bring_energy
 from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, records_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, add_force, force_stress
@@ -39,7 +39,7 @@ class MassMomentum(NamedTuple):
             (SquaredMass, 0, 1),
             (Centre, 0, d),
             (RigidSums, 0, of_force(kin)),
-            (DissipatedEnergy, 0, 1),
+            (EnergyLoss, 0, 1),
         )
         return ("sums", 0, of_force(kin)), *own
 
@@ -224,7 +224,7 @@ def _scattered_mass_momentum(quantity, w, stencil, k, load):
     mass, v, moment, led, x = load
     part = momentum_part(w, stencil, k, weight, mass, v, moment)
     accumulate(w.nodes.sums, i, MASS, (weight * mass,) + part)
-    bring_energy(field(w.nodes.fields, DissipatedEnergy), i, weight * mass, part)
+    bring_energy(field(w.nodes.fields, EnergyLoss), i, weight * mass, part)
     accumulate_led(field(w.nodes.fields, RigidSums), i, weight, led, v)
     accumulate_optional(field(w.nodes.fields, Centre), i, scale(weight * mass, x))
     accumulate_optional(field(w.nodes.fields, Normal), i, scale(mass, leading(gradient, v)))

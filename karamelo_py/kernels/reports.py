@@ -1,7 +1,5 @@
 """The reports of tiles: how far points went, at what rate, and which one went wrong."""
 
-from __future__ import annotations
-
 from karamelo_py.compiler.compile import over_blocks, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand

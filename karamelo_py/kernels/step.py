@@ -55,9 +55,9 @@ def _take(row, s, mode, hooks, more):
         at_points(hooks, row.stage, row.then, s)
     elif isinstance(row, table.AtNodes):
         at_nodes(hooks, row.stage, row.target, s)
-    elif isinstance(row, table.Call):
+    elif isinstance(row, table.SceneTask):
         row.function(s, mode, hooks)
-    elif isinstance(row, table.Nodes):
+    elif isinstance(row, table.NodeTask):
         task = row.task(s) if callable(row.task) else row.task
         sweep_nodes(mode, task, s.kin, s.nodes, s.ranges, kick(s))
     elif isinstance(row, table.Check):

@@ -13,8 +13,6 @@ Then each tile of nodes sums the boxes that reach it. Threads share out tiles an
 sums are made in one order, whatever the number of threads.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from math import inf
