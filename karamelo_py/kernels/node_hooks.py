@@ -19,7 +19,7 @@ from karamelo_py.kernels.hooks import (
     publish_total,
     with_items_of,
 )
-from karamelo_py.kernels.loss import Rubbed
+from karamelo_py.kernels.loss import FrictionalHeat
 from karamelo_py.kernels.searching import first_from
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.grid import node_position
@@ -348,7 +348,7 @@ def _work_of_loads(kin, grids, nodes, ranges, hooks, control, dt):
 @shared
 def _rubbed_alone(nodes):
     """The nodes with that of their declared fields which walls know."""
-    fields = tuple([one for one in nodes.fields if type(one) is Rubbed])
+    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
     return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
 
 
