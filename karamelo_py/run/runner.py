@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.step import DONE, STOPPED
-from karamelo_py.run.advice import known_failures, steps
+from karamelo_py.run.advice import known_failures, large_steps
 from karamelo_py.run.advice.report import bytes_per_point, report
 from karamelo_py.run.advice.resting import warn_about_length
 from karamelo_py.run.checkpoint import restart_file
@@ -81,7 +81,7 @@ class Runner:
         if hub.rehearsing:
             steps = inf if self.steps is None else self.steps
             span = self.end_time - hub.update.time, steps
-            hub.later.append(steps.step_of(hub, self.halve, span))
+            hub.later.append(large_steps.step_of(hub, self.halve, span))
             hub.in_runs += hub.lasting()
             return
         if hub.pausing:
@@ -166,7 +166,7 @@ class Runner:
             ruined = not simulation.control.clock[0].watch_limit and simulation.step > first_step
             simulation.go_on(self.end_time, self.halvings)
             if not self.halvings:  # else the step is not that of the script
-                steps.warn_about_steps(hub, simulation, self.halve, again=True)
+                large_steps.warn_about_steps(hub, simulation, self.halve, again=True)
             self._tell_of_no_step_left(file, simulation, first_step)
         else:
             ruined = False

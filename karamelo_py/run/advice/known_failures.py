@@ -14,8 +14,8 @@ from karamelo_py.language.rules import Advice
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import law_kind, specific_volume
 from karamelo_py.run.advice.facts import SceneFacts
+from karamelo_py.run.advice.large_steps import duration_of_later, warn_about_steps
 from karamelo_py.run.advice.resting import UNITS, warn_about_rest
-from karamelo_py.run.advice.steps import duration_of_later, warn_about_steps
 from karamelo_py.run.diagnosis.explain import no_number
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import blows_up, elastic_speed
