@@ -12,10 +12,11 @@ rules are declared beside it, those of plug-ins as well::
     )
 
 `when` gets the part and the facts of the scene (:class:`karamelo_py.run.advice.facts.SceneFacts`).
-What it gives says whether the rule speaks: nothing; True; numbers for the words, by name; or
-several such, one for each time that it speaks. In words between braces stand these numbers and what
-``part``, ``scene`` and ``owner`` have, such as ``{scene.turn:.2g}``; the owner of a law, or of one
-of its parts, is the material.
+It returns whether the rule speaks, or the numbers for its words, by name, or a list of these, one
+for each time that it speaks. Between braces words have these numbers and what ``part``, ``scene``
+and ``owner`` have, such as ``{scene.turn:.2g}``; the owner of a law, or of one of its parts, is the
+material. Two names mean more: ``place``, the place in the script that is marked (else that of the
+fix, the material or the method), and ``share``, of noise how much it takes of what a body bears.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,7 +25,7 @@ from typing import Any, NamedTuple
 
 
 class Rule(NamedTuple):
-    """What a class of parts may have to say.
+    """Warn of, save or explain something, where a part of this class is used so.
 
     Attributes
     ----------
@@ -46,7 +47,7 @@ class Rule(NamedTuple):
 
 
 class Advice(NamedTuple):
-    """What a rule says of a scene.
+    """Tell what a rule says of a scene.
 
     Attributes
     ----------
@@ -100,5 +101,5 @@ def _said(rule: Rule, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
         numbers = one if isinstance(one, dict) else {}
         named = {"part": part, "owner": owner, "scene": scene, **numbers}
         words = (text.format(**named) for text in (rule.name, rule.reason, rule.cure))
-        place = getattr(owner or part, "place", None)
+        place = numbers.get("place", getattr(owner or part, "place", None))
         yield Advice(*words, numbers.get("share", inf), place)
