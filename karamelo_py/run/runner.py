@@ -6,7 +6,7 @@ from math import inf, isfinite, isnan
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.run.advice import known_failures, steps
+from karamelo_py.run.advice import known_failures, large_steps
 from karamelo_py.run.advice.report import bytes_per_point, report
 from karamelo_py.run.advice.resting import warn_about_length
 from karamelo_py.run.diagnosis import energy
@@ -59,7 +59,7 @@ def _note_in_rehearsal(runner: "Runner") -> None:
     """Note what the run asks for, and what acts in it."""
     hub = runner.hub
     span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
-    hub.later.append(steps.step_of(hub, runner.rollback.halve, span))
+    hub.later.append(large_steps.step_of(hub, runner.rollback.halve, span))
     hub.in_runs += hub.lasting()
 
 
@@ -210,7 +210,7 @@ class Runner:
         ruined = not watched and simulation.step > self.first_step
         simulation.go_on(self.end_time, self.rollback.halvings)
         if not self.rollback.halvings:  # else the step is not that of the script
-            steps.warn_about_steps(hub, simulation, self.rollback.halve, again=True)
+            large_steps.warn_about_steps(hub, simulation, self.rollback.halve, again=True)
         self._tell_of_no_step_left(file, simulation)
         return ruined
 

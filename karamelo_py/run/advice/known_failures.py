@@ -25,9 +25,9 @@ from karamelo_py.points.transfers.mls import MLS
 from karamelo_py.points.transfers.pic import PIC
 from karamelo_py.run.advice.conflicts import warn_about_velocities
 from karamelo_py.run.advice.facts import Foreseen
+from karamelo_py.run.advice.large_steps import duration_of_later, warn_about_steps
 from karamelo_py.run.advice.noise import ELASTIC, noises
 from karamelo_py.run.advice.resting import UNITS, warn_about_rest
-from karamelo_py.run.advice.steps import duration_of_later, warn_about_steps
 from karamelo_py.run.diagnosis.explain import no_number
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import blows_up, elastic_speed, one_a_cell, sparse

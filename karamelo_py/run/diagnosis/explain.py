@@ -13,7 +13,7 @@ from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, 
 from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
 from karamelo_py.output.fields import Fields
 from karamelo_py.points.basis import carried, extent
-from karamelo_py.run.advice.steps import step_was_told
+from karamelo_py.run.advice.large_steps import step_was_told
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates
 from karamelo_py.run.checkpoint.rollback import RollbackPoint
