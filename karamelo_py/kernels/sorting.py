@@ -35,7 +35,7 @@ class Sight(NamedTuple):
     offset: float  # of the first node that a point sees now, see points.basis.first_node
 
 
-class Order(NamedTuple):
+class SortedOrder(NamedTuple):
     """What is found where n points are sorted by threads, each of which has a part of them."""
 
     width: int  # of groups of points

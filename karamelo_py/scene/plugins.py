@@ -31,7 +31,7 @@ SAID = {
     "scheme": ("rows",),
 }
 ROWS = (
-    table.AtPoints, table.AtNodes, table.Gather, table.Scatter, table.Nodes, table.Call,
+    table.AtPoints, table.AtNodes, table.Gather, table.Scatter, table.NodeTask, table.SceneTask,
     table.Check,
 )  # fmt: skip
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
