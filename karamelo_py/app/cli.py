@@ -23,7 +23,7 @@ from karamelo_py.app.options import (
     positive,
     threads_option,
 )
-from karamelo_py.app.starting import begun
+from karamelo_py.app.start import begun
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
 from karamelo_py.run.mpi.crew import Crew, launched
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message

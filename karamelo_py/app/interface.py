@@ -45,7 +45,7 @@ class Quiet(Console):
 
 
 @contextmanager
-def told() -> Iterator[None]:
+def as_simulation_error() -> Iterator[None]:
     """Raise errors as those whose text is the whole message."""
     try:
         yield
@@ -81,7 +81,7 @@ def threads_of(given: Any) -> int | None:
         ) from None
 
 
-def said(value: Any) -> str:
+def as_script_text(value: Any) -> str:
     """Write a value of Python as a script would."""
     if value is None:
         return "NULL"
