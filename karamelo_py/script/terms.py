@@ -100,10 +100,6 @@ def applied(operation: str, *operands: Term) -> Term:
     return Term(operation, operands, None)
 
 
-def _rounded(term: Term) -> Term:
-    return applied("round", term)
-
-
 def _quotient(polynomials: tuple[tuple[float, ...], ...], r: Term) -> Term:
     """Two polynomials of `r`, the first over the second."""
     terms = []
