@@ -57,7 +57,7 @@ def as_simulation_error() -> Iterator[None]:
 
 
 def refuse_copies() -> None:
-    """Of several processes that were started, the first tells that none shares a scene here."""
+    """Refuse several processes that were started: the first tells that none shares a scene here."""
     size, rank = launched()
     if size == 1:
         return
@@ -71,7 +71,7 @@ def refuse_copies() -> None:
 
 
 def threads_of(given: Any) -> int | None:
-    """The number of threads, as `--threads` takes it; None for auto."""
+    """Read the number of threads, as `--threads` takes it; None for auto."""
     try:
         return None if given is None else threads_option(str(given))
     except ArgumentTypeError:

@@ -168,7 +168,7 @@ class Simulation:
 
     @contextmanager
     def _carried_out(self) -> Iterator[None]:
-        """Runs are made at once, and end as the user wants."""
+        """Make runs at once, and end them as the user wants."""
         pausing, self.hub.pausing = self.hub.pausing, False
         try:
             with as_simulation_error():
@@ -181,7 +181,7 @@ class Simulation:
             self.hub.pausing = pausing
 
     def evaluate(self, expression: str) -> float | str:
-        """The present value of an expression of the language."""
+        """Compute the present value of an expression of the language."""
         with as_simulation_error():
             raw, node = parse_text(expression, "evaluate")
             found = self._interpreter.evaluate(node, raw)
@@ -288,7 +288,7 @@ class Simulation:
         return {n: v if isinstance(v, (float, str)) else shown(v) for n, v in found.items()}
 
     def show(self, field: str | None = None, width: float = 6, height: float = 4.5, **look: Any):
-        """A picture of the points, coloured by a column (or by solid), which a notebook shows.
+        """Draw a picture of the points, coloured by a column (or by solid), which a notebook shows.
 
         Parameters
         ----------
