@@ -1,4 +1,4 @@
-"""What points give to nodes as N_I times an affine field: mass, momentum, and the force of MLS.
+"""Scatter and gather of quantities that are affine around a point: mass, momentum, force of MLS.
 
 In lanes such a quantity is brought into the order of the nodes' records once a point, not once a
 node: half of the work of a scatter, in space two thirds.
@@ -33,7 +33,7 @@ def affine_part(quantity, w, stencil, load):
 
 @shared
 def _lacks(w, kinds):
-    """Whether the nodes have none of these fields."""
+    """Return True if the nodes have none of these fields."""
     return not any(field(w.nodes.fields, kind) is not None for kind in kinds)
 
 
@@ -132,7 +132,7 @@ def gathered_by_arms(w):
 
 @point_function(otherwise=True)
 def gathered_at_once(task, w, stencil, total):
-    """What a gather sums up over all nodes of a stencil; () where that goes node by node."""
+    """Return the total of a gather over all nodes of a stencil; () where that goes node by node."""
     return ()
 
 

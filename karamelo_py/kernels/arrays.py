@@ -64,7 +64,7 @@ VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 
 
 class Points(NamedTuple):
-    """What the points of one constitutive law carry, in the order of the tiles.
+    """Arrays of the points of one constitutive law, in the order of the tiles.
 
     A place is a position (d numbers), followed by what the basis keeps of the shape of a point's
     domain where weights follow the motion.
@@ -144,7 +144,7 @@ CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
 
 
 class Buffers(NamedTuple):
-    """What points give to nodes: a dense box of nodes for each tile of points, one after another.
+    """Sums of the tiles of points: a dense box of nodes for each, one after another.
 
     A tile of nodes sums the boxes that reach it, in one order, and leaves zeros in them. Its parts
     are ranges of nodes in up to three directions: what each box has in common with it; before them
@@ -164,7 +164,7 @@ class Buffers(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where the points of a block are during a sweep: arrays (w, n) of places."""
+    """Places of the points of a block during a sweep: arrays (w, n)."""
 
     where: np.ndarray  # that the weights of the gather belong to
     x: np.ndarray  # before
@@ -210,7 +210,7 @@ HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the 
 
 
 class Apart(NamedTuple):
-    """What each of so many threads, A, has of its own where hooks act on nodes."""
+    """Arrays of each of A threads for hooks on nodes."""
 
     chosen: np.ndarray  # (A, BLOCK): see Hooks
     scratch: np.ndarray  # (A, 8 + depth, BLOCK)
@@ -330,7 +330,7 @@ TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values
 
 
 class Control(NamedTuple):
-    """What the compiled loop reads and writes beside the fields."""
+    """Clock, published values and totals: the arrays of the compiled loop beside the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
     clock: np.ndarray  # (1,) CLOCK

@@ -1,4 +1,4 @@
-"""How long steps are, and what ends one."""
+"""The size of steps, and the end of a step."""
 
 from math import inf
 
@@ -27,7 +27,7 @@ def last_step_size(s):
 
 @shared
 def kick(s):
-    """How long forces act in this step.
+    """Return the time for which forces act in this step.
 
     Places belong to the ends of steps, velocities to their middles: forces lead from the middle of
     one step to that of the next.

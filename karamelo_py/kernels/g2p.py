@@ -128,7 +128,7 @@ class SeriesTerm(NamedTuple):
 
 @point_function()
 def empty(task, w, x):
-    """What a gather sums up, before the first node."""
+    """Return the totals of a gather before the first node: zeros."""
 
 
 @empty.on(Move)
@@ -200,7 +200,7 @@ def _gathered_move(task, w, stencil, k, total):
 
 @shared
 def moves_corners(basis, kin):
-    """Whether what is gathered is corners of domains that go with the velocity there."""
+    """Return True for a gather at corners of domains that move with the velocity there."""
     return isinstance(basis, AtCorners) and carried(basis.basis, kin) > 0
 
 

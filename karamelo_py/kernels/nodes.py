@@ -1,4 +1,4 @@
-"""What is done at the nodes between two visits of the points."""
+"""Tasks at the nodes between two visits of the points."""
 
 from typing import NamedTuple
 
@@ -38,7 +38,7 @@ class ExtendSeries(NamedTuple):
 
 
 class KeepLoss(NamedTuple):
-    """What a node does not keep of the kinetic energy that it was brought."""
+    """Energy loss of a node: kinetic energy that points brought, less that of the node."""
 
     goes_through = ("sums", "energy loss", "energy loss")
 

@@ -128,7 +128,7 @@ class SquaredMass(SummedField):
 
     @staticmethod
     def needed(basis: Any) -> bool:
-        """Whether a basis makes light nodes that the gradient feels."""
+        """Return True if a basis makes light nodes that the gradient feels."""
         return basis.steep_edge
 
 
@@ -139,7 +139,7 @@ class Centre(SummedField):
 
 
 class RigidSums(SummedField):
-    """What rigid points give a node: mass, momentum and the force on them, as in `Nodes.sums`."""
+    """Sums of the rigid points at a node: mass, momentum, force on them, as in `Nodes.sums`."""
 
     @staticmethod
     def shape(kin):
@@ -149,7 +149,7 @@ class RigidSums(SummedField):
 
 @point_function()
 def load_of(quantity, w, p, like):
-    """What a point brings to the nodes."""
+    """Return the load of a point: the numbers that it scatters, before they are weighted."""
 
 
 @records_of.on(MassMomentum)

@@ -17,7 +17,7 @@ from karamelo_py.points.kinematics import dimension
 
 
 class Cut(NamedTuple):
-    """How g grids are cut into T tiles."""
+    """Division of g grids into T tiles."""
 
     size: np.ndarray  # (d,) cells of a tile
     count: np.ndarray  # (g, d) number of tiles
@@ -25,7 +25,7 @@ class Cut(NamedTuple):
 
 
 class Sight(NamedTuple):
-    """Which nodes points see that may go `reach` cells."""
+    """Neighbourhood of a point: the nodes that it may see before it has gone `reach` cells."""
 
     top: np.ndarray  # (g, d) the last node of each grid
     per_cell: int
@@ -36,7 +36,7 @@ class Sight(NamedTuple):
 
 
 class SortedOrder(NamedTuple):
-    """What is found where n points are sorted by threads, each of which has a part of them."""
+    """Order and boxes of n points that threads sort, each of which has a part of them."""
 
     width: int  # of groups of points
     ends: np.ndarray  # (parts, T) the last row takes where the points of each tile end
@@ -89,7 +89,7 @@ def _find_tiles(kin, grids, tiles, x, of, ends, tile, k):
 
 @subkernel
 def _begin_tiles(found):
-    """Where what each part gives to each tile begins; shares of the tiles, with as many points."""
+    """Set where each part's points begin in each tile; share out the tiles by points."""
     ends, share, points = found.ends, found.share, found.order.size
     parts = ends.shape[0]
     place = shares = 0
@@ -266,13 +266,13 @@ def find_tiles(mode, kin, grids, tiles, x, of, ends, tile):
 
 @loop
 def find_rows(mode, kin, grids, sight, x, tiling, parts):
-    """What of each row of their boxes the sorted points at `x` (w, n) of each tile may reach."""
+    """Find the range of each row of a tile's box that its sorted points at `x` (w, n) may reach."""
     _find_all_rows(mode, parts, kin, grids, sight, x, tiling, parts)
 
 
 @loop
 def widest(kin, basis, grids, x, of):
-    """How far from its point a corner of a domain is at most, in cells."""
+    """Return the largest distance of a corner of a domain from its point, in cells."""
     grids = at_hand(grids)
     far = 0.0
     for p in range(x.shape[1]):

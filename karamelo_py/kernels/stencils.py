@@ -43,7 +43,7 @@ def _scatter(quantities, w, stencil, loads):
 
 @shared
 def _even(w, stencil, asked):
-    """Whether D^-1 is the same for all points of a group; not asked where nothing depends on it."""
+    """Return True if D^-1 is the same for all points in lanes, or nothing depends on it."""
     return in_all(evenly(w.basis, w.grid, stencil)) if asked else True
 
 
@@ -104,7 +104,7 @@ def _ask_ahead(tags, w, stencil):
 
 @shared
 def _gather_parts(tasks, w, stencil, totals):
-    """What can be is gathered from all nodes at once, the rest node by node."""
+    """Gather affine parts from all nodes at once, the rest node by node."""
     found = gathered_at_once_all(tasks, w, stencil, totals)
     rest = [k for k, total in enumerate(found) if not len(total)]
     own = _gather(tuple([tasks[k] for k in rest]), w, stencil, tuple([totals[k] for k in rest]))
@@ -160,7 +160,7 @@ def _scatter_block(width, quantities, w, block, loads):
 
 @shared
 def _scatter_parts(width, quantities, w, stencil, loads, parts):
-    """What is affine at all nodes at once, the rest node by node."""
+    """Scatter affine parts to all nodes at once, the rest node by node."""
     known = tuple([part for part in parts if len(part)])
     if len(known):
         give_affine(width, w, stencil, known)
@@ -171,5 +171,5 @@ def _scatter_parts(width, quantities, w, stencil, loads, parts):
 
 @shared
 def gathered_by(width, tasks, w, stencil, x):
-    """What the tasks gather over the nodes of a stencil."""
+    """Gather the totals of the tasks over the nodes of a stencil."""
     return gather_nodes(width, stencil, tasks, w, empty_all(tasks, w, x))

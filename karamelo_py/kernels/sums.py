@@ -1,4 +1,4 @@
-"""What points give to nodes: records of the tiles' buffers, and their sums at the nodes.
+"""Sums at the nodes of the records in the tiles' buffers.
 
 A quantity says in ``fills(kin)`` which columns of the nodes' arrays take it: (array, first column,
 end), the array a name in `Nodes` or the class of a field, which a scene may not have. With
@@ -18,7 +18,7 @@ from karamelo_py.kernels.arrays import ADD, CLEAR, Nodes
 
 
 def adds(quantity: NamedTuple) -> bool:
-    """Whether a quantity adds to what is at the nodes."""
+    """Return True if a quantity adds to the values at the nodes."""
     return getattr(type(quantity), "adds", False)
 
 
@@ -33,7 +33,7 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
 
 @shared
 def given(quantities, kin):
-    """Which arrays of the nodes the quantities give to: 1 the sums, 2 velocities, 4 fields."""
+    """Add up the kinds of arrays that take the quantities: 1 the sums, 2 velocities, 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
     fields = any(not isinstance(name, str) for name in names)
     return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields
@@ -61,7 +61,7 @@ def _take_record(quantities, kin, nodes, n, buffers, m, keep):
 
 @shared
 def _clear_record(quantities, kin, nodes, n):
-    """What points give to node `n` starts from zero, but for what they add to."""
+    """Clear the columns of node `n` that take the quantities, but those that they add to."""
     for name, first, end, add in _columns(quantities, kin):
         array = _array(nodes, name)
         if array is not None and not add:

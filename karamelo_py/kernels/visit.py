@@ -1,4 +1,4 @@
-"""What a visit of a point works with, and loops over the tags of what it does.
+"""The arrays and tags of a visit to a point, and loops over its tags.
 
 A visit gathers from the nodes of the point's stencil and settles the point (grid to points,
 :mod:`karamelo_py.kernels.g2p`), then scatters to the nodes (points to grid,
@@ -20,7 +20,7 @@ from karamelo_py.points.transfers import Moment, zero_moment
 
 
 class Work(NamedTuple):
-    """What a visit of a point works with; made once a tile."""
+    """Arrays and tags of a visit to a point; made once a tile."""
 
     frame: NamedTuple
     kin: NamedTuple
