@@ -10,11 +10,11 @@ from karamelo_py.compiler.lanes import EightLanes, FourLanes
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.tuples import add, add_scaled, nested_as, scale
 from karamelo_py.kernels import p2g
-from karamelo_py.kernels.arrays import MASS, of_force
+from karamelo_py.kernels.arrays import MASS, Tag, of_force
 from karamelo_py.kernels.averaging import NodalStress
 from karamelo_py.kernels.g2p import Move, update_at, zero_vector
 from karamelo_py.kernels.loss import EnergyLoss
-from karamelo_py.kernels.visit import for_tags
+from karamelo_py.kernels.visit import Work, for_tags
 from karamelo_py.points.basis import entry, reach, support
 from karamelo_py.points.basis.product import inverse_spread, spacing
 from karamelo_py.points.frames import force_columns
@@ -131,7 +131,7 @@ def gathered_by_arms(w):
 
 
 @point_function(otherwise=True)
-def gathered_at_once(task, w, stencil, total):
+def gathered_at_once(task: Tag, w: Work, stencil: tuple, total: tuple) -> tuple:
     """Return the total of a gather over all nodes of a stencil; () where that goes node by node."""
     return ()
 

@@ -13,6 +13,7 @@ import numpy as np
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.totals import LIMBS, Alone
+from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import dimension
 
 # A NamedTuple, often empty, whose class selects the implementation of point functions.
@@ -233,7 +234,7 @@ class Hooks(NamedTuple):
     scratch: np.ndarray  # (8 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack
     held: np.ndarray  # (N, d) HELD, where hooks hold nodes in common; else (0, d)
     loads: np.ndarray  # (N, d) of this step, where hooks bring forces; else (0, d)
-    mode: NamedTuple  # one thread, or several
+    mode: Tag  # one thread, or several
     apart: Apart
 
 
@@ -339,7 +340,7 @@ class Control(NamedTuple):
     digits: np.ndarray  # (LIMBS,) scratch
     answer: np.ndarray  # rounded totals, and what processes agree on
     firsts: np.ndarray  # (S,) int64: id of the first point of each solid
-    ranks: NamedTuple  # whether there are other processes
+    ranks: Tag  # whether there are other processes
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
@@ -355,17 +356,17 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
 class Setup(NamedTuple):
     """Everything a step needs; its type decides what is compiled."""
 
-    frame: NamedTuple  # whether weights belong to present or reference positions
-    kin: NamedTuple  # kinematics tag
-    basis: NamedTuple
-    transfer: NamedTuple
-    averaging: NamedTuple  # whether changes of volume are averaged (F-bar)
-    contact: NamedTuple  # how solids with fields of their own touch
-    heat: NamedTuple  # whether heat flows between points, and the nodes it flows through
-    grids: NamedTuple  # points.grid.Grid with an array (g,) for each number
+    frame: Tag  # whether weights belong to present or reference positions
+    kin: Tag  # kinematics tag
+    basis: Tag
+    transfer: Tag
+    averaging: Tag  # whether changes of volume are averaged (F-bar)
+    contact: Tag  # how solids with fields of their own touch
+    heat: Tag  # whether heat flows between points, and the nodes it flows through
+    grids: Grid  # with an array (g,) for each number
     nodes: Nodes
     buffers: Buffers
-    blocks: tuple  # of Block, one for each constitutive law
+    blocks: tuple[Block, ...]  # one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
     ranges: np.ndarray  # (S + rows, 2) int64: which of the rows that follow each share of the nodes
     #                     has; then the ranges of node numbers in use, share after share

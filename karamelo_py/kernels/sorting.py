@@ -10,9 +10,10 @@ from karamelo_py.compiler.items import pick_items, put_items
 from karamelo_py.compiler.loops import loop, subkernel
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import Number, Tag, Tiling
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent
-from karamelo_py.points.grid import cells_along, in_cells
+from karamelo_py.points.grid import Grid, cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
 
 
@@ -49,7 +50,7 @@ class SortedOrder(NamedTuple):
 
 
 @shared
-def cell_of(grid, direction, at):
+def cell_of(grid: Grid, direction: int, at: Number) -> int:
     """The cell of a point that lies so many cells from the corner of the grid.
 
     Clamped, since a hook may have put a point anywhere: the next sweep finds it.
@@ -248,7 +249,18 @@ _sort_by_team = by_team(_sort, "kin, grids, sight, tiles, x, of, ids, found, row
 
 
 @loop
-def sort_points(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
+def sort_points(
+    mode: Tag,
+    kin: Tag,
+    grids: Grid,
+    sight: Sight,
+    tiles: Cut,
+    x: np.ndarray,
+    of: np.ndarray,
+    ids: np.ndarray,
+    found: SortedOrder,
+    rows: tuple,
+) -> None:
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
     They are on the grids `of` (n,) and have the numbers `ids` (n,). Of all that they carry, these
@@ -259,19 +271,30 @@ def sort_points(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
 
 
 @loop
-def find_tiles(mode, kin, grids, tiles, x, of, ends, tile):
+def find_tiles(
+    mode: Tag,
+    kin: Tag,
+    grids: Grid,
+    tiles: Cut,
+    x: np.ndarray,
+    of: np.ndarray,
+    ends: np.ndarray,
+    tile: np.ndarray,
+) -> None:
     """The tile of each of some points at `x` (w, n), of the grids `of` (n,); `ends` is scratch."""
     _find_all_tiles(mode, ends.shape[0], kin, grids, tiles, x, of, ends, tile)
 
 
 @loop
-def find_rows(mode, kin, grids, sight, x, tiling, parts):
+def find_rows(
+    mode: Tag, kin: Tag, grids: Grid, sight: Sight, x: np.ndarray, tiling: Tiling, parts: int
+) -> None:
     """Find the range of each row of a tile's box that its sorted points at `x` (w, n) may reach."""
     _find_all_rows(mode, parts, kin, grids, sight, x, tiling, parts)
 
 
 @loop
-def widest(kin, basis, grids, x, of):
+def widest(kin: Tag, basis: Tag, grids: Grid, x: np.ndarray, of: np.ndarray) -> float:
     """Return the largest distance of a corner of a domain from its point, in cells."""
     grids = at_hand(grids)
     far = 0.0

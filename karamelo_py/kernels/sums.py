@@ -14,7 +14,7 @@ from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.lanes.records import move_record
 from karamelo_py.compiler.loops import subkernel
 from karamelo_py.compiler.tuples import put_at
-from karamelo_py.kernels.arrays import ADD, CLEAR, Nodes
+from karamelo_py.kernels.arrays import ADD, CLEAR, Buffers, Nodes, Tag
 
 
 def adds(quantity: NamedTuple) -> bool:
@@ -32,7 +32,7 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
 
 
 @shared
-def given(quantities, kin):
+def given(quantities: tuple, kin: Tag) -> int:
     """Add up the kinds of arrays that take the quantities: 1 the sums, 2 velocities, 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
     fields = any(not isinstance(name, str) for name in names)
@@ -69,7 +69,7 @@ def _clear_record(quantities, kin, nodes, n):
 
 
 @subkernel
-def sum_share(quantities, kin, nodes, buffers, share):
+def sum_share(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
     """Sum the quantities at the nodes of a share, tile after tile, box after box."""
     nodes, buffers = at_hand(nodes), at_hand(buffers)
     first, parts = buffers.first, buffers.parts
