@@ -1,4 +1,4 @@
-"""What is gathered and given at the corners of domains, each in the place of a node.
+"""Gather from and scatter to the corners of domains, each in the place of a node.
 
 The functions of CPDI are sums over corners, N_I = sum_c w_c N_I^lin(x_c). What takes the weight or
 the gradient of a node once, as a factor, is therefore done with the few corners: a corner shows
@@ -17,7 +17,7 @@ from karamelo_py.points.transfers import add_moment, add_momentum, gradient_weig
 
 @point_function(otherwise=True)
 def by_corners(part, w):
-    """Whether a task or quantity takes the weight or the gradient of a node once, as a factor."""
+    """Return True if a part takes the weight or gradient of a node once, as a factor."""
     return False
 
 
@@ -47,7 +47,7 @@ def _by_corners_mass_momentum(part, w):
 
 @shared
 def all_by_corners(parts, w):
-    """Whether all tasks or quantities of a visit do."""
+    """Return True if all tasks or quantities of a visit go by corners."""
     return all(by_corners(part, w) for part in parts)
 
 
@@ -66,7 +66,7 @@ def in_block(w):
 
 @shared
 def shows_corners(tasks, w):
-    """Whether the velocities of the corners themselves are asked for."""
+    """Return True if the visit needs the velocities of the corners themselves."""
     return carried(w.basis, w.kin) > 0 and any(isinstance(task, g2p.Move) for task in tasks)
 
 
