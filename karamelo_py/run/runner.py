@@ -272,7 +272,7 @@ class Runner:
                     explain.stop(hub, simulation, status, good, self.place)
                 chunk = 1
                 continue
-            found = None if simulation.told_of_growth else energy.growth(hub, simulation)
+            found = None if simulation.told_of_growth else energy.words_of_growth(hub, simulation)
             if found is not None:
                 if self.returns < RETURNS and self._try_half(simulation, found[0]):
                     self.returns += 1

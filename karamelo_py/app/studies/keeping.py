@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.app.logs import read_log
+from karamelo_py.app.studies import stretches
 from karamelo_py.app.studies.curves import missing
+from karamelo_py.kernels.growth import WITHIN
 
-WITHIN = 0.1  # of what it was, which still counts as kept
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
@@ -52,12 +53,12 @@ class Kept(NamedTuple):
 
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
     """The word for a column `y` over `x`, and its mean over the last part over that at first."""
-    span = SHARE * (x[-1] - x[0])
-    first, last = y[x <= x[0] + span].mean(), y[x >= x[-1] - span].mean()
-    ratio = float(last / first) if first else np.nan
-    if not ratio <= 1 + within:  # nor for NaN
+    first, last = stretches.ends(x, y, SHARE)
+    share = stretches.grown(first, last)
+    ratio = last / first if first else np.nan
+    if not share <= within:  # nor for NaN
         return "gains", ratio
-    return ("damps" if ratio < 1 - within else "keeps"), ratio
+    return ("damps" if share < -within else "keeps"), ratio
 
 
 def look_at(

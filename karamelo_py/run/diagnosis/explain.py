@@ -9,6 +9,7 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels import growth
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, STOPPED
 from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
 from karamelo_py.output.fields import Fields
@@ -136,9 +137,7 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str
     if status not in (GAINED, HEATED) and step > simulation.step:
         before = simulation.energy()
         good.marks.again(simulation.advance, step)
-        if path is None and simulation.energy() - before > energy.IN_ALL * max(
-            abs(before), float(simulation.control.clock[0].energy_floor)
-        ):
+        if path is None and energy.growth_since(simulation, before) > growth.WITHIN:
             # The watch looks at means of a hundred steps, and has not seen it yet.
             grown = True
             _go_back(simulation, good, step)
@@ -190,9 +189,8 @@ def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
     before, steps = simulation.energy(), step - simulation.step
     if steps:
         simulation.advance(steps)
-    gain = simulation.energy() - before
-    floor = float(simulation.control.clock[0].energy_floor)
-    healthy = gain <= energy.IN_ALL * max(abs(before), floor) and not simulation.above_limit()
+    kept = energy.growth_since(simulation, before) <= growth.WITHIN
+    healthy = kept and not simulation.above_limit()
     simulation.advance(1)  # which goes wrong again, for others to look at
     return healthy
 
