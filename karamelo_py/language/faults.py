@@ -2,7 +2,6 @@
 
 import inspect
 import linecache
-import re
 import sysconfig
 import traceback
 from collections.abc import Callable, Iterator
@@ -10,10 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from numba.core.errors import NumbaError
-
-from karamelo_py.compiler.compile import Undefined
-from karamelo_py.compiler.trace import line_that_asks
+from karamelo_py.compiler.trace import CannotCompile, Undefined, places_of
 from karamelo_py.language import registry
 from karamelo_py.script.errors import FAILURES, Place, Quit, ScriptError
 
@@ -73,43 +69,16 @@ def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptEr
     return error
 
 
-def is_of_numba(error: BaseException) -> bool:
-    """Whether Numba refuses to compile something."""
-    return isinstance(error, NumbaError) or type(error).__module__.startswith("numba.")
-
-
 def cause_of(error: BaseException) -> str:
-    """What went wrong, in one line; of Numba, the cause that it gives."""
+    """Tell what went wrong, in one line; of what cannot be compiled, with the user's own line."""
     if isinstance(error, Undefined):
         return str(error)
-    if not is_of_numba(error):
+    if not isinstance(error, CannotCompile):
         return ": ".join(filter(None, (type(error).__name__, str(error))))
-    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
-    inner = text.rpartition("raised a specific error:")[2] or text
-    lines = (line.strip() for line in inner.splitlines())
-    causes = (line for line in lines if line and not re.match(r"(\w+: )?Failed in ", line))
-    text = f"Numba cannot compile it: {next(causes, type(error).__name__)}"
-    for file, line in places_of(error):
-        asking = line_that_asks(file, line)
-        if asking is not None:
-            what = linecache.getline(file, asking).strip()
-            return f"{text} (Numba compiles it for line {asking}, '{what}')"
-    return text
-
-
-def places_of(error: BaseException) -> list[tuple[str, int]]:
-    """Files and lines that took part in an exception, the innermost first.
-
-    Of Numba those that its text names, and the functions that it was compiling.
-    """
-    frames = list(traceback.walk_tb(error.__traceback__))[::-1]
-    here = [(frame.f_code.co_filename, line) for frame, line in frames]
-    if not is_of_numba(error):
-        return here
-    named = [(f, int(k)) for f, k in re.findall(r'File "(.*?)", line (\d+)', str(error))]
-    compiled = (frame.f_locals.get("func") for frame, _ in frames)
-    codes = [f.__code__ for f in compiled if inspect.isfunction(f)]
-    return [*named, *((code.co_filename, code.co_firstlineno) for code in codes), *here]
+    own = (place for place in places_of(error) if not place[0].startswith(_OTHERS))
+    lines = (linecache.getline(*place).strip() for place in own)
+    line = next(filter(None, lines), None)
+    return f"it cannot be compiled: {error}" + (f", in '{line}'" if line else "")
 
 
 # Not of the user: this program, Python's own library, and what is installed.
@@ -140,7 +109,7 @@ def place_in(code: Any, error: BaseException) -> str:
         own = inspect.getsourcefile(code)
     except TypeError:
         own = None
-    places = places_of(error)
+    places = [*places_of(error)]
     same = [place for place in places if own and Path(place[0]).resolve() == Path(own).resolve()]
     for file, line in [*same, *places][:1]:
         return f" ({Path(file).name}:{line})"

@@ -6,9 +6,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import Undefined
+from karamelo_py.compiler.trace import Undefined, places_of
 from karamelo_py.language import registry
-from karamelo_py.language.faults import KNOWN, TRACEBACK, cause_of, fault, places_of
+from karamelo_py.language.faults import KNOWN, TRACEBACK, cause_of, fault
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.laws import law_kind
 from karamelo_py.script.errors import FAILURES

@@ -157,7 +157,7 @@ def check_part(hub: Scene, name: str, part: Any) -> None:
     if family == "scheme":
         known = (
             table.AtPoints, table.AtNodes, table.Gather, table.Scatter,
-            table.Nodes, table.Call, table.Check,
+            table.NodeTask, table.SceneTask, table.Check,
         )  # fmt: skip
         for row in kind.rows:
             if not isinstance(row, known):

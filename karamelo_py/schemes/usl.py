@@ -6,9 +6,9 @@ from karamelo_py.compiler.compile import real, shared
 from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
-from karamelo_py.kernels.p2g import SeenMass
+from karamelo_py.kernels.p2g import SquaredMass
 from karamelo_py.kernels.rows import ACCELERATE, MOVE, SERIES, SUMS, light_node
-from karamelo_py.kernels.table import AtPoints, Gather, Nodes
+from karamelo_py.kernels.table import AtPoints, Gather, NodeTask
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import gradient_weight
 
@@ -33,12 +33,12 @@ class USL(NamedTuple):
 
     courant = (0.65, 0.4)
     damps = True  # what vibrates, with two points a cell and direction
-    node_fields = (SeenMass,)
+    node_fields = (SquaredMass,)
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),
         SUMS,
         *ACCELERATE,
-        Nodes(light_node),
+        NodeTask(light_node),
         SERIES,
         *MOVE,
         Gather(Strain()),
@@ -84,4 +84,4 @@ class USLUnlimited(NamedTuple):
     """
 
     courant = USL.courant
-    rows = tuple(Nodes(any_node) if row == Nodes(light_node) else row for row in USL.rows)
+    rows = tuple(NodeTask(any_node) if row == NodeTask(light_node) else row for row in USL.rows)

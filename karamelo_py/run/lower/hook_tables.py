@@ -129,6 +129,10 @@ class _Builder:
     def _program(self, formula: Any) -> tuple:
         if formula is None:
             return NO_PROGRAM
+        if formula.is_constant:  # without code: the number
+            first = sum(len(p) for p in self.constants)
+            self.constants.append(np.array([formula.constant]))
+            return 0, 0, first, first + 1
         program = formula.program(self.hub.values)
         ranges = []
         for pieces, piece in ((self.code, program.code), (self.constants, program.constants)):

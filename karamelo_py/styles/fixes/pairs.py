@@ -123,7 +123,7 @@ class PairContact(Fix):
         n, total = len(order), np.zeros(3)
         _, mass, radius, *both = np.ascontiguousarray(of_all[order].T)
         x, v = (np.stack(part, axis=1) for part in (both[:d], both[d:]))
-        bodies = pairs.Bodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
+        bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
         pairs.push_apart(self.law(), kin, bodies, pairs.cells_for(n), self._reach, dt, kick, total)
         force = np.empty((n, d))
         force[order] = bodies.force
