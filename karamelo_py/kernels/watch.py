@@ -232,7 +232,7 @@ def _sum_before(s, mode, step):
 
 @shared
 def unit_of(clock):
-    """What growth of energy is measured by: the most that there was, of a drift no more than so."""
+    """Unit of the growth of energy: the most that there was, of a drift no more than so."""
     return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
 
 
@@ -316,7 +316,7 @@ def measure_heat(s):
 
 @shared
 def look_at_heat(s):
-    """Whether all temperatures are between what fixes, sources and the initial state allow."""
+    """Compare all temperatures with what fixes, sources and the initial state allow."""
     clock = s.control.clock[0]
     if clock.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
         return True

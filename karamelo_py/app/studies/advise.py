@@ -278,7 +278,7 @@ def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
 
 
 def sureness(adviser: Adviser, best: Candidate) -> str:
-    """How sure a candidate is, in words."""
+    """Say how sure a candidate is."""
     said = f"{adviser.accuracy} {best.error:.3g}, {adviser.cost} {best.cost:.3g}"
     if best.forecast is None:
         return f"sure: it was run ({said})"

@@ -31,7 +31,7 @@ _TOO_MUCH = re.compile(r"memory|times the stable one")
 
 @dataclass
 class Outcome:
-    """What became of a case.
+    """Outcome of a case.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Stop(Exception):
 
 @dataclass
 class Launch:
-    """How the cases of a study are run.
+    """Run the cases of a study.
 
     Attributes
     ----------
@@ -128,14 +128,14 @@ class Launch:
     stop: threading.Event = field(default_factory=threading.Event)
 
     def key(self, case: Mapping[str, str]) -> str:
-        """What a result belongs to: it is used again only for the very same."""
+        """Hash what a result belongs to: it is used again only for the very same."""
         said = [karamelo_py.__version__, *self.texts, str(self.threads), str(self.repeat)]
         said += [f"{name}={value}" for name, value in case.items()]
         said.append(os.environ.get("NUMBA_DISABLE_JIT", "0"))
         return hashlib.sha256("\0".join(said).encode()).hexdigest()
 
     def kept(self, case: Mapping[str, str], folder: Path) -> Outcome | None:
-        """What became of this case in an earlier study, if the same was run in this folder."""
+        """Read the outcome of this case in an earlier study, if the same was run in this folder."""
         try:
             found = json.loads((folder / KEPT).read_text(encoding="utf-8"))
         except (OSError, ValueError):

@@ -82,7 +82,7 @@ def histories(
 
 
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
-    """Which rows (n,) of a log belong to one way forward.
+    """Choose the rows (n,) of a log that belong to one way forward.
 
     A run that was stopped ends with its last good state, which came before; one that went back and
     on with smaller steps has rows of what it gave up.

@@ -1,4 +1,4 @@
-"""Whether a log column, such as an energy, stays what it was: a cell for each run of a study."""
+"""Runs judged by a log column, such as an energy, that should stay: a cell for each."""
 
 import re
 from collections.abc import Container, Mapping, Sequence
@@ -23,7 +23,7 @@ _POINT = re.compile(r"point \d+ of solid '[^']*'")
 
 
 class Kept(NamedTuple):
-    """What became of the column in a run.
+    """Verdict on the column in a run.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Kept(NamedTuple):
 
     @property
     def silent(self) -> bool:
-        """Whether it went wrong and nothing says why."""
+        """Tell whether it went wrong and nothing says why."""
         return self.word in WRONG and not self.warned
 
 
@@ -65,7 +65,7 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, within: float,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """What became of a column in a run; a value of one of the computes `parts` is no whole.
+    """Judge a column in a run; a value of one of the computes `parts` is no whole.
 
     Raises
     ------

@@ -77,7 +77,7 @@ class Part:
 
 
 class Recorded:
-    """What is recorded of a log: ``err`` (the last value of that column), ``max:err``, ...
+    """Take a number from a log: ``err`` (the last value of that column), ``max:err``, ...
 
     ``off=abs(max:depth/3.28 - 1)`` is a formula of such numbers under a name of its own, in the
     language of scripts; it knows the variables of the study as well.
@@ -142,7 +142,7 @@ def recorded(
     variables: Container[str] = (),
     option: str = "-record",
 ) -> list[Recorded]:
-    """What -record, or another option, asks for.
+    """Read the numbers that -record, or another option, asks for.
 
     Raises
     ------
@@ -269,7 +269,7 @@ def surroundings() -> dict[str, Any]:
 
 
 def beside(path: Path) -> dict[str, Any]:
-    """What `describe` wrote beside a table, or nothing."""
+    """Read what `describe` wrote beside a table, or nothing."""
     try:
         return json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -155,7 +155,7 @@ def in_short(row: Mapping[str, Any]) -> str:
 
 
 def limited_by(folder: Path) -> str:
-    """What limits the first step of a run, by name; nothing where the script says the step."""
+    """Read by name what limits the first step of a run; nothing where the script says the step."""
     try:
         said = (folder / "out.txt").read_text(encoding="utf-8", errors="replace")
     except OSError:

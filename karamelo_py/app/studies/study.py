@@ -225,7 +225,7 @@ class _Display:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """How many runs there were, and of how many."""
+        """Count the runs that there were, and of how many."""
         most = self.study.most
         return (self.study.ran, most) if most else (self.finished, self.count)
 
@@ -243,7 +243,7 @@ class _Display:
 
 
 def kind_of(case: Mapping[str, str]) -> tuple[str, ...]:
-    """What the loops of a case are compiled for, as far as variables tell: words, not numbers."""
+    """Pick what the loops of a case are compiled for, as far as variables tell: its words."""
     return tuple(value for value in case.values() if number_of(value) is None)
 
 
@@ -335,7 +335,7 @@ def default_jobs() -> int:
 
 
 def terminal() -> Any:
-    """Where tables are shown; a file or a pipe is wide enough for whole rows."""
+    """Open the place of tables; a file or a pipe is wide enough for whole rows."""
     from rich.console import Console
 
     return Console() if sys.stdout.isatty() else Console(width=200)

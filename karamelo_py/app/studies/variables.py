@@ -158,7 +158,7 @@ class Scope:
 
 
 def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) -> bool:
-    """Whether a condition in the language of scripts holds for a case."""
+    """Evaluate a condition in the language of scripts for a case."""
     raw, node = parse_text(condition, "-where")
     value = evaluate(node, raw, Scope("-where", case, words))
     if not isinstance(value, float):

@@ -86,12 +86,12 @@ class SceneFacts:
 
     @property
     def moments(self) -> bool:
-        """Whether points move through the grid, with moments or gradients of their velocity."""
+        """Tell whether points that move through the grid keep moments or gradients of velocity."""
         return self.moves and Moment in getattr(self.transfer, "point_fields", ())
 
     @property
     def vanishing(self) -> bool:
-        """Whether points move through places at which D of the affine transfers vanishes."""
+        """Tell whether points move through places at which D of the affine transfers vanishes."""
         return self.moves and not self.basis.steady_moment
 
     @property
@@ -102,7 +102,7 @@ class SceneFacts:
 
     @property
     def linear(self) -> bool:
-        """Whether gradients jump at the faces of cells, with nodes at their corners alone."""
+        """Tell whether gradients jump at the faces of cells, with nodes at their corners alone."""
         return getattr(self.basis, "gradient_jumps", False) and self.basis.nodes_per_cell == 1
 
     @property
@@ -112,7 +112,7 @@ class SceneFacts:
 
     @property
     def sparse(self) -> bool:
-        """Whether a solid has about one point a cell and direction."""
+        """Tell whether a solid has about one point a cell and direction."""
         return timestep.sparse(self.hub)
 
     @property
@@ -124,17 +124,17 @@ class SceneFacts:
 
     @cached_property
     def motions(self) -> list[BodyMotion]:
-        """How the solids move."""
+        """Motions of the solids."""
         return self.simulation.motions()
 
     @cached_property
     def drift(self) -> Noise | None:
-        """What a drift through the grid feeds, at most."""
+        """Noise of a drift through the grid, at most."""
         return drift_of(self)
 
     @cached_property
     def rotation(self) -> Noise | None:
-        """What a turn through the grid feeds, at most."""
+        """Noise of a turn through the grid, at most."""
         return turn_of(self)
 
     @cached_property
@@ -146,7 +146,7 @@ class SceneFacts:
 
     @property
     def turns(self) -> bool:
-        """Whether a solid turns by an angle that counts."""
+        """Tell whether a solid turns by an angle that counts."""
         return self.turn > TURN
 
     @cached_property
@@ -177,7 +177,7 @@ class SceneFacts:
 
     @cached_property
     def vibration(self) -> Vibration:
-        """How the solid swings that does so most."""
+        """Vibration of the solid that swings most."""
         most = Vibration(0.0, 0.0)
         for one in self.motions if self.waves > 0 else ():
             strain = one.rate * one.size / (2 * self.waves)

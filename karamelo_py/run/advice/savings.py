@@ -1,4 +1,4 @@
-"""What a scene pays for and could leave out, each with the words to write instead."""
+"""Savings: a scene pays for this and could leave it out, with the words to write instead."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ MANY_POINTS = 4  # a cell and direction
 
 
 class Saving(NamedTuple):
-    """What could be left out.
+    """Part of a scene that could be left out.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ def savings(hub: Hub, simulation: Any) -> list[Saving]:
 
 
 def _of_parts(hub: Hub, simulation: Any) -> Iterator[Saving]:
-    """What parts say by their rules."""
+    """Ask the rules of the parts."""
     said = SceneFacts(hub, simulation, inf).advice("saving")
     return (Saving(one.reason, one.cure) for one in said)
 
@@ -151,7 +151,7 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Whether all points (or nodes) of a grid with one key are in the group of `fix`, or none.
+    """Tell whether all points (or nodes) of a grid with one key are in the group, or none.
 
     `key` makes one or two numbers of each of positions (n, 3).
     """
@@ -196,7 +196,7 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
 
 
 def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
-    """Whether fixes say nothing that is not 0 along direction k, nor what depends on it."""
+    """Tell whether fixes say nothing that is not 0 along direction k, nor depends on it."""
     for fix in _acting(hub):
         given = _given(fix)
         if len(given) <= len(rest) or not _is_zero(given[k]):
@@ -207,7 +207,7 @@ def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
 
 
 def _acts_alike(hub: Hub, rest: list[int]) -> bool:
-    """Whether fixes act on all that lies at one place in the directions `rest`, or on nothing."""
+    """Tell whether fixes act on all that lies at one place in the directions `rest`, or none."""
     for fix in _acting(hub):
         smooth_wall = fix.wall_friction is None and all(_given(fix)[j] is None for j in rest)
         if not smooth_wall and not _alike(hub, fix, lambda x: x[:, rest]):
@@ -238,7 +238,7 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
 
 
 def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
-    """Whether no node of the planes at `low` and `high` (in cells) moves along direction k."""
+    """Tell whether no node of the planes at `low` and `high` (in cells) moves along k."""
     lattice = hub.lattices[0]
     held = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():

@@ -1,4 +1,4 @@
-"""What went wrong in a run: found, explained, and the last good state written."""
+"""Troubles of a run: found, explained, and the last good state written."""
 
 import os
 from collections.abc import Iterator
@@ -37,7 +37,7 @@ APART = "no other point of it within a cell"
 
 
 class Trouble(NamedTuple):
-    """What went wrong, what can be done, and the line of the script at fault where one is known."""
+    """Trouble of a run, what can be done, and the line of the script at fault, if known."""
 
     message: str
     hint: str
@@ -52,7 +52,7 @@ class TooLarge(NamedTuple):
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
-    """What went wrong in a step, and what can be done."""
+    """Find what went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
         return Trouble(*_above_limit(hub, simulation), hub.update.dt_place)
     if status == SHRUNK:
@@ -169,7 +169,7 @@ def _return_before_growth(simulation: Simulation, good: RollbackPoint, end: int)
 
 
 def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
-    """Whether a step went wrong because points leave the domain, with no more energy than before.
+    """Tell whether a step went wrong since points leave the domain, at no more energy.
 
     No smaller step keeps these. Where nobody watches energy, who knows.
     """
@@ -288,7 +288,7 @@ def _first_wrong(simulation: Simulation) -> Wrong | None:
 
 
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
-    """What is wrong with the first point that went wrong, and what can be done."""
+    """Find what is wrong with the first point that went wrong, and what can be done."""
     wrong = [one for one in simulation.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
         return no_number(
@@ -352,13 +352,13 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
 
 
 def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> bool:
-    """Whether a point has a solid of others, none of which is near."""
+    """Tell whether a point has a solid of others, none of which is near."""
     others, near = np.sum(simulation.seen(_others, number, x, reach), axis=0)
     return others > 0 and near == 0
 
 
 def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> tuple[int, int]:
-    """How many other points of the solid of a point are at hand, and how many are near it."""
+    """Count the other points of the solid of a point, at hand and near it."""
     solid, others, near = solid_with(simulation.hub, number), 0, 0
     for some in simulation.some(None):
         own = (some.solid_of == solid.index) & (some.ids != number)
@@ -368,7 +368,7 @@ def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) ->
 
 
 def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
-    """Whether the domain of a point, whose corners move, is folded over."""
+    """Tell whether the domain of a point, whose corners move, is folded over."""
     s = simulation.stepped
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return False
@@ -376,7 +376,7 @@ def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
 
 
 def _smaller_step(hub: Hub, simulation: Simulation) -> str:
-    """How to take a smaller step, and whether the present one is too large for sure.
+    """Say how to take a smaller step, and that the present one is too large where it is.
 
     One that was so from the start on has ruined the state, and its limit with it.
     """
@@ -417,7 +417,7 @@ def _end_outputs(hub: Hub) -> None:
 
 @contextmanager
 def _told(hub: Hub) -> Iterator[None]:
-    """What prevents writing is told as a warning: another error is on its way."""
+    """Warn of what prevents writing: another error is on its way."""
     try:
         yield
     except ScriptError as error:
