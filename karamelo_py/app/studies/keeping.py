@@ -105,7 +105,7 @@ def _general(text: str) -> str:
     return _POINT.sub("a point", _OWN.sub("", text))
 
 
-class Table(NamedTuple):
+class Verdicts(NamedTuple):
     """Cells of runs: rows and columns are the values of variables."""
 
     headings: list[str]
@@ -115,7 +115,7 @@ class Table(NamedTuple):
 
 
 def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[str],
-          variables: Sequence[str]) -> Table:  # fmt: skip
+          variables: Sequence[str]) -> Verdicts:  # fmt: skip
     """Arrange runs: a row for each value of the variables `by`, a column for each of the others.
 
     Variables that go in step with those of the rows are left out.
@@ -146,7 +146,7 @@ def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[
         if one.silent:
             silent.append(", ".join(f"{name} = {row[name]}" for name in (*by, *across)))
     headings = [", ".join(f"{n} = {v}" for n, v in zip(across, c, strict=True)) for c in columns]
-    return Table(
+    return Verdicts(
         [*by, *(heading or "all" for heading in headings)],
         [[*key, *(cells.get((key, c), "") for c in columns)] for key in dict.fromkeys(keys)],
         notes,
@@ -154,7 +154,7 @@ def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[
     )
 
 
-def markdown(found: Table) -> str:
+def markdown(found: Verdicts) -> str:
     """The table as Markdown, and below what runs said, by the numbers in brackets."""
     lines = [found.headings, ["---"] * len(found.headings), *found.rows]
     text = "\n".join("| " + " | ".join(line) + " |" for line in lines)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.logs import read_log
-from karamelo_py.app.studies.case import Launch, Outcome, Refused, folder_name
+from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name
 from karamelo_py.app.studies.records import Recorded, row
 from karamelo_py.output.console import duration
 from karamelo_py.script.terms import number_of
@@ -146,7 +146,7 @@ class Study:
                 return item
         return None
 
-    def _put(self, case: Mapping[str, str], outcome: Outcome) -> None:
+    def _put(self, case: Mapping[str, str], outcome: CaseOutcome) -> None:
         if self.strict and outcome.status == "refused":
             raise Refused(case, outcome)
         found = row(case, outcome, self.items, self.folder.parent)
@@ -234,7 +234,9 @@ class _Display:
         done = [found for found in self.study.rows.values() if found.get("wall_s")]
         if not self.finished or not done:
             return None
-        predict = growth([{n: f[n] for n in self.names} for f in done], [f["wall_s"] for f in done])
+        predict = guessed_time(
+            [{n: f[n] for n in self.names} for f in done], [f["wall_s"] for f in done]
+        )
         now = time.perf_counter()
         rest = sum(predict(case) for case in queue)
         for case in running:
@@ -247,7 +249,7 @@ def kind_of(case: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(value for value in case.values() if number_of(value) is None)
 
 
-def growth(
+def guessed_time(
     cases: Sequence[Mapping[str, str]], times: Sequence[float]
 ) -> Callable[[Mapping[str, str]], float]:
     """A guess of the time of a case: a product of powers of its numbers and factors of its words.

@@ -44,7 +44,7 @@ class Trouble(NamedTuple):
     place: Place | None = None
 
 
-class TooLarge(NamedTuple):
+class StepTooLarge(NamedTuple):
     """A step above the stable limit of the start of a run: nothing behind that is a good state."""
 
     smaller: str  # what to write instead, by that limit
@@ -75,7 +75,7 @@ def stop(
     simulation: Simulation,
     status: int,
     good: RollbackPoint,
-    start: TooLarge | None,
+    start: StepTooLarge | None,
     place: Place | None,
 ) -> NoReturn:
     """Return to the last good state, write it, and raise what the user should know.
@@ -95,7 +95,7 @@ def stop(
 
 
 def _keep_start(
-    hub: Hub, simulation: Simulation, status: int, good: RollbackPoint, start: TooLarge
+    hub: Hub, simulation: Simulation, status: int, good: RollbackPoint, start: StepTooLarge
 ) -> str:
     """Write the state that the run began with, end the outputs, and say how to begin anew."""
     step, path = simulation.step, None
