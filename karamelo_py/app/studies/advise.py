@@ -22,7 +22,7 @@ from karamelo_py.app.studies.options import (
     out_file,
     zipped,
 )  # fmt: skip
-from karamelo_py.app.studies.study import Study, shown, terminal
+from karamelo_py.app.studies.study import Study, plain_table, shown, terminal
 from karamelo_py.app.studies.variables import cases, logged
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
@@ -241,13 +241,8 @@ def coarse_first(
 
 def tell(adviser: Adviser) -> None:
     """Print what each choice has shown, and what is expected of it."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("choice", style="cyan", no_wrap=True)
     headings = ("runs", f"finest {adviser.name}", adviser.accuracy, "order", "meets it at", "cost")
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = plain_table(["choice"], headings)
     for choice in adviser.choices:
         errors = column(choice.rows, adviser.accuracy)
         last = choice.rows[-1]

@@ -282,12 +282,24 @@ def _term(name: str, value: str) -> tuple[str, Any]:
 
 
 def shown(value: Any) -> str:
-    """A number or a word as a table shows it."""
-    if value is None or value == "":
+    """A number or a word as a table shows it; NaN is none."""
+    if value is None or value == "" or value != value:
         return "–"
     if isinstance(value, float):
         return f"{value:.4g}" if abs(value) < 1e5 or value != round(value) else f"{value:.3e}"
     return str(value)
+
+
+def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> Any:
+    """A table for a terminal, empty, with columns of words and of numbers."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, title=title, title_justify="left")
+    for name in words:
+        table.add_column(name, style="cyan", no_wrap=True)
+    for name in numbers:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
 
 
 def results_table(
