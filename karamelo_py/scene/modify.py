@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.hooks import STAGES, CompiledHook, heat_hook, node_hook, point_hook
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.views import NodesView, PointsView
@@ -147,7 +147,7 @@ class Fix:
 
         @wraps(hook)
         def call(view: Any) -> None:
-            with told(f"fix {self.style}", name, type(self), self.place):
+            with as_script_error(f"fix {self.style}", name, type(self), self.place):
                 hook(view)
                 view.write_back()
 

@@ -14,8 +14,8 @@ from karamelo_py.points.transfers import Moment
 from karamelo_py.run import timestep
 from karamelo_py.run.advice.noise import Noise, drift_of, turn_of
 from karamelo_py.run.body_motion import BodyMotion
-from karamelo_py.scene.blame import blamed, foreign_parts
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import attributed, foreign_parts
 
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
 
@@ -90,7 +90,7 @@ class SceneFacts:
         """Tell what the rules of the parts say, of one kind."""
         foreign = {part.kind: part for part in foreign_parts(self.hub)}
         for part, owner in self.parts():
-            with blamed(self.hub, foreign.get(type(part))):
+            with attributed(self.hub, foreign.get(type(part))):
                 said = list(rules.advice(kind, part, owner, self))
             yield from said
 
