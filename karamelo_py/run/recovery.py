@@ -89,10 +89,10 @@ class RollBack:
             elif not self._halve_step(status=status):
                 start = None
                 if self.smaller and not simulation.control.clock[0].watch_limit:
-                    start = explain.TooLarge(self.smaller, self.point.step == self.begun_at)
+                    start = explain.StepTooLarge(self.smaller, self.point.step == self.begun_at)
                 explain.stop(hub, simulation, status, self.point, start, self.place)
             return False
-        found = None if simulation.told_of_growth else energy.growth(hub, simulation)
+        found = None if simulation.told_of_growth else energy.words_of_growth(hub, simulation)
         if found is not None:
             if self.returns < RETURNS and self._halve_step(found[0]):
                 self.returns += 1
