@@ -1,8 +1,8 @@
 """The loop of compiled hooks of fixes over the members of their groups, at nodes and at points.
 
-What hooks act on is a tuple (`AtNodes`, `Motion`, `Warmth`), whose class says how the next members
-are chosen and what is done with a block of them. The functions of the hooks are described in
-`karamelo_py.kernels.hooks`.
+What hooks act on is a tuple (`AtNodes`, `MovingPoints`, `HeatedPoints`), whose class says how the
+next members are chosen and what is done with a block of them. The functions of the hooks are
+described in `karamelo_py.kernels.hooks`.
 """
 
 from typing import NamedTuple
@@ -42,7 +42,7 @@ _call_heat_function = caller_of(kinds.HEAT_FUNCTION)
 
 
 class AtNodes(NamedTuple):
-    """What node functions change, those of heat too.
+    """Nodes that node functions change, those of heat too.
 
     `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
     """
@@ -55,8 +55,8 @@ class AtNodes(NamedTuple):
     kept: float
 
 
-class Motion(NamedTuple):
-    """What point functions change: velocity, and the places y that follow from x.
+class MovingPoints(NamedTuple):
+    """Points whose velocity point functions change, and the places y that follow from x.
 
     Behind the d coordinates of a point, `y` has those of `corners` corners of its domain.
     """
@@ -69,8 +69,8 @@ class Motion(NamedTuple):
     corners: int
 
 
-class Warmth(NamedTuple):
-    """What heat functions change: the heat that points get."""
+class HeatedPoints(NamedTuple):
+    """Points that get heat, which heat functions change."""
 
     ids: np.ndarray
     kin: NamedTuple
@@ -87,22 +87,22 @@ class Warmth(NamedTuple):
 
 @point_function()
 def turns(what, k, parts):
-    """Where the turns of thread `k` of so many begin, end, and how far it is to the next."""
+    """Return where the turns of thread `k` of so many begin and end, and the step between them."""
 
 
 @point_function()
 def bounds(what, turn, parts):
-    """From where to before where members are chosen in a turn."""
+    """Return from where to before where members are chosen in a turn."""
 
 
 @point_function()
 def choose(what, hooks, h, place, end, member):
-    """Choose the next members, up to a block: how many, and where to go on."""
+    """Choose the next members, up to a block; return how many, and where to go on."""
 
 
 @point_function()
 def act(what, task, hooks, control, dt, h, count, share):
-    """Do `task` with the chosen members, add to the totals; the number of those that count."""
+    """Do `task` with the chosen members, add to the totals; return how many count."""
 
 
 @subkernel
@@ -123,7 +123,7 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
 
 @subkernel
 def _act_apart(what, task, hooks, control, dt, h, share, k):
-    """The part of thread `k`, with a scratch and totals of its own: totals do not round."""
+    """Act in the part of thread `k`, with a scratch and totals of its own: totals do not round."""
     own = record(hooks.apart, k)
     for i in range(control.values.size):
         own.values[i] = control.values[i]
@@ -145,7 +145,7 @@ def _act_apart(what, task, hooks, control, dt, h, share, k):
 
 @shared
 def _with_items_of(values, others):
-    """A NamedTuple with the items of another in the place of those with their names."""
+    """Put the items of another NamedTuple in the place of those with their names."""
     new = dict(zip(others._fields, others, strict=True))
     items = zip(values._fields, values, strict=True)
     return type(values)(*(new.get(name, item) for name, item in items))
@@ -185,13 +185,13 @@ def _act_on_all_threaded(mode, what, task, hooks, control, dt, h, share):
 
 @shared
 def directions(hooks):
-    """How many there are: a number that is read, so that no loop over them is unrolled."""
+    """Read their number: so that no loop over them is unrolled."""
     return hooks.x0.shape[1]
 
 
 @subkernel
 def evaluate(hooks, h, component, count, control, result, shift):
-    """Formula of one component over the chosen members, at the present time plus `shift`.
+    """Evaluate the formula of a component for the chosen members, at the present time plus `shift`.
 
     The results go to the row `result` of the scratch. A formula without code is a number.
     """
@@ -221,7 +221,7 @@ def evaluate(hooks, h, component, count, control, result, shift):
 
 @subkernel
 def _published(hooks, h):
-    """The first of the totals of a hook, and how many it publishes."""
+    """Return the first of the totals of a hook, and how many it publishes."""
     slot = hooks.table[h].slot
     rubs = hooks.programs[h, FRICTION].begin >= 0
     first, last = 3, -1
@@ -233,7 +233,7 @@ def _published(hooks, h):
 
 @subkernel
 def _clear_total(hooks, h, control):
-    """The totals of a hook start from zero."""
+    """Let the totals of a hook start from zero."""
     first, count = _published(hooks, h)
     for row in range(first, first + count):
         control.totals[row] = 0
@@ -264,7 +264,7 @@ def _bounds_of_nodes(what, turn, parts):
 
 @choose.on(AtNodes)
 def _choose_nodes(what, hooks, h, row, end, member):
-    """Those in use, with mass. Members ascend as rows do: a wall may have more than are in use."""
+    """Take those in use, with mass. Members ascend as rows do: a wall may have more than in use."""
     ranges, sums = what.ranges, what.nodes.sums
     of_all = what.target == LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
@@ -291,7 +291,7 @@ def _choose_nodes(what, hooks, h, row, end, member):
 
 @subkernel
 def _node(hooks, h, m):
-    """The number of a member of the group."""
+    """Return the number of a member of the group."""
     return hooks.members[m] if m < hooks.table[h].end else END
 
 
@@ -316,7 +316,7 @@ def _act_at_nodes(what, task, hooks, control, dt, h, count, share):
 
 @subkernel
 def _locate_nodes(grids, hooks, count):
-    """Positions of the chosen nodes."""
+    """Find the positions of the chosen nodes."""
     where = hooks.scratch
     for q in range(count):
         n = hooks.chosen[q]
@@ -331,7 +331,7 @@ def _locate_nodes(grids, hooks, count):
 
 @subkernel
 def _clear_held(what, held):
-    """Nobody holds a node yet."""
+    """Forget who has held nodes."""
     kin, ranges = what.kin, what.ranges
     if held.size > 0:
         for r in range(ranges[0, 0], ranges[ranges[0, 0] - 1, 1]):
@@ -342,7 +342,7 @@ def _clear_held(what, held):
 
 @subkernel
 def _take_over(hooks, control, h, n, c, force):
-    """Hook `h` holds node `n` by `force`: what those had of it that held it before."""
+    """Let hook `h` hold node `n` by `force`; return what those had of it that held it before."""
     before = 0.0
     if hooks.held.size > 0 and hooks.table[h].holds:
         held = hooks.held[n, c]
@@ -434,7 +434,7 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
 
 @subkernel
 def _rub_at_nodes(what, hooks, control, dt, h, count):
-    """Friction of the chosen nodes along their wall."""
+    """Rub the chosen nodes along their wall."""
     target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
     programs = hooks.programs[h]
     if target == arrays.ON_VELOCITY:
@@ -472,7 +472,7 @@ def _work_at_nodes(what, hooks, control, dt, count):
 
 @shared
 def _rubbed_alone(nodes):
-    """The nodes with that of their declared fields which walls know."""
+    """Return the nodes with that of their declared fields which walls know."""
     fields = tuple([one for one in nodes.fields if type(one) is Rubbed])
     return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
 
@@ -562,7 +562,7 @@ def _bounds_of_points(what, turn, parts):
 
 @shared
 def _choose_points(what, hooks, h, p, end, member):
-    """Those from `p` to before `end`; where they are before the step."""
+    """Take those from `p` to before `end`; note where they are before the step."""
     begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
     count = 0
     while p < end and count < BLOCK:
@@ -578,13 +578,13 @@ def _choose_points(what, hooks, h, p, end, member):
     return count, p, member
 
 
-for kind in (Motion, Warmth):
+for kind in (MovingPoints, HeatedPoints):
     turns.on(kind)(_turns_of_points)
     bounds.on(kind)(_bounds_of_points)
     choose.on(kind)(_choose_points)
 
 
-@act.on(Motion)
+@act.on(MovingPoints)
 def _act_on_motion(what, task, hooks, control, dt, h, count, share):
     v, y = what.v, what.y
     step_back = min(control.clock[0].last_dt, control.values[arrays.TIME])
@@ -622,7 +622,7 @@ def _act_on_motion(what, task, hooks, control, dt, h, count, share):
     return 0
 
 
-@act.on(Warmth)
+@act.on(HeatedPoints)
 def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
     evaluate(hooks, h, 0, count, control, np.int64(arrays.VALUE), 0.0)
     if hooks.programs[h, 1].begin >= 0:
@@ -674,7 +674,7 @@ def point_hooks(stage, what, hooks, control, dt):
 
 @entered
 def clear_totals(stage, hooks, control):
-    """Totals of point functions start from zero: they are summed over the blocks."""
+    """Let totals of point functions start from zero: they are summed over the blocks."""
     for h in range(len(hooks.table)):
         if hooks.table[h].stage == stage:
             _clear_total(hooks, h, control)
@@ -690,7 +690,7 @@ def publish_totals(stage, hooks, control):
 
 @shared
 def corners_that_move(s):
-    """How many corners stand behind the position of a point, and move with it."""
+    """Count the corners that stand behind the position of a point, and move with it."""
     return placed(s.basis, s.kin) if follows(s.frame) else 0
 
 
@@ -698,7 +698,7 @@ def corners_that_move(s):
 def _hook_points(block, s, hooks, stage, now, then):
     points = block.points
     corners = corners_that_move(s)
-    motion = Motion(points.id, points.v, points.mass, points.x[now], points.x[then], corners)
+    motion = MovingPoints(points.id, points.v, points.mass, points.x[now], points.x[then], corners)
     point_hooks(stage, motion, hooks, s.control, step_size(s))
 
 

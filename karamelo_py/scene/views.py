@@ -60,7 +60,7 @@ class NodesView(View):
         return self._simulation.summed(terms[own])
 
     def _part(self, array: np.ndarray, first: int) -> tuple:
-        """Where in an array of the nodes a vector of those of the view lies."""
+        """Return where in an array of the nodes a vector of those of the view lies."""
         return self.index, slice(first, first + self._d)
 
     @Shown
@@ -165,7 +165,7 @@ class PointsView(View):
         return found
 
     def _at_hand(self) -> list[tuple]:
-        """The points of the view: blocks, rows of them, and which of the view these are."""
+        """List the points of the view: blocks, rows of them, and which of the view these are."""
         if self._parts is None:
             place = np.full(self._simulation.count, -1)
             place[self.ids] = np.arange(len(self.ids))
@@ -175,7 +175,7 @@ class PointsView(View):
         return self._parts
 
     def _gather(self, of: Callable) -> np.ndarray:
-        """(n, ...) what points have, by what takes it from `Points`."""
+        """Gather a field (n, ...), which a function takes from `Points`."""
         parts = self._at_hand()
         first = of(parts[0][0].points)
         found = np.empty((len(self.ids), *first.shape[:-1]), first.dtype)

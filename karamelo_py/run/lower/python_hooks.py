@@ -15,7 +15,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def sets_initial_state(fix: Any) -> bool:
-    """Whether all a fix does is a hook in Python before the first step."""
+    """Tell whether all a fix does is a hook in Python before the first step."""
     hooks = fix.hooks()
     return set(hooks) == {"initial_integrate"} and not isinstance(
         hooks["initial_integrate"], CompiledHook
