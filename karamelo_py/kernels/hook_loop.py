@@ -20,7 +20,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
 from karamelo_py.kernels import hooks as kinds
 from karamelo_py.kernels.clock import kick, step_size
-from karamelo_py.kernels.loss import Rubbed
+from karamelo_py.kernels.loss import FrictionalHeat
 from karamelo_py.kernels.searching import first_from
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.basis import placed
@@ -473,7 +473,7 @@ def _work_at_nodes(what, hooks, control, dt, count):
 @shared
 def _rubbed_alone(nodes):
     """Return the nodes with that of their declared fields which walls know."""
-    fields = tuple([one for one in nodes.fields if type(one) is Rubbed])
+    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
     return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
 
 

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Protocol
 
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.log import Log
 from karamelo_py.output.plots import Plots
@@ -182,7 +182,9 @@ class Output:
     def _do(item: Any, what: str) -> None:
         """Write or finish; exceptions of a dump say where they come from."""
         style = getattr(item, "style", "")
-        with told(f"dump {style}", what, type(item), item.place) if style else nullcontext():
+        place = getattr(item, "place", None)
+        naming = as_script_error(f"dump {style}", what, type(item), place)
+        with naming if style else nullcontext():
             getattr(item, what)()
 
     def _items(self) -> list[Periodic]:
@@ -201,7 +203,7 @@ def _located(error: ScriptError, item: Any) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Whether `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
+    """Tell if `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

@@ -16,9 +16,9 @@ from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.conduction import show_heat
 from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.kernels.passes import sweep
+from karamelo_py.kernels.reports import all_well
 from karamelo_py.kernels.rows import SUMS
-from karamelo_py.kernels.sweep import Visit, sweep_nodes
+from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.access.nodes_by_number import ByNumber
@@ -223,6 +223,7 @@ class Lowered(ById, ByNumber):
         dt = step_size(s)
         visit = Visit((), SUMS.quantities, SUMS.weights)
         sweep(s, self.mode, visit, dt, False, True, False)
+        all_well(s)
         sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.ranges, dt)
         show_heat(s.heat, s, self.mode)
 

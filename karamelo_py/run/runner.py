@@ -17,8 +17,8 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import ruling_limit, words_of_own_step, words_of_share
 from karamelo_py.run.timings import Timings
 from karamelo_py.scene import boundary
-from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import attributed
 from karamelo_py.script.errors import Pause, Quit, ScriptError, render_message
 
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
@@ -136,7 +136,11 @@ class Runner:
             if hub.simulation.follows:
                 hub.simulation.follow()
             else:
-                with self.timings.telling_of_compilation(), blamed(hub), hub.simulation.leading():
+                with (
+                    self.timings.telling_of_compilation(),
+                    attributed(hub),
+                    hub.simulation.leading(),
+                ):
                     self._run(hub.simulation)
         finally:
             hub.running = None
