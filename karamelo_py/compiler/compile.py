@@ -74,7 +74,7 @@ def in_each_lane(function: Callable, arguments: tuple) -> Any:
     raise TypeError("only compiled kernels know lanes")
 
 
-def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Callable]:
+def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Any]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     The decorated function gives name, parameters and docstring. Implementations are added with

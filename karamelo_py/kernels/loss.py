@@ -148,7 +148,7 @@ def warm(w, stencil, p, v):
 
 @shared
 def in_company(w, stencil, p, moment):
-    """What point `p` of a gas keeps of the `moment` of its nodes' velocity: none of it alone.
+    """Return the part of `moment` that point `p` of a gas keeps: none where it is alone.
 
     Nodes that nobody else sees show it what it gave them: its moment would stay for ever, driven by
     its own pressure, and its volume grow without bounds, whatever the room around it. The energy of
@@ -229,7 +229,7 @@ def _before(w, i, like):
 
 @looping
 def _moment_before(w, stencil, v, moment):
-    """What a point would keep beside its velocity of that of the nodes before the update."""
+    """Gather the moment of the velocity that the nodes had before the update."""
     for k in range(support(w.basis, w.kin)):
         i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
         g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)

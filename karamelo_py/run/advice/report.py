@@ -77,8 +77,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
         say("")
         say("could be left out")
     for saving in found:
-        say(f"  {saving.cost}")
-        say(f"    instead: {saving.instead}")
+        say(f"  {saving.reason}")
+        say(f"    instead: {saving.cure}")
 
 
 def _size(count: float) -> str:
