@@ -3,7 +3,13 @@
 All at once go sums along the arms of a stencil, what is affine, and the corners of domains.
 """
 
-from karamelo_py.compiler.compile import in_all, looping, point_function, prefetch_records, shared
+from karamelo_py.compiler.compile import (
+    all_lanes,
+    looping,
+    point_function,
+    prefetch_records,
+    shared,
+)
 from karamelo_py.compiler.lanes import Eights, Fours
 from karamelo_py.kernels.affine import (
     affine_parts,
@@ -44,7 +50,7 @@ def _scatter(quantities, w, stencil, loads):
 @shared
 def _even(w, stencil, asked):
     """Whether D^-1 is the same for all points of a group; not asked where nothing depends on it."""
-    return in_all(evenly(w.basis, w.grid, stencil)) if asked else True
+    return all_lanes(evenly(w.basis, w.grid, stencil)) if asked else True
 
 
 @point_function(tags=2, otherwise=True)

@@ -9,14 +9,14 @@ from math import inf
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import (
-    choose,
-    first_failing,
-    in_all,
+    all_lanes,
+    first_false_lane,
     index,
     largest,
     point_function,
     real,
     shared,
+    where,
 )
 from karamelo_py.compiler.fields import load, load_vector, store
 from karamelo_py.compiler.held import at_hand, hold
@@ -126,7 +126,7 @@ def _fits_old_weights(weights, room, moved):
 
 @fits.on(PresentWeights)
 def _fits_present_weights(weights, room, moved):
-    return in_all(moved <= room)
+    return all_lanes(moved <= room)
 
 
 @point_function()
@@ -219,10 +219,10 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
                     totals = gathered_by(width, visit.tasks, w, stencil, place_of(w, p))
                 moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
             elif follows(s.frame):
-                moved = choose(inside(grid, s.kin, place_of(w, p)), moved, real(inf, moved))
+                moved = where(inside(grid, s.kin, place_of(w, p)), moved, real(inf, moved))
             good = (moved <= 1) & (rate < 1e300)  # so written, NaN counts as wrong too
-            if not in_all(good):
-                wrong = q + 1 + first_failing(good)
+            if not all_lanes(good):
+                wrong = q + 1 + first_false_lane(good)
                 continue
             furthest = max(furthest, moved)
             fastest = rate

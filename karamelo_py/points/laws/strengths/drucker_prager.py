@@ -71,7 +71,7 @@ class DruckerPrager(NamedTuple):
     """
 
     in_lanes = True
-    one_by_one = ("respond",)
+    scalarised = ("respond",)
 
     G: float  # shear modulus
     cohesion: float
