@@ -23,7 +23,7 @@ The node functions of heat see capacity, temperature before and after the step, 
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -80,8 +80,8 @@ class CompiledHook(NamedTuple):
         return self.where == "nodes"
 
     @property
-    def signature(self) -> types.Type:
-        """What its function takes and returns."""
+    def signature(self) -> Any:
+        """Signature of its function."""
         return FUNCTIONS[self.where]
 
 

@@ -49,7 +49,7 @@ def any_node(s):
     return UpdateToVelocity(real(0, s.nodes.sums[0, MASS]))
 
 
-any_node.goes_through = UpdateToVelocity.goes_through
+any_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defined]
 
 
 class USLUnlimited(NamedTuple):
