@@ -252,7 +252,7 @@ def advice(lowered):
         found = savings(
             hub, SimpleNamespace(dt=dt, limit=limit, control=control, fastest=lambda: 0.0)
         )
-        return "\n".join(f"{saving.cost} / {saving.instead}" for saving in found)
+        return "\n".join(f"{saving.reason} / {saving.cure}" for saving in found)
 
     return say
 

@@ -31,7 +31,7 @@ def save_state(request: dict) -> int:
     from karamelo_py.run.mpi import subdomain as part
     from karamelo_py.run.tiles import tiles
     from karamelo_py.script.errors import ScriptError
-    from karamelo_py.styles.dumps import hdf5, look
+    from karamelo_py.styles.dumps import hdf5
 
     script, columns = request["arguments"][0], request["columns"]
     usual = tiles.DIRECT_UP_TO, tiles.TILES, ranks.Ranks.gather
@@ -43,7 +43,7 @@ def save_state(request: dict) -> int:
     # One process has all points in a piece, several a few; files of HDF5 are the same then, too.
     piece = 16 if request["ranks"] > 1 else 1 << 17
     by_id.PIECE = by_number.PIECE = storing.PIECE = ranks.PIECE = piece
-    ranks.SAMPLES, hdf5.PIECE, look.MARKS = 8, 16, 16
+    ranks.SAMPLES, hdf5.PIECE = 8, 16
     try:
         folder = request["out"] and Path(request["out"])
         if request["fails"]:

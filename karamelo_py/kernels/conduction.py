@@ -32,9 +32,14 @@ from karamelo_py.kernels.heat import (
     Volume,
     Warming,
 )
-from karamelo_py.kernels.node_hooks import node_hooks
+from karamelo_py.kernels.hook_loop import (
+    HeatedPoints,
+    clear_totals,
+    node_hooks,
+    point_hooks,
+    publish_totals,
+)
 from karamelo_py.kernels.nodes import NodalUpdate, SumsToVelocity, TakeMean
-from karamelo_py.kernels.point_hooks import Warmth, clear_totals, point_hooks, publish_totals
 from karamelo_py.kernels.reports import read_reports
 from karamelo_py.kernels.rows import conduct
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
@@ -64,16 +69,17 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
 def _supply_blocks(block, s, hooks):
     points = block.points
     fields = points.fields
-    warmth = Warmth(
+    warmth = HeatedPoints(
+        points.id,
+        s.kin,
         field(fields, Capacity),
         field(fields, Temperature),
         field(fields, Volume),
         field(fields, Supply),
         field(fields, TemperatureShare),
-        points.mass,
         points.x[s.control.clock[0].now],
     )
-    point_hooks(arrays.SUPPLY_HEAT, warmth, s.kin, points.id, hooks, s.control, step_size(s))
+    point_hooks(arrays.SUPPLY_HEAT, warmth, hooks, s.control, step_size(s))
 
 
 @point_function(otherwise=True)

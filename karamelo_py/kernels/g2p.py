@@ -41,6 +41,7 @@ class Move(NamedTuple):
     """Gather v* and its change; settle velocity and new position."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "g2p, move"
     reads = ("x", "v")
     writes = ("x moved", "v", "moment", "bounces")
@@ -50,6 +51,7 @@ class Strain(NamedTuple):
     """Gather the gradient of the nodal velocity; settle the state of the law."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "stress"
     reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
     writes = ("state", "deformation gradient")
@@ -59,6 +61,7 @@ class StrainOfLastStep(NamedTuple):
     """The same by the velocity that has led here, at the places that it has led to."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -68,6 +71,7 @@ class SecondStrain(NamedTuple):
     """The same for the second of two strain increments of a step."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "second half of the stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -77,6 +81,7 @@ class StrainInMove(NamedTuple):
     """`Strain` in one visit with `Move`, behind it: what v* gave already is not gathered again."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -90,6 +95,7 @@ class TrialStrain(NamedTuple):
     """Gather the gradient; settle only by what factor it would change the volume (F-bar)."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "trial volume"
     reads = Strain.reads
     writes = ("volume ratio",)
@@ -99,6 +105,7 @@ class TrialStrainOfLastStep(NamedTuple):
     """The same of `StrainOfLastStep`."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "trial volume"
     reads = Strain.reads
     writes = TrialStrain.writes
@@ -108,6 +115,7 @@ class SetMeanStress(NamedTuple):
     """Gather the averaged mean stress of F-bar."""
 
     in_lanes = True
+    not_at_corners = ()
     says = "averaged mean stress"
     reads = ("x",)
     writes = ("averaged stress",)
@@ -119,6 +127,7 @@ class SeriesTerm(NamedTuple):
     k: int
 
     in_lanes = True
+    not_at_corners = ()
     says = "term of the series to the points"
     reads = ("x",)
     writes = ("term of series",)

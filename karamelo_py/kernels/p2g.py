@@ -35,6 +35,7 @@ class MassMomentum(NamedTuple):
     """Scatter mass and momentum."""
 
     in_lanes = True
+    not_at_corners = ("moments", "loss")
     says = "p2g mass and momentum"
     reads = ("x moved", "mass", "v", "moment")
 
@@ -56,6 +57,7 @@ class InternalForce(NamedTuple):
     """Scatter the internal force, and that of fixes on points."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "internal force"
     reads = ("mass", "state", "material", "deformation gradient", "force")
 
@@ -69,6 +71,7 @@ class MomentumAgain(NamedTuple):
     """Scatter momentum to the velocity array."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "momentum to grid"
     reads = ("mass", "v", "moment")
 
@@ -82,6 +85,7 @@ class Volumes(NamedTuple):
     """Scatter volume, after and before the trial increment (F-bar)."""
 
     in_lanes = True
+    not_at_corners = ()
     says = "volumes to grid"
     reads = ("mass", "state", "material", "volume ratio")
 
@@ -95,6 +99,7 @@ class AveragedForce(NamedTuple):
     """Scatter the internal force of the averaged mean stress less that of a point's own (F-bar)."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"
     reads = ("mass", "state", "material", "deformation gradient", "averaged stress")
     adds = True  # to a force that is there
@@ -109,6 +114,7 @@ class SeriesBack(NamedTuple):
     """Scatter the term of the series of XPIC, times mass."""
 
     in_lanes = True
+    not_at_corners = ()
     says = "term of the series to the grid"
     reads = ("mass", "term of series")
 

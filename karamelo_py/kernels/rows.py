@@ -12,8 +12,8 @@ from karamelo_py.kernels.arrays import Number, Setup, Tag
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.g2p import Move, SeriesTerm, SetMeanStress
+from karamelo_py.kernels.hook_loop import add_work
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
-from karamelo_py.kernels.moments import add_work
 from karamelo_py.kernels.nodes import (
     ClearFrictionalHeat,
     ExtendSeries,

@@ -154,7 +154,7 @@ def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
         for rest in (False, True):
             for c in range(cells):
                 here = bins[k, 0, c]
-                if bins[k, 1, c] < 0 and (here % found.width != 0) == rest:
+                if bins[k, 1, c] < 0 and (rest or here % found.width == 0):
                     bins[k, 0, c] = bins[k, 1, c] = place
                     place += here
         for q in range(begin, end):

@@ -18,7 +18,7 @@ from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
 from karamelo_py.kernels.clock import common_velocity, finish, kick, last_step_size, step_size
 from karamelo_py.kernels.g2p import STRAINS, TrialStrain, TrialStrainOfLastStep
-from karamelo_py.kernels.moments import at_nodes, at_points
+from karamelo_py.kernels.hook_loop import at_nodes, at_points
 from karamelo_py.kernels.reports import all_well, check_moves
 from karamelo_py.kernels.rows import average_volumes
 from karamelo_py.kernels.sweep import sweep, sweep_nodes

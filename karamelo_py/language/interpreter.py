@@ -103,12 +103,12 @@ class Interpreter(Meanings):
 
     @property
     def waits(self) -> bool:
-        """Whether a script is in the midst of its statements."""
+        """Tell if a script is in the midst of its statements."""
         return bool(self.frames)
 
     @property
     def has_more(self) -> bool:
-        """Whether statements come behind the present one."""
+        """Tell if statements come behind the present one."""
         return any(frame.next < len(frame.statements) for frame in self.frames)
 
     def include(self, name: str) -> None:
@@ -136,7 +136,7 @@ class Interpreter(Meanings):
         self.frames.pop()
 
     def included(self, name: str, folder: Path) -> Path:
-        """The file that ``include(name)`` means in a script of this folder."""
+        """Find the file that ``include(name)`` means in a script of this folder."""
         path = folder / name
         elsewhere = self._working_folder / name
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
@@ -163,7 +163,7 @@ class Interpreter(Meanings):
             raise
 
     def _copy(self, hub: Any) -> Interpreter:
-        """The same place in the script, on another hub."""
+        """Copy the place in the script, on another hub."""
         other = Interpreter(hub, self.presets)
         other.variables = dict(self.variables)
         other.files = list(self.files)
@@ -229,7 +229,7 @@ class Interpreter(Meanings):
                 raise
 
     def next_statement(self) -> syntax.Statement | None:
-        """The statement that comes next, in whichever file; it counts as carried out."""
+        """Take the statement that comes next, in whichever file; it counts as carried out."""
         while self.frames:
             frame = self.frames[-1]
             if frame.next < len(frame.statements):
@@ -263,7 +263,7 @@ class Interpreter(Meanings):
             ) from None
 
     def _execute_recorded(self, statement: syntax.Statement) -> None:
-        if isinstance(statement, syntax.Call) and registry.knows("command", statement.name):
+        if isinstance(statement, syntax.CommandCall) and registry.knows("command", statement.name):
             command = registry.find("command", statement.name)
             if getattr(command, "may_differ", False):
                 self._execute(statement)
@@ -281,14 +281,14 @@ class Interpreter(Meanings):
             raise replay.other_script("there a run stood here", statement.place)
 
     def _including(self, depth: int) -> list[Place]:
-        """The include statements of the first `depth` scripts in progress, the nearest first."""
+        """List the include statements of the first `depth` scripts, the nearest first."""
         frames = self.frames[:depth]
         return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
 
     def _execute(self, statement: syntax.Statement) -> None:
         if isinstance(statement, syntax.Assignment):
             self._assign(statement)
-        elif isinstance(statement, syntax.Call):
+        elif isinstance(statement, syntax.CommandCall):
             self._call(statement)
         else:
             assert isinstance(statement, syntax.Evaluation)
@@ -298,7 +298,7 @@ class Interpreter(Meanings):
             if isinstance(node, syntax.Name) and not self.means_something(node.name):
                 raise unknown_statement(self, node.name)
             if (
-                isinstance(node, syntax.Binary)
+                isinstance(node, syntax.BinaryOperation)
                 and node.operator == "=="
                 and isinstance(node.left, syntax.Name)
             ):
@@ -349,7 +349,7 @@ class Interpreter(Meanings):
 
     # -- calls ------------------------------------------------------------------------------------
 
-    def _call(self, statement: syntax.Call) -> None:
+    def _call(self, statement: syntax.CommandCall) -> None:
         name = statement.name
         if self.hides(name):
             raise unknown_call(self, name, statement.place, statement=True)

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Protocol
 
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.log import Log
 from karamelo_py.output.plots import Plots
@@ -104,7 +104,7 @@ class Output:
             self.write(last=True)
 
     def next_step(self, step: int) -> int:
-        """The first step after `step` at which something is due."""
+        """Find the first step after `step` at which something is due."""
         update = self.hub.update
         fixed = update.fixed_dt is not None
         return min(
@@ -182,7 +182,9 @@ class Output:
     def _do(item: Any, what: str) -> None:
         """Write or finish; exceptions of a dump say where they come from."""
         style = getattr(item, "style", "")
-        with told(f"dump {style}", what, type(item), item.place) if style else nullcontext():
+        place = getattr(item, "place", None)
+        naming = as_script_error(f"dump {style}", what, type(item), place)
+        with naming if style else nullcontext():
             getattr(item, what)()
 
     def _items(self) -> list[Periodic]:
@@ -192,7 +194,7 @@ class Output:
 
 
 def _located(error: ScriptError, item: Any) -> ScriptError:
-    """The error of an output, with the place of the command that asked for it."""
+    """Make the error of an output, with the place of the command that asked for it."""
     place = getattr(item, "place", None)
     if error.place is None and place is not None:
         error.place = place
@@ -201,7 +203,7 @@ def _located(error: ScriptError, item: Any) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Whether `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
+    """Tell if `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

@@ -23,16 +23,7 @@ from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.access.nodes_by_number import ByNumber
 from karamelo_py.run.access.points_by_id import ById
-from karamelo_py.run.checkpoint.arrays import (
-    Stored,
-    changing,
-    copied,
-    go_back,
-    opened,
-    stored,
-    stored_copies,
-    take_arrays,
-)
+from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.lower.build import State, chosen, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
@@ -241,32 +232,34 @@ class Lowered(ById, ByNumber):
 
         The copies of the snapshot `before`, which is lost, are used again where they fit.
         """
-        return copied(self, before or {})
+        return checkpoint.copied(self, before or {})
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot."""
-        go_back(self, snapshot)
+        checkpoint.restore(self, snapshot)
         self.version += 1
 
-    def stored(self) -> Iterator[Stored]:
+    def stored(self) -> Iterator[checkpoint.Stored]:
         """What a file to go on from holds, array by array."""
-        return stored(self)
+        return checkpoint.stored(self)
 
-    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[Stored]:
+    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[checkpoint.Stored]:
         """What such a file holds of a snapshot."""
-        return stored_copies(snapshot)
+        return checkpoint.in_file(snapshot)
 
     def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
         """The snapshot that a file holds."""
-        with opened(path, "good") as found:
+        with checkpoint.opened(path, "good") as found:
             # In the order in which copies are made, and written.
-            names = dict.fromkeys([*(name for name, _ in changing(self)), "values", *found])
-            return {name: found[name][()] for name in names}
+            names = [*(name for name, _ in checkpoint.changing(self)), "values", *found]
+            return {name: found[name][()] for name in dict.fromkeys(names)}
 
     def take_stored(self, path: Path) -> None:
         """Take the state that a file to go on from holds."""
-        with opened(path) as state:
-            take_arrays(self, {name: array[()] for name, array in state.items()})
+        with checkpoint.opened(path) as state:
+            checkpoint.restore(self, state)
+            checkpoint.take_known(self, state)
+            checkpoint.take_nodes(self, state)
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:
         """Block and index of points at hand that the last sweep found wrong, one a tile at most."""

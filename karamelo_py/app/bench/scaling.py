@@ -128,7 +128,7 @@ def measure(part: ScalingRun, crew: Crew | None = None) -> int:
     workload = WORKLOADS[part.workload]
     hub.interpreter.run_text(workload.script, "bench")
     simulation = hub.simulation
-    hub.running = SimpleNamespace(halve=False)
+    hub.running = SimpleNamespace(rollback=None)
     if simulation.follows:
         simulation.follow()
         return 0

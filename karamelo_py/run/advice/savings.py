@@ -1,52 +1,43 @@
-"""What a scene pays for and could leave out, each with the words to write instead."""
+"""Savings: a scene pays for this and could leave it out, with the words to write instead."""
 
 import re
 from collections.abc import Callable, Iterator
-from math import isinf
-from typing import Any, NamedTuple
+from math import inf
+from typing import Any
 
 import numpy as np
 
-from karamelo_py.points.laws import Absent, can, plastic_strain
-from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
-from karamelo_py.points.laws.thermoelastic import Thermoelastic
+from karamelo_py.language.rules import Advice
+from karamelo_py.run.advice.facts import SceneFacts
 from karamelo_py.run.timestep import own_step
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.styles.regions.cylinder import Cylinder
 
 AXES = "xyz"
 SMALL_STEP = 0.4  # of the stable one; scripts with moderate reserve are left alone
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lock
 MANY_POINTS = 4  # a cell and direction
-WIDE = {"cubic-spline", "ugimp", "cpgimp"}
 
 
-class Saving(NamedTuple):
-    """What could be left out.
-
-    Attributes
-    ----------
-    cost
-        What it costs and why it is not needed.
-    instead
-        What to write.
-    """
-
-    cost: str
-    instead: str
-
-
-def savings(hub: Hub, simulation: Any) -> list[Saving]:
-    """All that is known to be paid for without need, before anything has run."""
-    rules = (_step, _unread, _unused, _idle_parts, _averaging, _flat, _round, _basis, _points)
+def savings(hub: Hub, simulation: Any) -> list[Advice]:
+    """Find all that is known to be paid for without need, before anything has run."""
+    rules = (_step, _unread, _unused, _of_parts, _averaging, _flat, _round, _points)
     return [saving for rule in rules for saving in rule(hub, simulation)]
+
+
+def _of_parts(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    """Ask the rules of the parts."""
+    return SceneFacts(hub, simulation, inf).advice("saving")
+
+
+def _saving(cost: str, instead: str) -> Advice:
+    return Advice("", cost, instead)
 
 
 # --- the step ------------------------------------------------------------------------------------
 
 
-def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _step(hub: Hub, simulation: Any) -> Iterator[Advice]:
     share, limit = hub.update.dt_factor, simulation.limit
     if hub.update.fixed_dt is not None:
         dt = simulation.dt
@@ -59,9 +50,9 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
         return
     times = f"{best / dt:.3g} times as many steps as the program's own step asks for"
     if hub.update.fixed_dt is not None:
-        yield Saving(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
+        yield _saving(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
     else:
-        yield Saving(
+        yield _saving(
             f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
         )
 
@@ -69,7 +60,7 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
 # --- what nobody reads ---------------------------------------------------------------------------
 
 
-def _unread(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _unread(hub: Hub, simulation: Any) -> Iterator[Advice]:
     text = _script(hub)
     for kind, catalogue in (("compute", hub.computes), ("fix", hub.fixes)):
         for ID, item in catalogue.items():
@@ -79,13 +70,13 @@ def _unread(hub: Hub, simulation: Any) -> Iterator[Saving]:
             defined = rf"\b{kind}\s*\(\s*{re.escape(ID)}\s*,"
             uses = len(re.findall(rf"\b{re.escape(ID)}(?:_\w+)?\b", text))
             if 0 < uses <= len(re.findall(defined, text)):
-                yield Saving(
+                yield _saving(
                     f"{kind} {ID} ({item.style}) is measured at each output and shown nowhere",
                     f"leave it out, or name {_published(ID, item)} in log_modify",
                 )
 
 
-def _unused(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _unused(hub: Hub, simulation: Any) -> Iterator[Advice]:
     """Groups whose names stand nowhere but where they are made."""
     text = _script(hub)
     if re.search(r"\binclude\s*\(", text):
@@ -93,7 +84,7 @@ def _unused(hub: Hub, simulation: Any) -> Iterator[Saving]:
     for ID in hub.groups:
         made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
         if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
-            yield Saving(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
+            yield _saving(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
 
 
 def _published(ID: str, item: Any) -> str:
@@ -108,63 +99,7 @@ def _script(hub: Hub) -> str:
     return "\n".join(line.partition("#")[0] for line in lines)
 
 
-# --- parts of laws that never act ----------------------------------------------------------------
-
-
-def _idle_parts(hub: Hub, simulation: Any) -> Iterator[Saving]:
-    for material in dict.fromkeys(solid.material for solid in hub.solids.values()):
-        law = material.law
-        if isinstance(law, Thermoelastic):
-            if not hub.update.thermal:
-                yield Saving(
-                    f"material {material.id} has a temperature, and no heat flows",
-                    "leave cp, kappa and alpha out, or method(..., thermo-mechanical)",
-                )
-            continue
-        named = law._asdict()
-        strength, heat = named.get("strength"), named.get("temperature")
-        if strength is None:
-            continue
-        if not isinstance(named.get("damage", Absent()), Absent) and not _yields(strength):
-            yield Saving(
-                f"material {material.id} has a damage by plastic strain, and never yields",
-                "leave the damage out",
-            )
-        if heat is not None and not isinstance(heat, Absent) and not _feels_heat(named):
-            yield Saving(
-                f"the temperature of material {material.id} changes nothing but its column T",
-                "leave the temperature out",
-            )
-        if isinstance(strength, JohnsonCook) and strength.B == 0 and not any(_factors(strength)):
-            yield Saving(
-                f"the strength of {material.id} neither hardens nor depends on rate or heat",
-                f"strength(..., plastic, {strength.G:g}, {strength.A:g})",
-            )
-
-
-def _yields(strength: NamedTuple) -> bool:
-    return can(strength, plastic_strain) or any(
-        name in strength._fields for name in ("yield_stress", "A", "cohesion", "phi")
-    )
-
-
-def _factors(strength: NamedTuple) -> tuple[bool, bool]:
-    """Whether a strength has factors of the rate and of the temperature."""
-    names = ("rate", "softening")
-    return tuple(not isinstance(getattr(strength, n, Absent()), Absent) for n in names)
-
-
-def _feels_heat(parts: dict[str, Any]) -> bool:
-    """Whether the strength, the pressure or the damage depends on the temperature."""
-    strength = parts["strength"]
-    softens = _factors(strength)[1] or not isinf(getattr(strength, "Tm", np.inf))
-    pressures = getattr(parts["eos"], "thermal", 0), getattr(parts["temperature"], "alpha", 1)
-    presses = any(number != 0 for number in pressures)
-    damage = parts.get("damage", Absent())
-    return softens or presses or getattr(damage, "D5", 0) != 0
-
-
-def _averaging(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
     if not hub.update.anti_locking:
         return
     for solid in hub.solids.values():
@@ -172,7 +107,7 @@ def _averaging(hub: Hub, simulation: Any) -> Iterator[Saving]:
         moduli = (getattr(law, "lam", None), getattr(law, "G", None))
         if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
             return
-    yield Saving(
+    yield _saving(
         "anti_volumetric_locking(true): a visit of the points more, and nothing is nearly "
         "incompressible or flows",
         "leave it out",
@@ -205,7 +140,7 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Whether all points (or nodes) of a grid with one key are in the group of `fix`, or none.
+    """Tell whether all points (or nodes) of a grid with one key are in the group, or none.
 
     `key` makes one or two numbers of each of positions (n, 3).
     """
@@ -228,7 +163,7 @@ def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
     return True
 
 
-def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _flat(hub: Hub, simulation: Any) -> Iterator[Advice]:
     """Solids that are the same all along a direction in which nothing moves."""
     domain = hub.domain
     d = domain.dimension
@@ -241,7 +176,7 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
             given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             kept = " and ".join(AXES[axis] for axis in rest)
             named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
-            yield Saving(
+            yield _saving(
                 f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
                 f"the points of {'plane strain' if d == 3 else 'a line'}",
                 f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
@@ -250,7 +185,7 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
 
 
 def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
-    """Whether fixes say nothing that is not 0 along direction k, nor what depends on it."""
+    """Tell whether fixes say nothing that is not 0 along direction k, nor depends on it."""
     for fix in _acting(hub):
         given = _given(fix)
         if len(given) <= len(rest) or not _is_zero(given[k]):
@@ -261,7 +196,7 @@ def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
 
 
 def _acts_alike(hub: Hub, rest: list[int]) -> bool:
-    """Whether fixes act on all that lies at one place in the directions `rest`, or on nothing."""
+    """Tell whether fixes act on all that lies at one place in the directions `rest`, or none."""
     for fix in _acting(hub):
         smooth_wall = fix.wall_friction is None and all(_given(fix)[j] is None for j in rest)
         if not smooth_wall and not _alike(hub, fix, lambda x: x[:, rest]):
@@ -292,7 +227,7 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
 
 
 def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
-    """Whether no node of the planes at `low` and `high` (in cells) moves along direction k."""
+    """Tell whether no node of the planes at `low` and `high` (in cells) moves along k."""
     lattice = hub.lattices[0]
     held = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
@@ -308,15 +243,13 @@ def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
     return inside and bool(held.take(numbers, axis=k).all())
 
 
-def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
     """Cylinders about one axis, along which all acts."""
     if hub.domain.dimension != 3:
         return
     regions = [getattr(solid, "region", None) for solid in hub.solids.values()]
-    if not all(isinstance(region, Cylinder) for region in regions):
-        return
-    axes = {(region.along, region.centre) for region in regions}
-    if len(axes) > 1:
+    axes = {getattr(region, "axis", None) for region in regions}
+    if len(axes) > 1 or None in axes:
         return
     along, middle = axes.pop()
     across = [axis for axis in range(3) if axis != along]
@@ -338,7 +271,7 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
     radius = max(region.radius for region in regions)
     lo, hi = hub.domain.lo[along], hub.domain.hi[along]
     h = hub.domain.h
-    yield Saving(
+    yield _saving(
         "cylinders about one axis, and nothing acts around it: about "
         f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
         f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
@@ -346,28 +279,12 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
     )
 
 
-# --- basis and points ----------------------------------------------------------------------------
-
-
-def _basis(hub: Hub, simulation: Any) -> Iterator[Saving]:
-    method = hub.update.method
-    if method.frame.moves or method.basis_name not in WIDE:
-        return
-    d = hub.domain.dimension
-    cells = type(method.basis).cells + 1
-    yield Saving(
-        f"{method.basis_name} sees {cells**d} nodes a point; in a total Lagrangian method no point "
-        f"crosses cells, and linear functions, which see {2**d}, are of the same order",
-        "linear in method(...); karamelo-py sweep shows the errors of both",
-    )
-
-
-def _points(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _points(hub: Hub, simulation: Any) -> Iterator[Advice]:
     for solid in hub.solids.values():
         ppc = getattr(solid, "ppc", 0)
         if ppc >= MANY_POINTS:
             each = ppc**hub.domain.dimension
-            yield Saving(
+            yield _saving(
                 f"solid {solid.id} has {each} points a cell; more than two a direction gain little "
                 "once points have moved",
                 f"2 or 3 points a direction, and finer cells for what {each} cost",

@@ -14,13 +14,7 @@ from karamelo_py.kernels.totals import WORK
 from karamelo_py.output.node_columns import NodeRows
 from karamelo_py.run.access.points_by_id import ById, Piece
 from karamelo_py.run.checkpoint.arrays import Stored, check_points, of_nodes, opened, take_known
-from karamelo_py.run.checkpoint.part_state import (
-    own_share,
-    stored,
-    stored_snapshot,
-    take_nodes,
-    tilings_of,
-)
+from karamelo_py.run.checkpoint.part_state import own_share, stored, take_nodes, tilings_of
 from karamelo_py.run.lower.build import State, lower
 from karamelo_py.run.mpi.gather import join, lined_up, spread
 from karamelo_py.run.mpi.leading import Leading, by_all
@@ -258,7 +252,7 @@ class Holding(Leading):
 
     def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[Stored]:
         """What such a file holds of the state that each process has kept."""
-        return stored_snapshot(self)
+        return stored(self, kept=True)
 
     def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
         """Keep the state that a file holds beside the present one; what the first keeps."""
@@ -269,12 +263,8 @@ class Holding(Leading):
     def read_snapshot(self, path: Path, owner: np.ndarray) -> dict[str, np.ndarray]:
         """Keep the own share of it."""
         with opened(path, "good") as found:
-            part, names = self.part, ("clock", "work", "values")
-            known = {n: found[n][()] for n in found if n in names or n.startswith("touched/")}
-            part.kept = own_share(part, found, owner) | known | {"owner": owner}
-        if not self.crew.leads:
-            part.kept["work"][:] = 0
-        return part.kept
+            self.part.kept = own_share(self.part, found, owner)
+        return self.part.kept
 
     def stored(self) -> Iterator[Stored]:
         """What a file to go on from holds: not even the first needs the memory of all."""
@@ -309,16 +299,10 @@ class Holding(Leading):
 
     def read(self, path: Path, owner: np.ndarray) -> None:
         """Take the own share of the state that a file holds."""
-        part = self.part
         with opened(path) as state:
-            part.tiles.owner = owner
-            part.tiles.empty_nodes(part.setup)
-            part.put(own_share(part, state, owner))
-            reached = self.crew.everyone(part.tiles.reached_by(part.setup))
-            take_nodes(part, state, part.tiles.spans_of_all(reached))
+            self.part.restore(own_share(self.part, state, owner))
+            take_nodes(self.part, state)
             self.present[:] = state["present"][()]
-        if not self.crew.leads:
-            self.control.totals[WORK] = 0
         self._let_go()
 
     @property

@@ -317,4 +317,4 @@ class Ranks(Holding):
 
     def go_back(self) -> None:
         """Put back what was kept."""
-        self.part.go_back()
+        self.part.restore(self.part.kept)

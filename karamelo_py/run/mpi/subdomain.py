@@ -8,15 +8,16 @@ from karamelo_py.compiler.fields import records
 from karamelo_py.kernels.arrays import TIMESTEP, Block, Nodes, Setup, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.ranks import Linked
-from karamelo_py.kernels.totals import WORK
 from karamelo_py.run.access.points_by_id import Ordered
 from karamelo_py.run.checkpoint.arrays import (
+    changing,
     copied,
-    go_back,
     of_nodes,
     remembered_at,
+    restore,
     take_points,
     take_tiling,
+    touched,
 )
 from karamelo_py.run.checkpoint.part_state import points_of_tiles
 from karamelo_py.run.mpi.callbacks import Answers
@@ -152,33 +153,29 @@ class Part:
             "memory": [array[own] for array in self.memory()],
         }
 
-    def tell_of_tiles(self) -> dict:
-        """Tiles, the boxes of nodes that they reach, and work done."""
-        work, reached = self.setup.control.totals[WORK].copy(), self.tiles.reached_by(self.setup)
-        return {"tiling": self.tilings(), "reached": reached, "work": work}
+    def state(self, kept: bool) -> dict[str, np.ndarray]:
+        """Return the arrays of the present state, or of the one that was kept."""
+        return self.kept if kept else dict(changing(self)) | touched(self)
 
-    def give_tiles(self, k: int, first: int, end: int) -> dict[str, Any]:
+    def tell_of_state(self, kept: bool) -> dict:
+        """Tiles, the boxes of nodes that they reach, work done, and where contact acted last."""
+        state, blocks = self.state(kept), range(len(self.setup.blocks))
+        return {
+            "tiling": [stripped(state, f"tiling/{k}/") for k in blocks],
+            "reached": None if kept else self.tiles.reached_by(self.setup),
+            "work": state["work"].copy(), "touched": stripped(state, "touched/"),
+        }  # fmt: skip
+
+    def give_points(self, kept: bool, k: int, first: int, end: int) -> dict[str, Any]:
         """Points of the k-th block in tiles with numbers from `first` to before `end`."""
-        arrays = [array for _, array in arrays_of(self.setup.blocks[k].points)]
-        return points_of_tiles(self.tilings()[k], arrays, first, end)
-
-    def tell_of_kept(self) -> dict:
-        """Tiles and work of the state that was kept, and where contact acted last."""
-        kept, blocks = self.kept, range(len(self.setup.blocks))
-        tilings = [stripped(kept, f"tiling/{k}/") for k in blocks]
-        return {"tiling": tilings, "work": kept["work"], "touched": stripped(kept, "touched/")}
-
-    def give_kept(self, k: int, first: int, end: int) -> dict[str, Any]:
-        """Points that were kept, as `give_tiles` gives those of now."""
-        kept = self.kept
+        state = self.kept if kept else dict(changing(self))
         names = [name for name, _ in arrays_of(self.setup.blocks[k].points)]
-        arrays = [kept[f"points/{k}/{name}"] for name in names]
-        return points_of_tiles(stripped(kept, f"tiling/{k}/"), arrays, first, end)
+        arrays = [state[f"points/{k}/{name}"] for name in names]
+        return points_of_tiles(stripped(state, f"tiling/{k}/"), arrays, first, end)
 
-    def give_rows(self, first: int, end: int, memory: bool) -> tuple:
-        """Own nodes from `first` to before `end`: their rows, or what contact remembers of them."""
-        arrays = [array for _, array in of_nodes(self.setup)]
-        return self.rows(self.memory() if memory else arrays, first, end)
+    def give_rows(self, first: int, end: int) -> tuple:
+        """Own nodes from `first` to before `end`, and their rows."""
+        return self.rows([array for _, array in of_nodes(self.setup)], first, end)
 
     def node_rows(self, first: int, end: int, sums: dict[str, np.ndarray]) -> tuple:
         """The nodes from `first` to before `end`: what of them others do not show, and `sums`."""
@@ -258,15 +255,13 @@ class Part:
 
     def keep(self) -> dict[str, np.ndarray]:
         """Copy every array that a step changes."""
-        self.kept = copied(self, self.kept)
-        self.kept["owner"] = self.tiles.owner
+        self.kept = copied(self, self.kept) | {"owner": self.tiles.owner}
         return self.kept
 
-    def go_back(self) -> None:
-        """Put back what was kept."""
-        self.tiles.empty_nodes(self.setup)
-        self.tiles.owner = self.kept["owner"]
-        go_back(self, self.kept)
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Return to a state, and to whose the tiles were."""
+        self.tiles.owner = state["owner"]
+        restore(self, state)
 
 
 def _from_to(numbers: np.ndarray, first: int, end: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What every dump has: a rhythm, a file name with the step in it, checked columns."""
+"""The base of dumps: a rhythm, a file name with the step in it, checked columns."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -44,11 +44,11 @@ class Dump(Rhythmic):
 
     @property
     def one_file_per_step(self) -> bool:
-        """Whether the name has a ``*``."""
+        """Tell if the name has a ``*``."""
         return "*" in str(self.file)
 
     def path(self) -> Path:
-        """The file of the present state."""
+        """Name the file of the present state."""
         return self.hub.folder / str(self.file).replace("*", str(self.hub.update.step), 1)
 
     def write(self) -> None:

@@ -9,6 +9,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import pairs
 from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.p2g import Force
+from karamelo_py.language.rules import gain
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -128,3 +129,11 @@ class PairContact(Fix):
         force[order] = bodies.force
         ends = np.cumsum([len(one) for one in found])[:-1]
         return [(own, total) for own in np.split(force, ends)]
+
+
+gain(
+    PairContact,
+    when=lambda fix, scene: True,
+    cause="contact between points",
+    cure="a smaller step, or method ulmpm/contacts",
+)

@@ -1,4 +1,4 @@
-"""What Python says to a scene, in the words of a script, and what it is told."""
+"""Values and errors between Python and a scene, which speaks as a script does."""
 
 import re
 import sys
@@ -18,7 +18,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class SimulationError(ScriptError):
-    """What a script or a command is told that is wrong: the whole message, with its place.
+    """An error of a script or a command: the whole message, with its place.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class SimulationError(ScriptError):
 
 
 class KarameloWarning(UserWarning):
-    """What the command line would say as a warning."""
+    """A warning as the command line shows it."""
 
 
 class Quiet(Console):
@@ -45,7 +45,7 @@ class Quiet(Console):
 
 
 @contextmanager
-def told() -> Iterator[None]:
+def as_simulation_error() -> Iterator[None]:
     """Raise errors as those whose text is the whole message."""
     try:
         yield
@@ -57,7 +57,7 @@ def told() -> Iterator[None]:
 
 
 def refuse_copies() -> None:
-    """Of several processes that were started, the first tells that none shares a scene here."""
+    """Refuse several processes that were started: the first tells that none shares a scene here."""
     size, rank = launched()
     if size == 1:
         return
@@ -71,7 +71,7 @@ def refuse_copies() -> None:
 
 
 def threads_of(given: Any) -> int | None:
-    """The number of threads, as `--threads` takes it; None for auto."""
+    """Read the number of threads, as `--threads` takes it; None for auto."""
     try:
         return None if given is None else threads_option(str(given))
     except ArgumentTypeError:
@@ -81,8 +81,8 @@ def threads_of(given: Any) -> int | None:
         ) from None
 
 
-def said(value: Any) -> str:
-    """What a script says for a value in Python."""
+def as_script_text(value: Any) -> str:
+    """Write a value of Python as a script would."""
     if value is None:
         return "NULL"
     if isinstance(value, (bool, np.bool_)):
