@@ -7,7 +7,7 @@ through.
 from math import inf, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, fma, in_all, point_function, real, shared
+from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, shared, where
 from karamelo_py.compiler.fields import field, increase, load_vector, store, store_from
 from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
 from karamelo_py.kernels import averaging, visit
@@ -397,7 +397,7 @@ def _move(w, stencil, p, dt, total):
             new = carry(w.basis, w.kin, new, before, corner, scale(dt, u))
         store(w.places.y, p, new)
         moved += further_reach(w.basis, w.kin, w.grid, before, new)
-    return choose(inside(w.grid, w.kin, y), moved, real(inf, moved))
+    return where(inside(w.grid, w.kin, y), moved, real(inf, moved))
 
 
 @shared
@@ -422,17 +422,17 @@ def _strain(w, x, p, dt, dl, ratio, fastest):
         after = deformed(w.basis, w.kin, before, increment)
         store_from(w.places.y, p, dimension(w.kin), after)
         grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
-    if not in_all(j > 0):
-        return choose(j > 0, grown, real(inf, j)), fastest
+    if not all_lanes(j > 0):
+        return where(j > 0, grown, real(inf, j)), fastest
     # The speed of waves is only asked of the few points that may be faster than all before them.
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
     most = wave_speed_bound(law, w.kin, state) * shorter
     speed = largest_component(w.kin, subtract(load_vector(w.kin, w.points.v, p), w.common))
     slack = fastest - speed
-    if in_all((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
         return grown, fastest
     rate = sqrt(wave_speed_squared(law, w.kin, state) * shorter) + speed
-    return grown, choose(fastest > rate, fastest, rate)
+    return grown, where(fastest > rate, fastest, rate)
 
 
 @shared

@@ -3,7 +3,13 @@
 All at once go sums along the arms of a stencil, what is affine, and the corners of domains.
 """
 
-from karamelo_py.compiler.compile import in_all, looping, point_function, prefetch_records, shared
+from karamelo_py.compiler.compile import (
+    all_lanes,
+    looping,
+    point_function,
+    prefetch_records,
+    shared,
+)
 from karamelo_py.compiler.lanes import EightLanes, FourLanes
 from karamelo_py.kernels.affine import (
     affine_parts,
@@ -45,7 +51,7 @@ def _scatter(quantities, w, stencil, loads):
 @shared
 def _even(w, stencil, asked):
     """Return True if D^-1 is the same for all points in lanes, or nothing depends on it."""
-    return in_all(evenly(w.basis, w.grid, stencil)) if asked else True
+    return all_lanes(evenly(w.basis, w.grid, stencil)) if asked else True
 
 
 @point_function(tags=2, otherwise=True)
