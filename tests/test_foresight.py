@@ -298,7 +298,7 @@ def _checked(**words: object) -> Hub:
 def test_runs_that_are_over_count_from_the_last_fix():
     """200 time units of drift through 100 cells, of which the last run is a hundredth."""
     hub = _checked(**QUIET | {"u": "0.5, 0", "more": "scheme(musl)"})
-    told = hub.update.foreseen
+    told = hub.update.warned_of
     hub.values.set("time", 198.0)
     assert not told
     warn(hub, hub.simulation, 2.0, halves=False)
