@@ -63,7 +63,7 @@ def warn_about_steps(
     Raises
     ------
     ScriptError
-        See `foresight.warn`.
+        See `known_failures.warn`.
     """
     present = step_of(hub, halves)
     _warn_about_step(hub, simulation, present, again=again)
