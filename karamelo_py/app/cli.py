@@ -23,7 +23,7 @@ from karamelo_py.app.options import (
     positive,
     threads_option,
 )
-from karamelo_py.app.starting import begun
+from karamelo_py.app.start import begun
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
 from karamelo_py.run.mpi.crew import Crew, launched
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
@@ -159,7 +159,7 @@ def _dispatch(arguments: list[str]) -> int:
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """The last of the files behind -restart where a shell has put all that match a pattern.
+    """Take the last of the files behind -restart where a shell has put all that match a pattern.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def _numbers(name: str) -> list[int]:
 
 
 def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError:
-    """The error for words that a command line has no use for."""
+    """Make the error for words that a command line has no use for."""
     option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
     if option == "--ranks":
         return ScriptError(
@@ -216,7 +216,7 @@ class CommandLine(argparse.ArgumentParser):
         super().__init__(**(usual | options))
 
     def options(self) -> list[str]:
-        """All words that begin an option."""
+        """List all words that begin an option."""
         return [word for action in self._actions for word in action.option_strings]
 
     def error(self, message: str) -> NoReturn:
@@ -231,7 +231,7 @@ class CommandLine(argparse.ArgumentParser):
 
 
 def _parser(command: str) -> tuple[CommandLine, Any]:
-    """The command line and its subparsers; what only `command` needs is there only for it."""
+    """Make the command line and its subparsers; what only `command` needs is there only for it."""
     parser = CommandLine(
         prog="karamelo-py",
         usage=USAGE,
@@ -349,7 +349,7 @@ def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = Non
 
 
 def _tell_of_no_run(hub: Hub, script: str) -> None:
-    """A script of calculations needs no run; one that makes a scene may have forgotten it.
+    """Tell of a script without a run: one that makes a scene may have forgotten it.
 
     Raises
     ------

@@ -74,7 +74,7 @@ def in_each_lane(function: Callable, arguments: tuple) -> Any:
     raise TypeError("only compiled kernels know lanes")
 
 
-def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Callable]:
+def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Any]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     The decorated function gives name, parameters and docstring. Implementations are added with
@@ -83,7 +83,7 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
     its own in the same way. With ``otherwise`` what the decorated function does is for all others.
 
     Point functions serve one point or several at once (:mod:`karamelo_py.compiler.lanes`). Those
-    that a class names in ``one_by_one``, since they branch, are called for one point after another.
+    that a class names in ``scalarised``, since they branch, are called for one point after another.
     """
 
     def declare(stub: Callable) -> Callable:
@@ -124,7 +124,7 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         def choose(*arguments: Any) -> Callable | None:
             classes = tuple(tag_class(a) for a in arguments[:tags])
             found = find(classes)
-            apart = any(stub.__name__ in getattr(tag, "one_by_one", ()) for tag in classes)
+            apart = any(stub.__name__ in getattr(tag, "scalarised", ()) for tag in classes)
             if apart and lanes_of(arguments):
                 return one_by_one(dispatch, len(arguments))
             return found
@@ -216,13 +216,13 @@ def _fma(a, b, c):
     return lambda a, b, c: a * b + c
 
 
-def choose(condition: bool, a: float, b: float) -> float:
+def where(condition: bool, a: float, b: float) -> float:
     """`a` where `condition` holds, else `b`; both are computed, and nothing is branched over."""
     return a if condition else b
 
 
-@by_type(choose)
-def _choose(condition, a, b):
+@by_type(where)
+def _where(condition, a, b):
     return None if lanes_of(condition) else _one_of
 
 
@@ -230,23 +230,23 @@ def _one_of(condition: bool, a: float, b: float) -> float:
     return a if condition else b
 
 
-OF_REALS |= {fma, choose}
+OF_REALS |= {fma, where}
 
 
-def in_all(condition: bool) -> bool:
+def all_lanes(condition: bool) -> bool:
     """Whether a condition holds in all lanes; it itself where there are none."""
     return condition
 
 
-of_numbers(in_all)(lambda condition: lambda condition: condition)
+of_numbers(all_lanes)(lambda condition: lambda condition: condition)
 
 
-def in_any(condition: bool) -> bool:
+def any_lane(condition: bool) -> bool:
     """Whether a condition holds in any lane; it itself where there are none."""
     return condition
 
 
-of_numbers(in_any)(lambda condition: lambda condition: condition)
+of_numbers(any_lane)(lambda condition: lambda condition: condition)
 
 
 def of_present(p: int, value: float) -> float:
@@ -305,12 +305,12 @@ def added(total: float, value: float) -> float:
 of_numbers(added)(lambda total, value: lambda total, value: total + value)
 
 
-def first_failing(condition: bool) -> int:
+def first_false_lane(condition: bool) -> int:
     """The first lane in which a condition does not hold; 0 where there are none."""
     return 0
 
 
-of_numbers(first_failing)(lambda condition: lambda condition: 0)
+of_numbers(first_false_lane)(lambda condition: lambda condition: 0)
 
 
 def is_one(number: int) -> bool:

@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from karamelo_py.compiler.compile import by_type, choose, define, fma, in_all, real, shared
+from karamelo_py.compiler.compile import all_lanes, by_type, define, fma, real, shared, where
 from karamelo_py.compiler.lanes.registers import Lanes, element, vector_of
 
 
@@ -111,7 +111,7 @@ def _series(x: str, coefficients: list[float]) -> list[str]:
     return [*lines, f"total = fma(odd, {x}, even)"]
 
 
-_NAMES = {"real": real, "fma": fma, "choose": choose, "inf": inf, "nan": nan}
+_NAMES = {"real": real, "fma": fma, "where": where, "inf": inf, "nan": nan}
 _LN_2, _REST = math.log(2), 2.3190468138462996e-17  # what the first leaves of ln 2
 
 # ln m = 2 artanh s with s = (m - 1) / (m + 1), up to 0.172
@@ -123,7 +123,7 @@ _logarithm = define(
     "tt = t * t",
     *_series("t", [2 / (2 * k + 3) for k in range(10)]),
     f"ln = fma(e, real({_LN_2!r}, x), fma(s * t, total, fma(e, real({_REST!r}, x), s + s)))",
-    "return choose(x > 0, ln + (x - x), choose(x == 0, real(-inf, x), real(nan, x)))",
+    "return where(x > 0, ln + (x - x), where(x == 0, real(-inf, x), real(nan, x)))",
     taken_apart=_taken_apart,
     **_NAMES,
 )
@@ -150,10 +150,10 @@ _near_one = define(
     "rr = r * r",
     *_series("r", [(-1) ** k / (k + 3) for k in range(11)]),
     "ln = fma(rr, fma(r, total, real(-0.5, x)), r)",
-    "if in_all(near): return ln",
-    "return choose(near, ln, logarithm(x))",
+    "if all_lanes(near): return ln",
+    "return where(near, ln, logarithm(x))",
     logarithm=logarithm,
-    in_all=in_all,
+    all_lanes=all_lanes,
     **_NAMES,
 )
 
@@ -180,9 +180,9 @@ shared(_exponential)
 
 @shared
 def _of_zero(x, y):
-    return choose(y == 0, real(1, x), choose(y < 0, real(inf, x), real(0, x)))
+    return where(y == 0, real(1, x), where(y < 0, real(inf, x), real(0, x)))
 
 
 @by_type(power)
 def _choose_power(x, y):
-    return lambda x, y: choose(x == 0, _of_zero(x, y), exponential(y * logarithm(x)))
+    return lambda x, y: where(x == 0, _of_zero(x, y), exponential(y * logarithm(x)))

@@ -6,7 +6,8 @@ first compilation. Where a kernel calls a function marked for it, it is run by P
 meets one is lowered at once, into the function that calls. Tuples are Python's own, so that what
 only takes them apart costs nothing. The bits are the same. A function that asks what only a run can
 know (`if x > 0`) is walked through instead, statement by statement
-(:mod:`~karamelo_py.compiler.walk`). What cannot be written so is refused: :class:`CannotCompile`.
+(:mod:`~karamelo_py.compiler.statements`). What cannot be written so is refused:
+:class:`CannotCompile`.
 
 Functions run here see their globals through :class:`~karamelo_py.compiler.values.Globals`: what
 other code chooses by type is lowered for the types at hand, Python's functions are run in the same
@@ -36,6 +37,7 @@ from karamelo_py.compiler.choices import choosers, note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of, resolutions
 from karamelo_py.compiler.methods import refuse_methods
+from karamelo_py.compiler.statements import AstFunction, place_in_text
 from karamelo_py.compiler.values import (
     OF_REALS,
     OF_WHOLE,
@@ -57,7 +59,6 @@ from karamelo_py.compiler.values import (
     words,
     writing,
 )
-from karamelo_py.compiler.walk import Walked, place_in_text
 
 # --- what cannot be compiled ------------------------------------------------------------------
 
@@ -72,7 +73,7 @@ class CannotCompile(TypeError):
 
 
 class Undefined(TypeError):
-    """A point function is not defined for classes that need it."""
+    """Tell that a point function is not defined for classes that need it."""
 
     def __init__(self, function: str, classes: tuple):
         names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
@@ -81,7 +82,7 @@ class Undefined(TypeError):
 
 
 def _reason(error: BaseException) -> str:
-    """What is wrong, in one line; of Numba, the cause that it gives."""
+    """Say what is wrong, in one line; of Numba, the cause that it gives."""
     if isinstance(error, Untraceable):
         return str(error)
     if not isinstance(error, NumbaError):
@@ -94,7 +95,7 @@ def _reason(error: BaseException) -> str:
 
 
 def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
-    """Files and lines that took part in an exception, the innermost first."""
+    """List the files and lines that took part in an exception, the innermost first."""
     if isinstance(error, CannotCompile):
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
@@ -111,7 +112,7 @@ _copies: dict[Any, Any] = {}
 
 
 class _Module:
-    """A module, whose functions are seen like globals."""
+    """Show the functions of a module like globals."""
 
     def __init__(self, module: python.ModuleType):
         self._module = module
@@ -121,7 +122,7 @@ class _Module:
 
 
 class _Dispatched(Emitted):
-    """A point function: what the classes of its tags choose."""
+    """Call what the classes of tags, or the types of numbers, choose."""
 
     def __call__(self, *arguments: Any) -> Any:
         if self.counts(arguments):
@@ -142,7 +143,7 @@ class _Dispatched(Emitted):
         return found.run(*arguments)
 
     def defined(self, *classes: type) -> bool:
-        """Whether a point function has an implementation for these classes."""
+        """Tell whether a point function has an implementation for these classes."""
         return self.seen.defined(*classes)
 
 
@@ -197,7 +198,7 @@ _CONSTANT = (type(None), type(NotImplemented), bool, int, float, str, np.number,
 
 
 def _seen(thing: Any) -> Any:
-    """What takes the place of a global in functions that are run here."""
+    """Find what takes the place of a global in functions that are run here."""
     if isinstance(thing, (*_CONSTANT, Emitted, _Module)):
         return thing
     if isinstance(thing, python.ModuleType):
@@ -214,7 +215,7 @@ def _seen(thing: Any) -> Any:
     if thing not in _copies:
         _copies[thing] = _copy(thing)
     made = _copies[thing]
-    if isinstance(made, Walked) or (
+    if isinstance(made, AstFunction) or (
         isinstance(made, python.FunctionType) and type(made.__globals__) is Globals
     ):
         note([made.__code__])
@@ -224,7 +225,7 @@ def _seen(thing: Any) -> Any:
 
 
 def _copy(thing: Any) -> Any:
-    """The same for what is called."""
+    """Make the same for what is called."""
     if thing in _INSTEAD:
         return _INSTEAD[thing]
     if thing in _SAFE:
@@ -244,14 +245,14 @@ def _copy(thing: Any) -> Any:
 
 
 def _numba_knows(thing: Any) -> bool:
-    """Whether Numba has a version of its own; also before it compiled anything for processors."""
+    """Tell whether Numba has a version of its own; also before it compiled anything."""
     cpu_target.typing_context.refresh()
     return bool(cpu_target.typing_context._lookup_global(thing))
 
 
 @functools.cache
 def _fault_of(code: python.CodeType) -> str:
-    """Why a function is not run: where it catches what is raised here, or nothing follows it."""
+    """Say why a function is not run: it catches what is raised here, or nothing follows it."""
     if code.co_exceptiontable and not code.co_flags & inspect.CO_GENERATOR:
         return "kernels know no `try` and no `with`"
     if any(i.opname == "IMPORT_NAME" for i in dis.get_instructions(code)):
@@ -260,7 +261,7 @@ def _fault_of(code: python.CodeType) -> str:
 
 
 def _copied(function: Callable) -> Callable:
-    """The same function with other globals; walked through where it asks what only a run knows."""
+    """Copy a function with other globals; one that asks what only a run knows, from its text."""
     code = function.__code__
     if _fault_of(code):
         raise Untraceable(_fault_of(code))
@@ -274,11 +275,11 @@ def _copied(function: Callable) -> Callable:
     if not rolled and code not in branching:
         return made
     vars(made).update(vars(function))
-    return Walked(made, lambda: Flow(now()), rolled)
+    return AstFunction(made, lambda: Flow(now()), rolled)
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
-    """What a point function gives where one that nothing sees through calls it, as methods do."""
+    """Call a point function for one that nothing sees through, as methods do."""
     return _seen(dispatch)(*arguments)
 
 
@@ -286,7 +287,7 @@ def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
 
 
 class _Formula(NamedTuple):
-    """What is run for arguments of some types, the type of its result, what it consists of."""
+    """Keep what is run for arguments of some types, its type, and what it consists of."""
 
     run: Callable
     result: types.Type
@@ -304,7 +305,7 @@ _rolled: set[python.CodeType] = set()  # of functions with loops that are left t
 
 
 def _kinds_of(dispatch: Callable, kinds: Iterable[types.Type]) -> tuple[types.Type, ...]:
-    """The types of arguments: one function serves all numbers."""
+    """List the types of arguments: one function serves all numbers."""
     return tuple(map(types.unliteral, kinds) if dispatch in _own else kinds)
 
 
@@ -315,7 +316,7 @@ def _is_plain(thing: Any) -> bool:
 
 
 def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
-    """What :func:`_formula` gives, found by running it."""
+    """Find by a run what :func:`_formula` gives."""
     chosen = dispatch
     try:
         lowering = Lowering(_seen, typing)
@@ -340,7 +341,7 @@ def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
 
 
 def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
-    """What to run for arguments of these types; None if Numba has it."""
+    """Find what to run for arguments of these types; None if Numba has it."""
     key = typing, dispatch, numbers_of(kinds)
     if len(_formulas) > MOST_FORMULAS and not at_work():
         forget()

@@ -1,4 +1,4 @@
-"""Gathers and scatters at the corners of domains, each in the place of a node.
+"""Gather from and scatter to the corners of domains, each in the place of a node.
 
 The functions of CPDI are sums over corners, N_I = sum_c w_c N_I^lin(x_c). What takes the weight or
 the gradient of a node once, as a factor, is therefore done with the few corners: a corner shows
@@ -33,7 +33,7 @@ def by_corners(part, w):
 
 @shared
 def all_by_corners(parts, w):
-    """Tell whether all tasks or quantities of a visit may be done at corners."""
+    """Return True if all tasks or quantities of a visit go by corners."""
     return all(by_corners(part, w) for part in parts)
 
 
@@ -52,7 +52,7 @@ def in_block(w):
 
 @shared
 def shows_corners(tasks, w):
-    """Tell whether the velocities of the corners themselves are asked for."""
+    """Return True if the visit needs the velocities of the corners themselves."""
     return carried(w.basis, w.kin) > 0 and any(isinstance(task, g2p.Move) for task in tasks)
 
 

@@ -5,11 +5,19 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.compile import accumulate, of_present, point_function, real, shared
 from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, vector
 from karamelo_py.compiler.tuples import add_optional, leading, scale, subtract
-from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, VELOCITY_WIDTH, of_force
+from karamelo_py.kernels.arrays import (
+    MASS,
+    SUMS_WIDTH,
+    VELOCITY_WIDTH,
+    Index,
+    Number,
+    Tag,
+    of_force,
+)
 from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.g2p import zero_vector
 from karamelo_py.kernels.loss import EnergyLoss, bring_energy
-from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, records_of, state_of
+from karamelo_py.kernels.visit import Work, deformation_of, for_tags, law_of, records_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, add_force, force_stress
 from karamelo_py.points.kinematics import add_pressure, dimension, stretching_mean, zero_symmetric
@@ -134,7 +142,7 @@ class SquaredMass(SummedField):
 
     @staticmethod
     def needed(basis: Any) -> bool:
-        """Whether a basis makes light nodes that the gradient feels."""
+        """Return True if a basis makes light nodes that the gradient feels."""
         return basis.steep_edge
 
 
@@ -145,7 +153,7 @@ class Centre(SummedField):
 
 
 class RigidSums(SummedField):
-    """What rigid points give a node: mass, momentum and the force on them, as in `Nodes.sums`."""
+    """Sums of the rigid points at a node: mass, momentum, force on them, as in `Nodes.sums`."""
 
     @staticmethod
     def shape(kin):
@@ -154,8 +162,8 @@ class RigidSums(SummedField):
 
 
 @point_function()
-def load_of(quantity, w, p, like):
-    """What a point brings to the nodes."""
+def load_of(quantity: Tag, w: Work, p: Index, like: Number) -> tuple:
+    """Return the load of a point: the numbers that it scatters, before they are weighted."""
 
 
 @records_of.on(MassMomentum)
@@ -169,7 +177,7 @@ def _records_of_momentum_again(quantity, nodes):
 
 
 @point_function()
-def scattered(quantity, w, stencil, k, load):
+def scattered(quantity: Tag, w: Work, stencil: tuple, k: int, load: tuple) -> None:
     """Give the k-th node of the stencil its part."""
 
 
@@ -216,7 +224,9 @@ def _load_of_mass_momentum(quantity, w, p, like):
 
 
 @shared
-def momentum_part(w, stencil, k, weight, mass, v, moment):
+def momentum_part(
+    w: Work, stencil: tuple, k: int, weight: Number, mass: Number, v: tuple, moment: tuple
+) -> tuple:
     """The momentum that a point gives to the k-th node."""
     none = subtract(v, v)
     return add_momentum(

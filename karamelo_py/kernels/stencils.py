@@ -3,7 +3,13 @@
 All at once go sums along the arms of a stencil, what is affine, and the corners of domains.
 """
 
-from karamelo_py.compiler.compile import in_all, looping, point_function, prefetch_records, shared
+from karamelo_py.compiler.compile import (
+    all_lanes,
+    looping,
+    point_function,
+    prefetch_records,
+    shared,
+)
 from karamelo_py.compiler.lanes import EightLanes, FourLanes
 from karamelo_py.kernels.affine import (
     affine_parts,
@@ -11,6 +17,7 @@ from karamelo_py.kernels.affine import (
     gathered_by_arms,
     give_affine,
 )
+from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.corners import (
     all_by_corners,
     gather_corners,
@@ -21,7 +28,7 @@ from karamelo_py.kernels.corners import (
 from karamelo_py.kernels.g2p import empty_all, gathered_all
 from karamelo_py.kernels.lanes import OneByOne
 from karamelo_py.kernels.p2g import scattered_all
-from karamelo_py.kernels.visit import all_records_of
+from karamelo_py.kernels.visit import Work, all_records_of
 from karamelo_py.points.basis import entry, support
 from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, is_whole, of_one
 from karamelo_py.points.basis.cpdi.corners import CornerStencil
@@ -43,12 +50,12 @@ def _scatter(quantities, w, stencil, loads):
 
 @shared
 def _even(w, stencil, asked):
-    """Whether D^-1 is the same for all points of a group; not asked where nothing depends on it."""
-    return in_all(evenly(w.basis, w.grid, stencil)) if asked else True
+    """Return True if D^-1 is the same for all points in lanes, or nothing depends on it."""
+    return all_lanes(evenly(w.basis, w.grid, stencil)) if asked else True
 
 
 @point_function(tags=2, otherwise=True)
-def gather_nodes(width, stencil, tasks, w, totals):
+def gather_nodes(width: Tag, stencil: tuple, tasks: tuple, w: Work, totals: tuple) -> tuple:
     """The totals of the tasks over all nodes of the stencil."""
     return _gather(tasks, w, stencil, totals)
 
@@ -104,7 +111,7 @@ def _ask_ahead(tags, w, stencil):
 
 @shared
 def _gather_parts(tasks, w, stencil, totals):
-    """What can be is gathered from all nodes at once, the rest node by node."""
+    """Gather affine parts from all nodes at once, the rest node by node."""
     found = gathered_at_once_all(tasks, w, stencil, totals)
     rest = [k for k, total in enumerate(found) if not len(total)]
     own = _gather(tuple([tasks[k] for k in rest]), w, stencil, tuple([totals[k] for k in rest]))
@@ -112,7 +119,7 @@ def _gather_parts(tasks, w, stencil, totals):
 
 
 @point_function(tags=2, otherwise=True)
-def scatter_nodes(width, stencil, quantities, w, loads):
+def scatter_nodes(width: Tag, stencil: tuple, quantities: tuple, w: Work, loads: tuple) -> None:
     """Give all nodes of the stencil their parts."""
     _scatter(quantities, w, stencil, loads)
 
@@ -160,7 +167,7 @@ def _scatter_block(width, quantities, w, block, loads):
 
 @shared
 def _scatter_parts(width, quantities, w, stencil, loads, parts):
-    """What is affine at all nodes at once, the rest node by node."""
+    """Scatter affine parts to all nodes at once, the rest node by node."""
     known = tuple([part for part in parts if len(part)])
     if len(known):
         give_affine(width, w, stencil, known)
@@ -170,6 +177,6 @@ def _scatter_parts(width, quantities, w, stencil, loads, parts):
 
 
 @shared
-def gathered_by(width, tasks, w, stencil, x):
-    """What the tasks gather over the nodes of a stencil."""
+def gathered_by(width: Tag, tasks: tuple, w: Work, stencil: tuple, x: tuple) -> tuple:
+    """Gather the totals of the tasks over the nodes of a stencil."""
     return gather_nodes(width, stencil, tasks, w, empty_all(tasks, w, x))

@@ -94,7 +94,7 @@ def _tasks(gathers: list[Gather]) -> tuple:
 
 
 def _kinds(tags: tuple) -> tuple:
-    """What tells tags apart: tuples without numbers are all equal."""
+    """Return the classes of tags: as tuples, tags without numbers are all equal."""
     return tuple(type(tag) for tag in tags)
 
 
@@ -164,7 +164,7 @@ def staged(rows: Iterable[Any]) -> list[Any]:
 
 
 def says(row: Any, setup: Any) -> str | None:
-    """What a row does, in words; None where it does nothing in this scene."""
+    """Describe a row in words; None where it does nothing in this scene."""
     if isinstance(row, Sweep):
         parts = [tag.says for tag in row.visit.tasks if row.gathers]
         parts += [tag.says for tag in row.visit.quantities if row.scatters]

@@ -208,7 +208,7 @@ def _eight(n):
 
 @shared
 def _without_zeros(word):
-    """How many of eight digits are left without the zeros at their end."""
+    """Count eight digits without the zeros at their end."""
     kept = 8
     while kept > 0 and word >> 8 * (kept - 1) & 255 == ZERO:
         kept -= 1

@@ -12,7 +12,15 @@ cannot hide what vibrates.
 
 from math import inf
 
-from karamelo_py.compiler.compile import added, in_all, index, of_present, over_blocks, real, shared
+from karamelo_py.compiler.compile import (
+    added,
+    all_lanes,
+    index,
+    of_present,
+    over_blocks,
+    real,
+    shared,
+)
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel
@@ -103,7 +111,7 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
             energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
             stored = added(stored, mass * real(specific_volume(law), 0.0) * real(energy, 0.0))
             total = _carried(total, mass, v)
-            if not in_all((points.id[p] >= begin) & (points.id[p] < behind)):
+            if not all_lanes((points.id[p] >= begin) & (points.id[p] < behind)):
                 solid = -1
         tiling.report[t, ENERGIES] = kinetic
         tiling.report[t, ENERGIES + 1] = stored

@@ -5,7 +5,7 @@ import re
 
 
 def sections(doc: str) -> tuple[str, dict[str, str]]:
-    """The head of a docstring, and its sections by title."""
+    """Split a docstring into its head, and sections by title."""
     pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}$", inspect.cleandoc(doc), flags=re.MULTILINE)
     titles = [title.replace("Examples", "Example") for title in pieces[1::2]]
     texts = (text.strip("\n") for text in pieces[2::2])
@@ -13,7 +13,7 @@ def sections(doc: str) -> tuple[str, dict[str, str]]:
 
 
 def descriptions(section: str) -> dict[str, str]:
-    """Descriptions by name, from a section in NumPy's form."""
+    """Read descriptions by name, from a section in NumPy's form."""
     found: dict[str, str] = {}
     for block in re.split(r"\n(?=\S)", section):
         head, _, text = block.partition("\n")

@@ -136,7 +136,7 @@ class Interpreter(Meanings):
         self.frames.pop()
 
     def included(self, name: str, folder: Path) -> Path:
-        """The file that ``include(name)`` means in a script of this folder."""
+        """Find the file that ``include(name)`` means in a script of this folder."""
         path = folder / name
         elsewhere = self._working_folder / name
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
@@ -163,7 +163,7 @@ class Interpreter(Meanings):
             raise
 
     def _copy(self, hub: Any) -> Interpreter:
-        """The same place in the script, on another hub."""
+        """Copy the place in the script, on another hub."""
         other = Interpreter(hub, self.presets)
         other.variables = dict(self.variables)
         other.files = list(self.files)
@@ -229,7 +229,7 @@ class Interpreter(Meanings):
                 raise
 
     def next_statement(self) -> syntax.Statement | None:
-        """The statement that comes next, in whichever file; it counts as carried out."""
+        """Take the statement that comes next, in whichever file; it counts as carried out."""
         while self.frames:
             frame = self.frames[-1]
             if frame.next < len(frame.statements):
@@ -281,7 +281,7 @@ class Interpreter(Meanings):
             raise replay.other_script("there a run stood here", statement.place)
 
     def _including(self, depth: int) -> list[Place]:
-        """The include statements of the first `depth` scripts in progress, the nearest first."""
+        """List the include statements of the first `depth` scripts, the nearest first."""
         frames = self.frames[:depth]
         return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
 

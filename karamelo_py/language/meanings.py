@@ -55,7 +55,7 @@ class Meanings:
         return known or registry.knows("command", name) or bool(defined_later(self, name, None))
 
     def command(self, node: FunctionCall, raw: Raw) -> Value:
-        """The value of a call inside an expression that is not a function."""
+        """Find the value of a call inside an expression that is not a function."""
         name = node.name
         begin = raw.start + node.start
         place = raw.source.place(begin, begin + len(name))
@@ -82,7 +82,7 @@ class Meanings:
 
 
 def shown(value: Value) -> str:
-    """A value as a script would say it."""
+    """Write a value as a script would say it."""
     if isinstance(value, str):
         return f'"{value}"'
     if isinstance(value, Expression):

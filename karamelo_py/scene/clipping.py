@@ -1,4 +1,4 @@
-"""What a region leaves of the boxes of points at its edge: volumes and middles.
+"""Clipping of the boxes of points at the edge of a region: volumes and middles.
 
 A region says how far its surface is at least (`Region.depth`), so that a box is looked at only
 where the surface may pass through it. There the surface is a plane, found from that distance at the
@@ -27,7 +27,7 @@ SLOPE = 1e-3  # over the largest: one that is less is none (sums would lose thei
 
 
 class Pieces(NamedTuple):
-    """What lies in a region of boxes through which its surface passes.
+    """Clipped boxes: the parts in a region of boxes through which its surface passes.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Pieces(NamedTuple):
         return cls(*map(np.concatenate, zip(*pieces, strict=True)))
 
     def missed(self, size: float) -> float:
-        """How thick a part must be for its mass to be known; 0 where nothing is as thin."""
+        """Return the least thickness whose mass is known; 0 where nothing is as thin."""
         mostly = self.rough.sum() > MOSTLY * self.share.sum()
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
 
@@ -142,7 +142,7 @@ def join(region: Region, boxes: CellBoxes, pieces: Pieces) -> Pieces:
 
 
 def _measure(region: Region, lo: np.ndarray, edges: np.ndarray, size: float):
-    """What is left of boxes of which the surface may pass through: share (n,), its moment (n, d).
+    """Measure boxes clipped by a surface: share (n,) of a box, its moment (n, d).
 
     In shares of a whole box. Third, how much is rough, see `Pieces`.
     """
@@ -191,7 +191,7 @@ def _measure(region: Region, lo: np.ndarray, edges: np.ndarray, size: float):
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where a linear function is above 0 in a cube of edge length 1: share (n,), middle (d, n).
+    """Clip a unit cube by a linear function: share (n,) and middle (d, n) of its positive part.
 
     It is `mean` (n,) at the middle of the cube.
     """

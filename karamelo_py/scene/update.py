@@ -1,4 +1,4 @@
-"""How the scene goes forward: method, scheme, transfer, step size, clock (Karamelo's Update)."""
+"""Time integration of a scene: method, scheme, transfer, step size, clock (Karamelo's Update)."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ from karamelo_py.script.values import Values
 
 
 class Update:
-    """What method, scheme, set_dt and dt_factor chose, and the clock.
+    """Choices of method, scheme, set_dt and dt_factor, and the clock.
 
     Attributes
     ----------

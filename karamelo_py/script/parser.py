@@ -22,7 +22,7 @@ _SPELLINGS = {"**": "^", "and": "&&", "or": "||", "not": "!"}
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
-    """The statements of a script.
+    """Read the statements of a script.
 
     Arguments of calls stay as they are written; everything else is checked.
 
@@ -57,7 +57,7 @@ def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
 
 
 def parse_expression(raw: syntax.Raw) -> syntax.Node:
-    """The tree of an expression.
+    """Read the tree of an expression.
 
     Raises
     ------
@@ -71,14 +71,14 @@ def parse_expression(raw: syntax.Raw) -> syntax.Node:
 
 
 def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node]:
-    """An expression that stands in no script, such as one from the command line."""
+    """Read an expression that stands in no script, such as one from the command line."""
     raw = syntax.Raw(syntax.Source(text, file), 0, len(text))
     return raw, parse_expression(raw)
 
 
 @functools.lru_cache(maxsize=4096)
 def _tree(code: str) -> syntax.Node:
-    """The tree of `code`; its offsets count from the start of `code`."""
+    """Read the tree of `code`; its offsets count from the start of `code`."""
     word = code.strip()
     # Most arguments and many right-hand sides are one name or one whole number.
     if word.isascii() and word.isidentifier() and word not in _SPELLINGS:
@@ -107,7 +107,7 @@ def _number(word: str, start: int) -> float:
 def _statement(
     source: syntax.Source, kind: str, name: str, start: int, end: int, parts: Any
 ) -> syntax.Statement:
-    """The statement that lies at `start` to `end`."""
+    """Read the statement that lies at `start` to `end`."""
     place = source.place(start, start + max(len(name), 1))
     whole = syntax.Raw(source, start, end)
     if kind == "assignment":

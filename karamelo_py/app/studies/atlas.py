@@ -254,7 +254,7 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
     }
     shown = page.parent / "_static" / "atlas"
     parts = [
-        "# Atlas",
+        "# Atlas of accuracy and stability",
         "Written by `karamelo-py atlas`, by the commands that stand below pictures.",
     ]
     group = ""

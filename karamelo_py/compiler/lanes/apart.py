@@ -14,7 +14,7 @@ from karamelo_py.compiler.compile import (
     added,
     by_type,
     define,
-    first_failing,
+    first_false_lane,
     first_lane,
     in_each_lane,
     lanes_of,
@@ -165,7 +165,7 @@ def _added_lanes(typing_context, total, a):
 
 known(largest, _largest_lane)
 known(added, _added_lanes)
-known(first_failing, _first_false)
+known(first_false_lane, _first_false)
 known(first_lane, _first)
 
 
@@ -192,6 +192,6 @@ for _function in (
 def _branch(value):
     if lanes_of(value):
         raise Untraceable(
-            "several points are computed at once, which a branch cannot tell apart: take choose, "
-            "in_all or in_any, or name the point function in one_by_one"
+            "several points are computed at once, which a branch cannot tell apart: take where, "
+            "all_lanes or any_lane, or name the point function in scalarised"
         )

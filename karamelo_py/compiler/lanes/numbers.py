@@ -12,16 +12,16 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import (
+    all_lanes,
+    any_lane,
     by_type,
-    choose,
     define,
     fma,
-    in_all,
-    in_any,
     index,
     lanes_of,
     real,
     round_off,
+    where,
 )
 from karamelo_py.compiler.lanes.registers import I32, Lanes, call_vector, known, splat, vector_of
 from karamelo_py.compiler.lowering import Lowering
@@ -182,14 +182,14 @@ def select(typing_context, condition, a, b):
     return lanes(condition, *typed), codegen
 
 
-@by_type(choose)
-def _choose(condition, a, b):
+@by_type(where)
+def _where(condition, a, b):
     if not isinstance(condition, Lanes):
         return None
     if not isinstance(a, types.BaseTuple):
         return lambda condition, a, b: select(condition, a, b)
-    items = "".join(f"choose(condition, a[{k}], b[{k}]), " for k in range(len(a)))
-    return _spelled("condition, a, b", items, a, choose=choose)
+    items = "".join(f"where(condition, a[{k}], b[{k}]), " for k in range(len(a)))
+    return _spelled("condition, a, b", items, a, where=where)
 
 
 def _spelled(parameters: str, items: str, like: Any, **names: Any) -> Callable:
@@ -230,8 +230,8 @@ def _truth(function: Callable, sign: str, bits_of: int) -> None:
     known(function, asked)
 
 
-_truth(in_all, "==", -1)
-_truth(in_any, "!=", 0)
+_truth(all_lanes, "==", -1)
+_truth(any_lane, "!=", 0)
 
 
 # --- conversions ------------------------------------------------------------------------------

@@ -178,7 +178,8 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
-        array[...] = _checked(state, name, array)
+        if not name.startswith("tiling/"):
+            array[...] = _checked(state, name, array)
     for block in s.blocks:
         block.points.x[:] = block.points.x[s.control.clock[0].now]
     if "values" in state:

@@ -48,7 +48,7 @@ class Dump(Rhythmic):
         return "*" in str(self.file)
 
     def path(self) -> Path:
-        """The file of the present state."""
+        """Name the file of the present state."""
         return self.hub.folder / str(self.file).replace("*", str(self.hub.update.step), 1)
 
     def write(self) -> None:
