@@ -37,13 +37,13 @@ class Update:
         Where the script says so.
     warned_of_bounces
         Whether the user knows that points were reflected.
-    foreseen
+    warned_of
         Names of the failures that the user was warned of.
     moving
         The fixes of the last run, and since when none has come to them.
     """
 
-    remembers = ("warned_of_bounces", "foreseen")
+    remembers = ("warned_of_bounces", "warned_of")
 
     def __init__(self, values: Values):
         self.values = values
@@ -59,8 +59,14 @@ class Update:
         self.boundary = "error"
         self.boundary_place: Place | None = None
         self.warned_of_bounces = False
-        self.foreseen: list[str] = []
+        self.warned_of: list[str] = []
         self.moving: tuple[list[Any], float] = ([], 0.0)
+
+    def first_time(self, name: str) -> bool:
+        """Note that the user is warned of something; False where that was so before."""
+        first = name not in self.warned_of
+        self.warned_of += [name] * first
+        return first
 
     @property
     def words(self) -> str:

@@ -402,7 +402,7 @@ def _write_last_good(hub: Hub) -> Path | None:
     written: list[Path] = []
     path = restart_file.path_of(hub, Path(LAST_GOOD))
     if hub.output.writes and (not path.exists() or restart_file.is_restart(path)):
-        with _told(hub):
+        with _as_warnings(hub):
             written.append(restart_file.write(hub, Path(LAST_GOOD), within=True))
             # The files of restart(...) would hold the same once more.
             for item in hub.output.last:
@@ -411,12 +411,12 @@ def _write_last_good(hub: Hub) -> Path | None:
 
 
 def _end_outputs(hub: Hub) -> None:
-    with _told(hub):
+    with _as_warnings(hub):
         hub.output.write(last=True)
 
 
 @contextmanager
-def _told(hub: Hub) -> Iterator[None]:
+def _as_warnings(hub: Hub) -> Iterator[None]:
     """Warn of what prevents writing: another error is on its way."""
     try:
         yield
