@@ -111,14 +111,14 @@ _modules: dict[int, Globals] = {}
 _copies: dict[Any, Any] = {}
 
 
-class _Module:
+class Module:
     """Show the functions of a module like globals."""
 
-    def __init__(self, module: python.ModuleType):
-        self._module = module
+    def __init__(self, module: python.ModuleType, seen: Callable[[Any], Any]):
+        self._module, self._seen = module, seen
 
     def __getattr__(self, name: str) -> Any:
-        return _seen(getattr(self._module, name))
+        return self._seen(getattr(self._module, name))
 
 
 class _Dispatched(Emitted):
@@ -165,7 +165,7 @@ def _is_instance(thing: Any, kind: Any) -> bool:
 
 
 def _attribute(thing: Any, *name: Any) -> Any:
-    if isinstance(thing, _Module):
+    if isinstance(thing, Module):
         raise Untraceable("what is taken from a module has to be named: module.name")
     return getattr(thing, *name)
 
@@ -200,10 +200,10 @@ _CONSTANT = (type(None), type(NotImplemented), bool, int, float, str, np.number,
 
 def _seen(thing: Any) -> Any:
     """Find what takes the place of a global in functions that are run here."""
-    if isinstance(thing, (*_CONSTANT, Emitted, _Module)):
+    if isinstance(thing, (*_CONSTANT, Emitted, Module)):
         return thing
     if isinstance(thing, python.ModuleType):
-        return _Module(thing)
+        return Module(thing, _seen)
     if isinstance(thing, tuple):
         inner = [_seen(item) for item in thing]
         return type(thing)(*inner) if hasattr(thing, "_fields") else tuple(inner)
