@@ -14,7 +14,7 @@ from karamelo_py.compiler.choices import (
     note,
     tag_class,
 )
-from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, roll, run_for_kernel, traced
+from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, run_for_kernel, traced
 from karamelo_py.compiler.values import OF_REALS, at_work, now
 
 
@@ -50,12 +50,6 @@ def implements(function: Callable, *numbers: type) -> Callable:
 def shared(function: Callable) -> Callable:
     """Mark a helper of point functions: kernels may call it. It may ask what its arguments are."""
     return implements(function)(function)
-
-
-def looping(function: Callable) -> Callable:
-    """Mark a helper with a loop that is left to the compiler to unroll."""
-    roll(function)
-    return shared(function)
 
 
 def in_each_lane(function: Callable, arguments: tuple) -> Any:

@@ -272,11 +272,10 @@ def _copied(function: Callable) -> Callable:
     defaults = function.__defaults__ and tuple(map(_seen, function.__defaults__))
     made = python.FunctionType(code, seen, function.__name__, defaults, cells)
     made.__kwdefaults__ = {k: _seen(v) for k, v in (function.__kwdefaults__ or {}).items()}
-    rolled = code in _rolled
-    if not rolled and code not in branching:
+    if code not in branching:
         return made
     vars(made).update(vars(function))
-    return AstFunction(made, lambda: Flow(now()), rolled)
+    return AstFunction(made, lambda: Flow(now()))
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
@@ -302,7 +301,6 @@ MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with con
 _numbers = itertools.count()
 _begun: set[tuple] = set()  # of what is written now
 _own: set[Callable] = set()  # functions that are not written into what calls them
-_rolled: set[python.CodeType] = set()  # of functions with loops that are left to the compiler
 
 
 def _kinds_of(dispatch: Callable, kinds: Iterable[types.Type]) -> tuple[types.Type, ...]:
@@ -400,11 +398,6 @@ def _class_in_words(kind: types.Type) -> Any:
 def alone(dispatch: Callable) -> None:
     """Let kernels call `dispatch` as a function of its own, which is not written into them."""
     _own.add(dispatch)
-
-
-def roll(function: Callable) -> None:
-    """Leave the loops in a function to the compiler, those over known ranges too."""
-    _rolled.add(function.__code__)
 
 
 def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> None:
