@@ -79,8 +79,7 @@ class Runner:
         check_scene(hub)
         self._check_condition()
         if hub.rehearsing:
-            steps = inf if self.steps is None else self.steps
-            span = self.end_time - hub.update.time, steps
+            span = self.end_time - hub.update.time, inf if self.steps is None else self.steps
             hub.later.append(steps.step_of(hub, self.halve, span))
             hub.in_runs += hub.lasting()
             return
