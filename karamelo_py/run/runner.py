@@ -16,7 +16,7 @@ from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.rollback import Marks
 from karamelo_py.run.diagnosis import energy, explain
 from karamelo_py.run.lower.build import check_scene
-from karamelo_py.run.mpi.crew import heeding
+from karamelo_py.run.mpi.comm import check_same_run, handled_signals
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import (
     own_step_instead,
@@ -71,7 +71,8 @@ class Runner:
         self.smaller = ""  # what to write for a step that was above the stable limit there
         self.place = hub.place
         self.spent = Spent(hub)
-        self.interrupted = 0  # the signal
+        self.signal = 0  # that this process has been sent
+        self.interrupted = 0  # the signal that all processes end with
 
     def run(self) -> None:
         """Do it."""
@@ -98,11 +99,9 @@ class Runner:
             return
         hub.running = self
         try:
-            if hub.simulation.follows:
-                hub.simulation.follow()
-            else:
-                with self.spent.telling_of_compilation(), blamed(hub), hub.simulation.leading():
-                    self._run(hub.simulation)
+            check_same_run(hub)
+            with self.spent.telling_of_compilation(), blamed(hub):
+                self._run(hub.simulation)
         finally:
             hub.running = None
         hub.runs.append(self._values())
@@ -180,7 +179,7 @@ class Runner:
         # Points that are deleted would not come back.
         self.begun_at = -1 if ruined or hub.update.boundary == "delete" else began
         self._banner(simulation, going_on)
-        with heeding(self._note):
+        with handled_signals(self._note):
             with self.spent.counted("output"):
                 hub.output.begin(within=going_on)
             hub.console.begin_run(simulation.step, 0.0)
@@ -241,6 +240,7 @@ class Runner:
                 if simulation.step == first_step:
                     self._tell_of_no_first_step()
                 break
+            self._agree(simulation)
             if self.interrupted:
                 break
             step = simulation.step
@@ -257,8 +257,7 @@ class Runner:
             compiled, before = (spent.on[name][0] for name in ("compilation", "steps"))
             with spent.counted("steps"):
                 status = simulation.advance(int(target) - step)
-            if simulation.signal and not self.interrupted:
-                self._note(simulation.signal)
+            self._agree(simulation)  # what is written shows steps that no process has failed in
             elapsed = spent.on["steps"][0] - before
             if status != DONE:
                 if status == STOPPED and boundary.delete_leaving(hub, simulation, self.snapshot):
@@ -289,6 +288,7 @@ class Runner:
                 )
             taken = max(simulation.step - step, 1)
             chunk = int(min(CHUNK, max(1, PATIENCE * taken / max(elapsed, 1e-9))))
+            chunk = simulation.comm.bcast(chunk)
             with self.spent.counted("output"):
                 if simulation.step < last_step and simulation.time < self.end_time:
                     output.write()
@@ -297,6 +297,10 @@ class Runner:
                     simulation.time,
                     self._fraction(simulation, first_step, first_time),
                 )
+
+    def _agree(self, simulation: Simulation) -> None:
+        """Learn which signal any of the processes has been sent."""
+        self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
 
     def _keeps_start(self, simulation: Simulation) -> bool:
         """Whether no state but the first is a good one: the step was too large from there on."""
@@ -355,9 +359,9 @@ class Runner:
 
         So do the signals of batch systems and of terminals that are closed.
         """
-        if self.interrupted:
+        if self.signal:
             raise KeyboardInterrupt
-        self.interrupted = number
+        self.signal = number
         if number == getattr(signal, "SIGHUP", None):
             self.hub.console.leave()
 

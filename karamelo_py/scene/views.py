@@ -250,7 +250,7 @@ class PointsView(View):
             is small beside a cell. It is not called where no point keeps such a thing.
         """
         simulation, slopes = self._simulation, None
-        s, d = simulation.stepped, simulation.kin.dimension
+        s, d = simulation.setup, simulation.kin.dimension
         here = slice(component * d, component * d + d)
         for block, rows, own in self._at_hand():
             points, kept = block.points, field(block.points.fields, Moment)
@@ -273,7 +273,7 @@ class PointsView(View):
         """The points of the view: blocks, rows of them, and which of the view these are."""
         place = np.full(self._simulation.count, -1)
         place[self.ids] = np.arange(len(self.ids))
-        for block in self._simulation.stepped.blocks:
+        for block in self._simulation.setup.blocks:
             of_block = place[block.points.id]
             rows = np.flatnonzero(of_block >= 0)
             yield block, rows, of_block[rows]
@@ -321,7 +321,7 @@ class PointsView(View):
 
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
-        s = self._simulation.stepped
+        s = self._simulation.setup
         names, like = s.kin.symmetric_names, s.nodes.sums[0, arrays.MASS]
         flags = np.array([name in given for name in names])
         values = np.stack(

@@ -2,17 +2,34 @@
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.compiler.fields import rows_of_points
 from karamelo_py.kernels.arrays import Tiling, arrays_of
-from karamelo_py.kernels.totals import carry
+from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.output.fields import PIECE
-from karamelo_py.run.checkpoint.arrays import Stored, known, latest, of_nodes, take_tiling, wholes
-from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of_tiling
-from karamelo_py.run.mpi.partition import SharedTiles
+from karamelo_py.run.checkpoint.arrays import (
+    Stored,
+    check_points,
+    known,
+    latest,
+    of_nodes,
+    opened,
+    take_known,
+    take_tiling,
+    wholes,
+)
+from karamelo_py.run.mpi.pack import (
+    by_tile,
+    join_tilings,
+    share_of_tiling,
+    stripped,
+    tilings_in_use,
+)
+from karamelo_py.run.mpi.partition import SharedTiles, work_of
 from karamelo_py.run.tiles.boxes import between, numbers
 from karamelo_py.run.tiles.tiles import SHARES, in_use
 
@@ -30,53 +47,92 @@ def points_of_tiles(
     }  # fmt: skip
 
 
-def stored(ranks: Any) -> Iterator[Stored]:
-    """The arrays of `state.arrays_by_name`, with the same bits, in the same order."""
-    parts = ranks.together("tell_of_tiles")
-    yield from _in_tiles(ranks, parts, ranks.control.clock, "give_tiles")
-    spans = ranks.part.tiles.spans_of_all(part["reached"] for part in parts)
-    if memory := ranks.part.memory():
-        yield from _nodes(ranks, spans, {"contact": memory[0]})
-    yield from wholes(known(ranks))
-    yield from _nodes(ranks, spans, dict(of_nodes(ranks.part.setup)))
+def stored(simulation: Any) -> Iterator[Stored]:
+    """Yield the arrays of `arrays.arrays_by_name`, with the same bits and in the same order.
+
+    All processes go through this together; the first gets the arrays.
+    """
+    s, comm, tiles = simulation.setup, simulation.comm, simulation.tiles
+    work, reached = s.control.totals[WORK].copy(), tiles.reached_by(s)
+    parts = comm.gather({"tiling": tilings_in_use(s), "reached": reached, "work": work})
+    own = [[a for _, a in arrays_of(block.points)] for block in s.blocks]
+    yield from _in_tiles(simulation, parts, s.control.clock, tilings_in_use(s), own)
+    spans = comm.bcast(parts and tiles.spans_of_all(part["reached"] for part in parts))
+    if memory := simulation.subdomain.contact_memory():
+        yield from _nodes(simulation, spans, {"contact": memory[0]}, memory)
+    yield from wholes(known(simulation))
+    kinds = dict(of_nodes(s))
+    yield from _nodes(simulation, spans, kinds, list(kinds.values()))
 
 
-def stored_snapshot(ranks: Any) -> Iterator[Stored]:
-    """The arrays of `state.stored_copies`, likewise."""
-    parts, own = ranks.together("tell_of_kept"), ranks.part.kept
-    yield from _in_tiles(ranks, parts, own["clock"], "give_kept")
-    yield from wholes({"values": own["values"]})
-    if touched := [part["touched"] for part in parts if part["touched"]]:
-        nodes, first = np.unique(np.concatenate([of["nodes"] for of in touched]), True)
-        rows = np.concatenate([of["rows"] for of in touched])[first]
+def stored_snapshot(simulation: Any, kept: Mapping[str, np.ndarray]) -> Iterator[Stored]:
+    """Yield the arrays of `arrays.stored_copies`, likewise, of what each process has kept."""
+    blocks = simulation.setup.blocks
+    tilings = [stripped(kept, f"tiling/{k}/") for k in range(len(blocks))]
+    touched = stripped(kept, "touched/")
+    parts = simulation.comm.gather({"tiling": tilings, "work": kept["work"], "touched": touched})
+    own = [
+        [kept[f"points/{k}/{name}"] for name, _ in arrays_of(block.points)]
+        for k, block in enumerate(blocks)
+    ]
+    yield from _in_tiles(simulation, parts, kept["clock"], tilings, own)
+    yield from wholes({"values": kept["values"]})
+    if found := [part["touched"] for part in parts or () if part["touched"]]:
+        nodes, first = np.unique(np.concatenate([of["nodes"] for of in found]), True)
+        rows = np.concatenate([of["rows"] for of in found])[first]
         yield from wholes({"touched/nodes": nodes, "touched/rows": rows})
 
 
-def _in_tiles(ranks: Any, parts: list[dict], clock: np.ndarray, give: str) -> Iterator[Stored]:
-    """Tiles, clock and work, and the points, which the parts `give` tile after tile."""
-    tilings = [ranks.tiles.empty_tiling() for _ in ranks.blocks]
-    for k, tiling in enumerate(tilings):
-        tiling.count[1] = 1 if ranks.tiles.direct else SHARES
+def _in_tiles(
+    simulation: Any, parts: list[dict] | None, clock: np.ndarray, own_tilings: list[dict],
+    own: list[list[np.ndarray]],
+) -> Iterator[Stored]:  # fmt: skip
+    """Yield tiles, clock and work, and the points, tile after tile.
+
+    Parameters
+    ----------
+    parts
+        Tiles and work of all processes, at the first.
+    own_tilings, own
+        Tiles and arrays of the points of this process, block by block.
+    """
+    tilings = [simulation.tiles.empty_tiling() for _ in own]
+    for k, tiling in enumerate(tilings if parts is not None else ()):
+        tiling.count[1] = 1 if simulation.tiles.direct else SHARES
         join_tilings(tiling, [part["tiling"][k] for part in parts])
         rows = {f"tiling/{k}/{name}": getattr(tiling, name)[:n] for name, n in in_use(tiling)}
         yield from wholes(rows)
-    work = sum(part["work"] for part in parts)
-    carry(work)
-    yield from wholes({"clock": clock.view(np.ndarray), "work": work})
+    if parts is not None:
+        work = sum(part["work"] for part in parts)
+        carry(work)
+        yield from wholes({"clock": clock.view(np.ndarray), "work": work})
     for k, tiling in enumerate(tilings):
-        yield from _points(ranks, k, tiling, give)
+        yield from _points(simulation, k, tiling, own_tilings[k], own[k])
 
 
-def _points(ranks: Any, k: int, tiling: Tiling, give: str) -> Iterator[Stored]:
-    """The points of a block, tile after tile."""
+def _points(
+    simulation: Any, k: int, tiling: Tiling, own_tiling: dict, own: list[np.ndarray]
+) -> Iterator[Stored]:
+    """Yield the points of a block, tile after tile."""
+    comm = simulation.comm
     number, ends = (array[: tiling.count[0]] for array in (tiling.number, tiling.range[:, 1]))
     total = int(ends[-1]) if len(ends) else 0
-    names = [name for name, _ in arrays_of(ranks.part.setup.blocks[k].points)]
+    limits = [
+        (int(number[first]), int(number[end - 1]) + 1) if total else (0, 0)
+        for first, end in _cuts(ends)
+    ]
+    names = [name for name, _ in arrays_of(simulation.setup.blocks[k].points)]
     begin = 0
-    for first, end in _cuts(ends):
-        limits = (int(number[first]), int(number[end - 1]) + 1) if total else (0, 0)
-        found = ranks.together(give, k, *limits)
-        order = by_tile(found)
+    sorted_before = comm.bcast(bool(total))
+    for first, end in comm.bcast(limits):
+        if sorted_before:
+            found = comm.gather(points_of_tiles(own_tiling, own, first, end))
+        else:  # each has those of an equal share of the ids
+            found = comm.gather({"points": own})
+        if found is None:
+            continue
+        total = total or sum(part["points"][0].shape[-1] for part in found)
+        order = by_tile(found) if sorted_before else np.arange(total)
         for name, *same in zip(names, *(part["points"] for part in found), strict=True):
             array = np.take(np.concatenate(same, axis=-1), order, axis=-1)
             where = ..., slice(begin, begin + len(order))
@@ -84,18 +140,24 @@ def _points(ranks: Any, k: int, tiling: Tiling, give: str) -> Iterator[Stored]:
         begin += len(order)
 
 
-def _nodes(ranks: Any, spans: np.ndarray, kinds: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Rows of nodes in use: of the arrays of nodes, or what contact remembers of them."""
-    memory = "contact" in kinds
+def _nodes(
+    simulation: Any, spans: np.ndarray, kinds: dict[str, np.ndarray], arrays: list[np.ndarray]
+) -> Iterator[Stored]:
+    """Yield rows of nodes in use: of the arrays of nodes, or what contact remembers of them."""
+    memory, counted = "contact" in kinds, simulation.counted()
     total = int((spans[:, 1] - spans[:, 0]).sum())
     for own, nodes in _pieces(spans):
-        rows = {n: np.zeros((len(nodes), *a.shape[1:]), a.dtype) for n, a in kinds.items()}
         limits = (int(nodes[0]), int(nodes[-1]) + 1) if len(nodes) else (0, 0)
-        for here, found in ranks.together("give_rows", *limits, memory):
-            for array, some in zip(rows.values(), found, strict=True):
-                array[np.searchsorted(nodes, here)] = some
+        here = counted[slice(*np.searchsorted(counted, limits))]
+        found = simulation.comm.gather((here, [array[here] for array in arrays]))
+        if found is None:
+            continue
+        rows = {n: np.zeros((len(nodes), *a.shape[1:]), a.dtype) for n, a in kinds.items()}
+        for there, some in found:
+            for array, of in zip(rows.values(), some, strict=True):
+                array[np.searchsorted(nodes, there)] = of
         for name, array in rows.items():
-            array = latest(array, ranks.step) if memory else array + 0
+            array = latest(array, simulation.step) if memory else array + 0
             yield name, (total, *array.shape[1:]), own, array
 
 
@@ -118,17 +180,64 @@ def _pieces(spans: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
 # --- and back -------------------------------------------------------------------------------------
 
 
-def tilings_of(tiles: SharedTiles, blocks: int, state: Mapping) -> list[Tiling]:
+def take_stored(simulation: Any, path: Path) -> None:
+    """Take the own share of the state that a file holds."""
+    comm, subdomain = simulation.comm, simulation.subdomain
+    with opened(path) as state, comm.joint():
+        take_known(simulation, state)
+        for k, block in enumerate(simulation.setup.blocks):
+            check_points(block.points, state, f"points/{k}/")
+        simulation.tiles.owner = owner = _owner_in(simulation, state)
+        simulation.tiles.empty_nodes(simulation.setup)
+        subdomain.put(_own_share(simulation, state, owner))
+        s = simulation.setup
+        _take_nodes(
+            simulation,
+            state,
+            simulation.tiles.spans_of_all(comm.allgather(simulation.tiles.reached_by(s))),
+        )
+        simulation.present[:] = state["present"][()]
+    if not comm.leads:
+        simulation.control.totals[WORK] = 0
+
+
+def take_snapshot(simulation: Any, path: Path) -> dict[str, np.ndarray]:
+    """Read the own share of the snapshot that a file holds."""
+    with opened(path, "good") as found:
+        owner, names = _owner_in(simulation, found), ("clock", "work", "values")
+        known = {n: found[n][()] for n in found if n in names or n.startswith("touched/")}
+        kept = _own_share(simulation, found, owner) | known | {"owner": owner}
+    if not simulation.comm.leads:
+        kept["work"][:] = 0
+    return kept
+
+
+def _owner_in(simulation: Any, state: Mapping) -> np.ndarray:
+    """Find who is to have each tile of the points that a file holds."""
+    tiles, blocks = simulation.tiles, simulation.setup.blocks
+    tilings = _tilings_of(tiles, len(blocks), state)
+    whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
+    before = tiles.owner
+    tiles.share_out(work_of(tiles.loads(whole), simulation.subdomain.load.costs))
+    owner, tiles.owner = tiles.owner, before
+    return owner
+
+
+def _tilings_of(tiles: SharedTiles, blocks: int, state: Mapping) -> list[Tiling]:
     """The tiles of all points."""
     return [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(blocks)]
 
 
-def own_share(part: Any, state: Mapping, owner: np.ndarray) -> dict[str, np.ndarray]:
-    """Points and tiles of a part, which are its own by the `owner` of each tile."""
-    blocks, found = part.setup.blocks, {}
-    own = owner == part.crew.rank
-    for k, tiling in enumerate(tilings_of(part.tiles, len(blocks), state)):
+def _own_share(simulation: Any, state: Mapping, owner: np.ndarray) -> dict[str, np.ndarray]:
+    """Read the points and tiles that are of this process by the `owner` of each tile."""
+    blocks, found = simulation.setup.blocks, {}
+    own = owner == simulation.comm.rank
+    for k, tiling in enumerate(_tilings_of(simulation.tiles, len(blocks), state)):
         points, tiles = share_of_tiling(k, tiling, own)
+        if not tiling.count[0]:  # not sorted yet: an equal share
+            count, comm = state[f"points/{k}/id"].size, simulation.comm
+            ends = count * comm.rank // comm.size, count * (comm.rank + 1) // comm.size
+            points = np.arange(*ends)
         names = [f"points/{k}/{name}" for name, _ in arrays_of(blocks[k].points)]
         found |= tiles | {name: _chosen(state[name], points) for name in names}
     return found
@@ -144,14 +253,15 @@ def _chosen(array: Any, points: np.ndarray) -> np.ndarray:
     return found
 
 
-def take_nodes(part: Any, state: Mapping, spans: np.ndarray) -> None:
-    """Rows of the nodes in use here, and what contact remembers of all nodes."""
-    used = np.zeros(len(part.tiles.foreign), np.bool_)
-    used[numbers(part.setup.spans)] = True
-    memory = part.memory()
+def _take_nodes(simulation: Any, state: Mapping, spans: np.ndarray) -> None:
+    """Take rows of the nodes in use here, and what contact remembers of all nodes."""
+    s = simulation.setup
+    used = np.zeros(len(simulation.tiles.foreign), np.bool_)
+    used[numbers(s.spans)] = True
+    memory = simulation.subdomain.contact_memory()
     for own, nodes in _pieces(spans):
         here = used[nodes]
-        for name, array in of_nodes(part.setup):
+        for name, array in of_nodes(s):
             array[nodes[here]] = state[name][own][here]
         for array in memory:
             array[nodes] = state["contact"][own]

@@ -70,19 +70,22 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
 
     The file appears under its name when all of it is written.
     """
-    path, simulation = path_of(hub, file), hub.simulation
-    if hub.settings.crew is None or within:
+    path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
+    if comm.leads:
         _write(hub, path, within)
-    elif simulation.apart and simulation.follows:
-        simulation.follow()
-    elif simulation.apart:
-        with simulation.leading():
-            _write(hub, path, within)
     else:
-        _ = simulation.setup  # of all processes together
-        if not simulation.follows:
-            _write(hub, path, within)
+        for _ in simulation.stored():
+            pass
+        for _ in _good(hub):
+            pass
+    comm.barrier()
     return path
+
+
+def _good(hub: Hub) -> Iterator[Stored]:
+    """Yield the last good state, where a run may go back to it."""
+    if hub.running is not None and hub.running.halve and hub.running.snapshot:
+        yield from hub.simulation.stored_snapshot(hub.running.snapshot)
 
 
 def _write(hub: Hub, path: Path, within: bool) -> None:
@@ -112,7 +115,7 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
             root.create_dataset(f"memory/{k}", data=array, **FLAT)
         _put(root.create_group("state"), hub.simulation.stored())
         if hub.running is not None and hub.running.good is not None:
-            _put(root.create_group("good"), hub.simulation.stored_snapshot(hub.running.snapshot))
+            _put(root.create_group("good"), _good(hub))
 
 
 def _put(group: Any, found: Iterator[Stored]) -> None:
@@ -242,13 +245,21 @@ class Restart:
                 continue
             if outputs or key[0] not in OUTPUTS:
                 remember(part, kept[key], arrays)
-                if hasattr(part, "resumed"):
-                    part.resumed()
+                resume(hub, part)
             else:
                 memory = kept[key]
                 remember(part, {k: memory[k] for k in carried(part) if k in memory}, arrays)
         if good and hub.running is not None and hub.running.halve:
             hub.running.snapshot = simulation.take_snapshot(self.path)
+
+
+def resume(hub: Hub, part: Any) -> None:
+    """Let a part go on from what it remembers now; outputs of the first process alone have files."""
+    outputs = [hub.output.log, *hub.dumps.values()]
+    if hasattr(part, "resumed") and (
+        hub.settings.comm.leads or not any(part is one for one in outputs)
+    ):
+        part.resumed()
 
 
 Memories = tuple[list, list[np.ndarray]]

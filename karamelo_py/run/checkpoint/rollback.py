@@ -54,8 +54,8 @@ class Mark(NamedTuple):
             hub.values.set(name, value)
         for part, seen in self.parts:
             _give(part, seen)
-            if cut and hasattr(part, "resumed"):
-                part.resumed()
+            if cut:
+                restart_file.resume(hub, part)
 
 
 class Marks:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -92,7 +92,8 @@ def stop(
     """
     message, hint, at_fault = trouble(hub, simulation, status)
     keep = _keep_good if good.too_large is None else _keep_start
-    hint += keep(hub, simulation, status, good)
+    with suppress(OthersWait):
+        hint += keep(hub, simulation, status, good)
     error = ScriptError(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error
@@ -277,6 +278,10 @@ def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trou
     )
 
 
+class OthersWait(Exception):
+    """This process cannot write a file, and others go on to give it what belongs there."""
+
+
 class Wrong(NamedTuple):
     """A point that went wrong in a step."""
 
@@ -379,7 +384,7 @@ def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) ->
 
 def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
     """Whether the domain of a point, whose corners move, is folded over."""
-    s = simulation.stepped
+    s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return False
     return not np.isfinite(extent(s.basis, s.kin, record(s.grids, grid), tuple(place.tolist())))
@@ -411,7 +416,8 @@ def _write_last_good(hub: Hub) -> Path | None:
     """Write the present state to a file to go on from; a file of somebody else is left alone."""
     written: list[Path] = []
     path = restart_file.path_of(hub, Path(LAST_GOOD))
-    if hub.output.writes and (not path.exists() or restart_file.is_restart(path)):
+    may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
+    if hub.output.takes_part and may_be:
         with _told(hub):
             written.append(restart_file.write(hub, Path(LAST_GOOD), within=True))
             # The files of restart(...) would hold the same once more.
@@ -432,3 +438,6 @@ def _told(hub: Hub) -> Iterator[None]:
         yield
     except ScriptError as error:
         hub.warn(error.message, hint=error.hint, place=error.place)
+        if hub.settings.comm.size > 1:
+            hub.settings.comm.failed_within = True
+            raise OthersWait from None

@@ -37,7 +37,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
     if count <= FEW or (there := machine_memory(on_machine(hub))) is None:
         return
     check_scene(hub)
-    crew, share = hub.settings.crew, share_of_machine(hub)
+    comm, share = hub.settings.comm, share_of_machine(hub)
     need = share * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
     if need > there.free:
         # Scenes of before, which point to themselves, stay until someone looks.
@@ -50,7 +50,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         need,
         hub.domain.dimension,
         _largest(hub).place,
-        f" for {crew.on_machine} of {crew.size} processes" if share < 1 else "",
+        f" for {comm.on_machine} of {comm.size} processes" if share < 1 else "",
         share * least_bytes(hub, np.float32, copied) if hub.settings.precision == "double" else 0.0,
     )
     if need > there.whole:
