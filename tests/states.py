@@ -1,5 +1,6 @@
 """The exact state at the end of a script: every bit of what the points carry."""
 
+import io
 from collections.abc import Iterable
 from pathlib import Path
 from tempfile import mkdtemp
@@ -21,7 +22,9 @@ def final_hub(
     folder: Path | None = None,
 ) -> Hub:
     """The hub after a script has run, where a comm is given as one of its ranks."""
-    hub = Hub(Console(quiet=True))
+    # Of several processes the first alone says something.
+    silent = None if comm is None or comm.leads else io.StringIO()
+    hub = Hub(Console(quiet=True, err=silent))
     hub.settings.threads = threads
     if comm is not None:
         share(hub, comm)

@@ -204,7 +204,7 @@ class Fields:
         """Rows (k, n) of the points of a part's group in the order of their keys, some at a time.
 
         Its method says both, keys (n,) and rows, of fields of some of the points. Keys are whole
-        numbers, no two alike. How many come together depends on processes.
+        numbers, no two alike. How many come together depends on processes; the first gets them.
         """
         return self._simulation.in_order(part, name, *arguments)
 

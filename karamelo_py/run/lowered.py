@@ -23,6 +23,7 @@ from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.access.nodes_by_number import ByNumber
 from karamelo_py.run.access.points_by_id import ById
+from karamelo_py.run.checkpoint import part_state
 from karamelo_py.run.checkpoint.arrays import (
     Stored,
     changing,
@@ -33,7 +34,6 @@ from karamelo_py.run.checkpoint.arrays import (
     stored_copies,
     take_arrays,
 )
-from karamelo_py.run.checkpoint import part_state
 from karamelo_py.run.lower.build import State, chosen, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room

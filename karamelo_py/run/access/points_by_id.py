@@ -196,7 +196,7 @@ class ById:
     def in_order(self, part: Any, name: str, *arguments: Any) -> Iterator[np.ndarray]:
         """Rows (k, n) of the points of a part's group in the order of keys that it says, too.
 
-        Of several processes none has those of all at a time.
+        Of several processes the first gets them, so many at a time.
         """
         keys, rows = _ordered(*zip(*self._said(part, name, *arguments), strict=True))
         if self.comm.size == 1:
@@ -206,8 +206,9 @@ class ById:
         cuts = np.sort(np.concatenate(samples))[SAMPLES::SAMPLES].tolist()
         for cut in pairwise([FIRST, *cuts, LAST_KEY]):
             own = slice(*np.searchsorted(keys, cut))
-            found = self.comm.allgather((keys[own], rows[:, own]))
-            yield _ordered(*zip(*found, strict=True))[1]
+            found = self.comm.gather((keys[own], rows[:, own]))
+            if found is not None:
+                yield _ordered(*zip(*found, strict=True))[1]
 
     def seen(self, say: Callable, *arguments: Any) -> list:
         """What a function says of the points at hand, of each process."""

@@ -31,7 +31,7 @@ from karamelo_py.run.mpi.pack import (
 )
 from karamelo_py.run.mpi.partition import SharedTiles, work_of
 from karamelo_py.run.tiles.boxes import between, numbers
-from karamelo_py.run.tiles.tiles import SHARES, in_use
+from karamelo_py.run.tiles.tiles import SHARES, Tiles, in_use
 
 
 def points_of_tiles(
@@ -96,7 +96,7 @@ def _in_tiles(
     own_tilings, own
         Tiles and arrays of the points of this process, block by block.
     """
-    tilings = [simulation.tiles.empty_tiling() for _ in own]
+    tilings = [Tiles.empty_tiling(simulation.tiles) for _ in own]  # as of one process
     for k, tiling in enumerate(tilings if parts is not None else ()):
         tiling.count[1] = 1 if simulation.tiles.direct else SHARES
         join_tilings(tiling, [part["tiling"][k] for part in parts])

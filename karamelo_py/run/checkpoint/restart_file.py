@@ -254,7 +254,7 @@ class Restart:
 
 
 def resume(hub: Hub, part: Any) -> None:
-    """Let a part go on from what it remembers now; outputs of the first process alone have files."""
+    """Let a part go on from what it remembers now; the first process alone has files."""
     outputs = [hub.output.log, *hub.dumps.values()]
     if hasattr(part, "resumed") and (
         hub.settings.comm.leads or not any(part is one for one in outputs)

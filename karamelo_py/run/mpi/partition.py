@@ -12,11 +12,11 @@ import numpy as np
 from karamelo_py.compiler.fields import length_of_rows, rows_of_points
 from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, made_of
 from karamelo_py.run.mpi.bisection import bisected
-from karamelo_py.scene.comm import SerialComm
 from karamelo_py.run.tiles.boxes import Boxes, Reached, between, extents, ragged, rows_of, steps_of
 from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, give_up
 from karamelo_py.run.tiles.distinct import distinct
 from karamelo_py.run.tiles.tiles import SHARES, Tiles, one_after_another, shares_of
+from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
 
 IMBALANCE = 1.1  # largest share of the work over that after a new cut: above it tiles are cut anew
@@ -331,7 +331,8 @@ class SharedTiles(Tiles):
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
         link = self._links.get((number, what))
         if link is None:
-            link = self._link(chosen_of(buffers_of(s)[number].nodes, what))
+            of = next(one for one in buffers_of(s) if one.number == number)
+            link = self._link(chosen_of(of.nodes, what))
             self._links[number, what] = link
         packed, self._under_way = link
         for array, rows, room in packed:

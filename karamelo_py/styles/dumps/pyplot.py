@@ -1,7 +1,8 @@
 """dump pyplot: pictures of the points, drawn with Matplotlib."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Annotated, Any, BinaryIO
 
@@ -139,14 +140,30 @@ class PyPlot(Dump):
                 with whole(self.path()) as file:
                     self.draw(file)
             else:
-                self._draw()
-                savefig(self._picture.figure, self.path())
+                with self._asking():
+                    self._draw()
+                    savefig(self._picture.figure, self.path())
 
     def draw(self, file: BinaryIO) -> None:
         """Draw the present state as PNG into an open file."""
-        with unwarned():
+        with unwarned(), self._asking():
             self._draw()
             self._picture.save_png(file, PNG_COMPRESSION)
+
+    @contextmanager
+    def _asking(self) -> Iterator[None]:
+        """Within this, the first of several processes draws, and asks the others for points."""
+        try:
+            yield
+        finally:
+            self.hub.settings.comm.bcast()
+
+    def take_part(self) -> None:
+        """Say of the own points what the first process asks for while it draws."""
+        scene = Scene(self)
+        while (asked := self.hub.settings.comm.bcast()) is not None:
+            question, *arguments = asked
+            question(scene, *arguments)
 
     def _draw(self) -> None:
         update = self.hub.update
@@ -208,30 +225,52 @@ class PyPlot(Dump):
 
 
 class Scene:
-    """The points of a scene that a picture asks, wherever they are."""
+    """The points of a scene that a picture shows, wherever they are.
+
+    The first of several processes draws them, and tells the others what it asks for.
+    """
 
     def __init__(self, dump: PyPlot):
         self.dump, self.fields = dump, dump.hub.fields
+        self.comm = dump.hub.settings.comm
+
+    def _ask(self, question: Callable, *arguments: Any) -> Any:
+        self.comm.bcast((question, *arguments))
+        return question(self, *arguments)
 
     def extent(self) -> Extent:
-        """What they fill."""
-        return joined(self.fields.each(self.dump, "extent"))
+        """Find what the points fill."""
+        return joined(self._ask(Scene._extents))
 
     @cached_property
     def side(self) -> float:
         """Side length of a typical point."""
         every = -(-self.fields.count // SAMPLE)
-        volumes = np.concatenate(self.fields.each(self.dump, "volumes", every))
+        volumes = np.concatenate(self._ask(Scene._volumes, every))
         dimension = self.dump.hub.domain.dimension
         return float(np.median(volumes)) ** (1 / dimension) if len(volumes) else 0.0
 
     def counts(self, look: Look) -> np.ndarray:
-        """How many there are in each cell."""
-        return self.fields.counted(self.dump, "cells", look.cells, look)
+        """Count the points in each cell."""
+        return self._ask(Scene._cells, look)
 
     def marks(self, look: Look) -> Iterator[np.ndarray]:
-        """Rows of what shows of them."""
+        """Yield rows of what shows of the points."""
+        self.comm.bcast((Scene._give_marks, look))
         return in_pieces(self.fields.in_order(self.dump, "marks", look))
+
+    def _extents(self) -> list:
+        return self.fields.each(self.dump, "extent")
+
+    def _volumes(self, every: int) -> list:
+        return self.fields.each(self.dump, "volumes", every)
+
+    def _cells(self, look: Look) -> np.ndarray:
+        return self.fields.counted(self.dump, "cells", look.cells, look)
+
+    def _give_marks(self, look: Look) -> None:
+        for _ in self.fields.in_order(self.dump, "marks", look):
+            pass
 
 
 def colours_of(
