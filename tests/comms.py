@@ -2,6 +2,7 @@
 
 import copy
 import threading
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -99,12 +100,17 @@ def together(size: int, act: Callable[[MpiComm], Any]) -> list:
     barrier, board = threading.Barrier(size), [None] * size
     found: list = [None] * size
     errors: list[BaseException] = []
+    ended: list[int] = []
 
     def run(rank: int) -> None:
         try:
             found[rank] = act(Threads(rank, size, barrier, board))
         except BaseException as error:
             errors.append(error)
+        ended.append(rank)
+        while errors and barrier.n_waiting + len(ended) < size:
+            time.sleep(0.01)  # others have not left where this one was last
+        if errors:
             barrier.abort()
 
     threads = [
