@@ -183,11 +183,10 @@ class Output:
         except ScriptError as error:
             raise _located(error, item) from error.__cause__
 
-    @staticmethod
-    def _do(item: Any, what: str) -> None:
+    def _do(self, item: Any, what: str) -> None:
         """Write or finish; exceptions of a dump say where they come from."""
         style = getattr(item, "style", "")
-        if not item.hub.settings.comm.leads:
+        if not self.hub.settings.comm.leads:
             what = "take_part" if hasattr(item, "take_part") else what
         with told(f"dump {style}", what, type(item), item.place) if style else nullcontext():
             getattr(item, what)()
