@@ -185,6 +185,8 @@ def test_growth():
     # From rest: the median stands for the beginning.
     assert stability.growth(np.array([0.0, 1.0, 1.0, 5.0])) == 5
     assert stability.growth(np.zeros(4)) == 0
+    # A single row shows what is not there: a mean of five has (4 + 3) / 5.
+    assert stability.growth(np.r_[np.ones(30), 3, np.ones(19)]) == pytest.approx(1.4)
 
 
 def test_energies_by_name(tmp_path):

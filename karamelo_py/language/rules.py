@@ -51,9 +51,9 @@ def known_failure(
         gain(part, when=when, cause=cause, cure=cure)
 
 
-def saving(part: type, *, when: When, cost: str, instead: str) -> None:
+def suggestion(part: type, *, when: When, cost: str, instead: str) -> None:
     """Declare what a part costs without need, told by `check`."""
-    _rules.setdefault(("saving", part), []).append((when, "", cost, instead))
+    _rules.setdefault(("suggestion", part), []).append((when, "", cost, instead))
 
 
 def gain(part: type, *, when: When, cause: str, cure: str) -> None:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import where
 from karamelo_py.compiler.tuples import added, increased, only
-from karamelo_py.language.rules import saving
+from karamelo_py.language.rules import suggestion
 from karamelo_py.points.kinematics import tensors
 from karamelo_py.points.laws import (
     Absent,
@@ -146,13 +146,13 @@ def _idle_heat(law, scene):
     return not (isinstance(law.temperature, Absent) or softens or presses or wears)
 
 
-saving(
+suggestion(
     EosStrength,
     when=_idle_damage,
     cost="material {owner.id} has a damage by plastic strain, and never yields",
     instead="leave the damage out",
 )
-saving(
+suggestion(
     EosStrength,
     when=_idle_heat,
     cost="the temperature of material {owner.id} changes nothing but its column T",

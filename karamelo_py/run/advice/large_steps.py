@@ -50,7 +50,7 @@ def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> S
 
 def step_was_told(hub: Hub) -> bool:
     """Tell whether a warning has said that the step is above the stable limit."""
-    return step_of(hub, False).name in hub.update.foreseen
+    return step_of(hub, False).name in hub.update.warned_of
 
 
 def warn_about_steps(
@@ -63,7 +63,7 @@ def warn_about_steps(
     Raises
     ------
     ScriptError
-        See `foresight.warn`.
+        See `known_failures.warn`.
     """
     present = step_of(hub, halves)
     _warn_about_step(hub, simulation, present, again=again)
@@ -107,7 +107,5 @@ def _warn_about_step(
         if step.fixed_dt and asked > MIXED * limit and limit != of_heat:
             words += f"; {mixed_units(hub, simulation)}"
             hint = f"{UNITS}. If they are as they should be, {hint}"
-    told = hub.update.foreseen
-    if again or step.name not in told:
-        told += [step.name] * (step.name not in told)
+    if hub.update.first_time(step.name) or again:
         hub.warn(words, place=step.place, hint=hint)

@@ -20,15 +20,12 @@ UNITS = (
 
 def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
     """Say so, once, where nothing can move in a run of `duration`."""
-    told = hub.update.foreseen
-    if REST in told or duration < LOOK * simulation.dt or not _rests(hub, simulation):
-        return
-    told.append(REST)
-    hub.warn(
-        "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
-        hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another load, "
-        "in front of it",
-    )
+    if duration >= LOOK * simulation.dt and _rests(hub, simulation) and hub.update.first_time(REST):
+        hub.warn(
+            "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
+            hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another "
+            "load, in front of it",
+        )
 
 
 def _rests(hub: Hub, simulation: Any) -> bool:

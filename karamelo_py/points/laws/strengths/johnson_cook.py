@@ -12,7 +12,7 @@ from karamelo_py.compiler.compile import (
     where,
 )
 from karamelo_py.compiler.powers import logarithm, power
-from karamelo_py.language.rules import saving
+from karamelo_py.language.rules import suggestion
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
@@ -93,7 +93,7 @@ class JohnsonCook(NamedTuple):
         return cls(G, A, B, n, rate, Softening(m, Tr, Tm) if m > 0 else Absent())
 
 
-saving(
+suggestion(
     JohnsonCook,
     when=lambda s, scene: s.B == 0 and all(isinstance(f, Absent) for f in (s.rate, s.softening)),
     cost="the strength of {owner.id} neither hardens nor depends on rate or heat",

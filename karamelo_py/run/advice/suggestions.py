@@ -1,4 +1,4 @@
-"""Savings: a scene pays for this and could leave it out, with the words to write instead."""
+"""Suggestions: what a scene pays for and could leave out, with the words to write instead."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -19,18 +19,18 @@ NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lo
 MANY_POINTS = 4  # a cell and direction
 
 
-def savings(hub: Hub, simulation: Any) -> list[Advice]:
+def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
     rules = (_step, _unread, _unused, _of_parts, _averaging, _flat, _round, _points)
-    return [saving for rule in rules for saving in rule(hub, simulation)]
+    return [suggestion for rule in rules for suggestion in rule(hub, simulation)]
 
 
 def _of_parts(hub: Hub, simulation: Any) -> Iterator[Advice]:
     """Ask the rules of the parts."""
-    return SceneFacts(hub, simulation, inf).advice("saving")
+    return SceneFacts(hub, simulation, inf).advice("suggestion")
 
 
-def _saving(cost: str, instead: str) -> Advice:
+def _suggestion(cost: str, instead: str) -> Advice:
     return Advice("", cost, instead)
 
 
@@ -50,9 +50,9 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Advice]:
         return
     times = f"{best / dt:.3g} times as many steps as the program's own step asks for"
     if hub.update.fixed_dt is not None:
-        yield _saving(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
+        yield _suggestion(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
     else:
-        yield _saving(
+        yield _suggestion(
             f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
         )
 
@@ -70,7 +70,7 @@ def _unread(hub: Hub, simulation: Any) -> Iterator[Advice]:
             defined = rf"\b{kind}\s*\(\s*{re.escape(ID)}\s*,"
             uses = len(re.findall(rf"\b{re.escape(ID)}(?:_\w+)?\b", text))
             if 0 < uses <= len(re.findall(defined, text)):
-                yield _saving(
+                yield _suggestion(
                     f"{kind} {ID} ({item.style}) is measured at each output and shown nowhere",
                     f"leave it out, or name {_published(ID, item)} in log_modify",
                 )
@@ -84,7 +84,7 @@ def _unused(hub: Hub, simulation: Any) -> Iterator[Advice]:
     for ID in hub.groups:
         made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
         if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
-            yield _saving(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
+            yield _suggestion(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
 
 
 def _published(ID: str, item: Any) -> str:
@@ -107,7 +107,7 @@ def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
         moduli = (getattr(law, "lam", None), getattr(law, "G", None))
         if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
             return
-    yield _saving(
+    yield _suggestion(
         "anti_volumetric_locking(true): a visit of the points more, and nothing is nearly "
         "incompressible or flows",
         "leave it out",
@@ -176,7 +176,7 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Advice]:
             given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             kept = " and ".join(AXES[axis] for axis in rest)
             named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
-            yield _saving(
+            yield _suggestion(
                 f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
                 f"the points of {'plane strain' if d == 3 else 'a line'}",
                 f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
@@ -271,7 +271,7 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
     radius = max(region.radius for region in regions)
     lo, hi = hub.domain.lo[along], hub.domain.hi[along]
     h = hub.domain.h
-    yield _saving(
+    yield _suggestion(
         "cylinders about one axis, and nothing acts around it: about "
         f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
         f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
@@ -284,7 +284,7 @@ def _points(hub: Hub, simulation: Any) -> Iterator[Advice]:
         ppc = getattr(solid, "ppc", 0)
         if ppc >= MANY_POINTS:
             each = ppc**hub.domain.dimension
-            yield _saving(
+            yield _suggestion(
                 f"solid {solid.id} has {each} points a cell; more than two a direction gain little "
                 "once points have moved",
                 f"2 or 3 points a direction, and finer cells for what {each} cost",
