@@ -8,7 +8,7 @@ import numpy as np
 
 from karamelo_py.kernels.totals import LIMBS, add_all, rounded
 from karamelo_py.output.fields import PIECE
-from karamelo_py.run.tiles.distinct import distinct
+from karamelo_py.run.tiles.unique import unique
 
 
 class BodyMotion(NamedTuple):
@@ -119,7 +119,7 @@ def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarr
         for begin in range(0, len(points.id), PIECE):
             own = slice(begin, begin + PIECE)
             solid = np.searchsorted(firsts, points.id[own], side="right") - 1
-            for k in distinct(solid):
+            for k in unique(solid):
                 here = solid == k
                 x, v = points.x[simulation.now, :d, own], points.v[:, own]
                 yield k, *(a[..., here].astype(float) for a in (points.mass[own], x, v))

@@ -14,8 +14,8 @@ from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, 
 from karamelo_py.run.mpi.bisection import bisected
 from karamelo_py.run.tiles.boxes import Boxes, Reached, between, extents, ragged, rows_of, steps_of
 from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, give_up
-from karamelo_py.run.tiles.distinct import distinct
 from karamelo_py.run.tiles.tiles import SHARES, Tiles, one_after_another, shares_of
+from karamelo_py.run.tiles.unique import unique
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
 
@@ -260,7 +260,7 @@ class SharedTiles(Tiles):
         me = self.comm.rank
         self._needs = {
             int(rank): _needs(place[here], reached.begin[here], reached.end[here])
-            for rank in distinct(of)
+            for rank in unique(of)
             for here in [of == rank]
         }
         own, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
@@ -296,7 +296,7 @@ class SharedTiles(Tiles):
         ends = np.append(0, np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1)))
         own = len(ends) - 1 - len(self._from)
         self._taken = {}
-        for rank in distinct(self._from):
+        for rank in unique(self._from):
             begin, end = np.searchsorted(self._from, [rank, rank + 1])
             self._taken[int(rank)] = slice(int(ends[own + begin]), int(ends[own + end]))
         return first, steps
