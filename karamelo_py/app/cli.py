@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import re
 import sys
 import traceback
@@ -23,7 +24,6 @@ from karamelo_py.app.options import (
     positive,
     threads_option,
 )
-from karamelo_py.app.start import begun
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
 from karamelo_py.run.mpi.crew import Crew, launched
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
@@ -156,6 +156,13 @@ def _dispatch(arguments: list[str]) -> int:
     if options.act is not _run:  # which imports more before it begins
         begun()
     return options.act(options)
+
+
+def begun() -> None:
+    """Let Python look for cycles again, among what is new: the program itself stays to its end."""
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
 
 
 def _one_file(arguments: list[str]) -> list[str]:

@@ -27,12 +27,11 @@ from karamelo_py.app.options import make_folder
 from karamelo_py.app.shown import Columns, ShownPicture
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
-from karamelo_py.language.meanings import shown
 from karamelo_py.output.console import Console
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Pause, Quit, ScriptError, nearest
-from karamelo_py.script.expressions import Expression
+from karamelo_py.script.expressions import Expression, shown
 from karamelo_py.script.parser import parse, parse_text
 
 SCRIPT = "the name of a script, or its text: statements, as in name = 1"

@@ -18,12 +18,5 @@ def main() -> int:
     return command()
 
 
-def begun() -> None:
-    """Let Python look again, among what is new: what a program consists of stays to its end."""
-    if not gc.isenabled():
-        gc.freeze()
-        gc.enable()
-
-
 if __name__ == "__main__":
     sys.exit(main())

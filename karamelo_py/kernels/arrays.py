@@ -111,7 +111,7 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
     """Points of the kind of `points` with such arrays as `arrays_of` has given."""
     arrays = iter(found)
-    own = {
+    own: dict[str, Any] = {
         name: None if array is None else next(arrays)
         for name, array in points._asdict().items()
         if name != "fields"

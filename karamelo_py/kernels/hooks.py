@@ -23,7 +23,7 @@ The node functions of heat see capacity, temperature before and after the step, 
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from numba import types
 
@@ -72,7 +72,7 @@ class CompiledHook(NamedTuple):
         return self.where == "nodes"
 
     @property
-    def signature(self) -> types.Type:
+    def signature(self) -> Any:
         """The Numba type of its function."""
         return FUNCTIONS[self.where]
 

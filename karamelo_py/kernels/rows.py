@@ -147,10 +147,10 @@ def light_node(s):
     return UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
 
 
-light_node.goes_through = UpdateToVelocity.goes_through
+light_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defined]
 
 
-def _call(do: Callable, says: Callable[[Any], str | None]) -> table.SceneTask:
+def _call(do: Any, says: Callable[[Any], str | None]) -> table.SceneTask:
     """A row that does something; `says` tells what in a scene."""
     do.says = says
     return table.SceneTask(do)

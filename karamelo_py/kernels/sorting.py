@@ -17,7 +17,7 @@ from karamelo_py.points.grid import Grid, cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
 
 
-class Cut(NamedTuple):
+class TileGrid(NamedTuple):
     """Division of g grids into T tiles."""
 
     size: np.ndarray  # (d,) cells of a tile
@@ -25,7 +25,7 @@ class Cut(NamedTuple):
     first: np.ndarray  # (g + 1,) number of the first
 
 
-class Sight(NamedTuple):
+class Neighbourhood(NamedTuple):
     """Neighbourhood of a point: the nodes that it may see before it has gone `reach` cells."""
 
     top: np.ndarray  # (g, d) the last node of each grid
@@ -253,8 +253,8 @@ def sort_points(
     mode: Tag,
     kin: Tag,
     grids: Grid,
-    sight: Sight,
-    tiles: Cut,
+    sight: Neighbourhood,
+    tiles: TileGrid,
     x: np.ndarray,
     of: np.ndarray,
     ids: np.ndarray,
@@ -275,19 +275,28 @@ def find_tiles(
     mode: Tag,
     kin: Tag,
     grids: Grid,
-    tiles: Cut,
+    tiles: TileGrid,
     x: np.ndarray,
     of: np.ndarray,
     ends: np.ndarray,
     tile: np.ndarray,
 ) -> None:
-    """The tile of each of some points at `x` (w, n), of the grids `of` (n,); `ends` is scratch."""
+    """Find the tile of each point at `x` (w, n), on the grids `of` (n,).
+
+    `tile` (n,) takes them; `ends` (parts, T) is scratch.
+    """
     _find_all_tiles(mode, ends.shape[0], kin, grids, tiles, x, of, ends, tile)
 
 
 @loop
 def find_rows(
-    mode: Tag, kin: Tag, grids: Grid, sight: Sight, x: np.ndarray, tiling: Tiling, parts: int
+    mode: Tag,
+    kin: Tag,
+    grids: Grid,
+    sight: Neighbourhood,
+    x: np.ndarray,
+    tiling: Tiling,
+    parts: int,
 ) -> None:
     """Find the range of each row of a tile's box that its sorted points at `x` (w, n) may reach."""
     _find_all_rows(mode, parts, kin, grids, sight, x, tiling, parts)

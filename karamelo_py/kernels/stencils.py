@@ -55,13 +55,13 @@ def _even(w, stencil, asked):
 
 
 @point_function(tags=2, otherwise=True)
-def gather_nodes(width: Tag, stencil: tuple, tasks: tuple, w: Work, totals: tuple) -> tuple:
-    """The totals of the tasks over all nodes of the stencil."""
+def gather_nodes(lanes: Tag, stencil: tuple, tasks: tuple, w: Work, totals: tuple) -> tuple:
+    """Add the parts of all nodes of the stencil to the totals of the tasks."""
     return _gather(tasks, w, stencil, totals)
 
 
 @gather_nodes.on(OneByOne, Stencil)
-def _gather_nodes_one_by_one_stencil(width, stencil, tasks, w, totals):
+def _gather_nodes_one_by_one_stencil(lanes, stencil, tasks, w, totals):
     if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
     return _gather_parts(tasks, w, stencil, totals)
@@ -69,7 +69,7 @@ def _gather_nodes_one_by_one_stencil(width, stencil, tasks, w, totals):
 
 @gather_nodes.on(FourLanes, Stencil)
 @gather_nodes.on(EightLanes, Stencil)
-def _gather_nodes_eights_stencil(width, stencil, tasks, w, totals):
+def _gather_nodes_lanes_stencil(lanes, stencil, tasks, w, totals):
     if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
@@ -80,7 +80,7 @@ def _gather_nodes_eights_stencil(width, stencil, tasks, w, totals):
 
 
 @gather_nodes.on(OneByOne, CornerStencil)
-def _gather_nodes_one_by_one_corner_stencil(width, stencil, tasks, w, totals):
+def _gather_nodes_one_by_one_corner_stencil(lanes, stencil, tasks, w, totals):
     if all_by_corners(tasks, w):
         return gather_corners(tasks, w, stencil, totals)
     return _gather(tasks, w, stencil, totals)
@@ -88,7 +88,7 @@ def _gather_nodes_one_by_one_corner_stencil(width, stencil, tasks, w, totals):
 
 @gather_nodes.on(FourLanes, CornerStencil)
 @gather_nodes.on(EightLanes, CornerStencil)
-def _gather_nodes_eights_corner_stencil(width, stencil, tasks, w, totals):
+def _gather_nodes_lanes_corner_stencil(lanes, stencil, tasks, w, totals):
     by_corners = all_by_corners(tasks, w)
     if by_corners and shows_corners(tasks, w):
         return gather_corners(tasks, w, stencil, totals)
@@ -119,26 +119,26 @@ def _gather_parts(tasks, w, stencil, totals):
 
 
 @point_function(tags=2, otherwise=True)
-def scatter_nodes(width: Tag, stencil: tuple, quantities: tuple, w: Work, loads: tuple) -> None:
-    """Give all nodes of the stencil their parts."""
+def scatter_nodes(lanes: Tag, stencil: tuple, quantities: tuple, w: Work, loads: tuple) -> None:
+    """Scatter the loads of the quantities to all nodes of the stencil."""
     _scatter(quantities, w, stencil, loads)
 
 
 @scatter_nodes.on(FourLanes, Stencil)
 @scatter_nodes.on(EightLanes, Stencil)
-def _scatter_nodes_eights_stencil(width, stencil, quantities, w, loads):
+def _scatter_nodes_lanes_stencil(lanes, stencil, quantities, w, loads):
     parts = affine_parts(quantities, w, stencil, loads)
     if not _even(w, stencil, any(len(part) and len(part[-1]) for part in parts)):
         _scatter(quantities, w, stencil, loads)
     elif sees_same_nodes(stencil):
-        _scatter_parts(width, quantities, w, with_one_node(stencil), loads, parts)
+        _scatter_parts(lanes, quantities, w, with_one_node(stencil), loads, parts)
     else:
         _ask_ahead(quantities, w, stencil)
-        _scatter_parts(width, quantities, w, stencil, loads, parts)
+        _scatter_parts(lanes, quantities, w, stencil, loads, parts)
 
 
 @scatter_nodes.on(OneByOne, CornerStencil)
-def _scatter_nodes_one_by_one_corner_stencil(width, stencil, quantities, w, loads):
+def _scatter_nodes_one_by_one_corner_stencil(lanes, stencil, quantities, w, loads):
     if all_by_corners(quantities, w):
         scatter_corners(quantities, w, stencil, loads)
     else:
@@ -147,12 +147,12 @@ def _scatter_nodes_one_by_one_corner_stencil(width, stencil, quantities, w, load
 
 @scatter_nodes.on(FourLanes, CornerStencil)
 @scatter_nodes.on(EightLanes, CornerStencil)
-def _scatter_nodes_eights_corner_stencil(width, stencil, quantities, w, loads):
+def _scatter_nodes_lanes_corner_stencil(lanes, stencil, quantities, w, loads):
     block = block_of(w.kin, w.grid, stencil)
     if is_one_block(block):
-        _scatter_block(width, quantities, w, of_one(block), loads)
+        _scatter_block(lanes, quantities, w, of_one(block), loads)
     elif is_whole(block):
-        _scatter_block(width, quantities, w, block, loads)
+        _scatter_block(lanes, quantities, w, block, loads)
     elif all_by_corners(quantities, w):
         scatter_corners(quantities, w, stencil, loads)
     else:
@@ -160,23 +160,23 @@ def _scatter_nodes_eights_corner_stencil(width, stencil, quantities, w, loads):
 
 
 @shared
-def _scatter_block(width, quantities, w, block, loads):
+def _scatter_block(lanes, quantities, w, block, loads):
     at = in_block(w)
-    _scatter_parts(width, quantities, at, block, loads, affine_parts(quantities, at, block, loads))
+    _scatter_parts(lanes, quantities, at, block, loads, affine_parts(quantities, at, block, loads))
 
 
 @shared
-def _scatter_parts(width, quantities, w, stencil, loads, parts):
+def _scatter_parts(lanes, quantities, w, stencil, loads, parts):
     """Scatter affine parts to all nodes at once, the rest node by node."""
     known = tuple([part for part in parts if len(part)])
     if len(known):
-        give_affine(width, w, stencil, known)
+        give_affine(lanes, w, stencil, known)
     rest = [k for k, part in enumerate(parts) if not len(part)]
     if len(rest):
         _scatter(tuple([quantities[k] for k in rest]), w, stencil, tuple([loads[k] for k in rest]))
 
 
 @shared
-def gathered_by(width: Tag, tasks: tuple, w: Work, stencil: tuple, x: tuple) -> tuple:
+def gathered_by(lanes: Tag, tasks: tuple, w: Work, stencil: tuple, x: tuple) -> tuple:
     """Gather the totals of the tasks over the nodes of a stencil."""
-    return gather_nodes(width, stencil, tasks, w, empty_all(tasks, w, x))
+    return gather_nodes(lanes, stencil, tasks, w, empty_all(tasks, w, x))

@@ -37,12 +37,12 @@ class Staged(NamedTuple):
     """One visit for each stage, so that hooks on points can act in between."""
 
 
-def rows_of(scheme: type, visits: type) -> list[Any]:
+def rows_of(scheme: Any, visits: Any) -> list[Any]:
     """The rows of a step of `scheme`."""
     return table.fused(scheme.rows) if visits is Fused else table.staged(scheme.rows)
 
 
-def _first_rows(scheme: type, visits: type) -> list[Any]:
+def _first_rows(scheme: Any, visits: Any) -> list[Any]:
     """Fused steps expect the sums on the nodes: the scatter of the last visit, alone."""
     if visits is not Fused:
         return []
@@ -86,7 +86,8 @@ def _take_all(rows, s, mode, hooks, more):
     return True
 
 
-_step_rows, _begin_rows = functools.cache(rows_of), functools.cache(_first_rows)  # interpreted
+_step_rows: Any = functools.cache(rows_of)  # interpreted
+_begin_rows: Any = functools.cache(_first_rows)
 
 
 def step(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, more: bool) -> bool:

@@ -10,7 +10,7 @@ A scheme names its rows once, stage by stage, as its class attribute ``rows``. F
 Averaged volumes, XPIC, heat and contact are calls that do nothing in scenes without them.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from karamelo_py.kernels.g2p import Move, Strain, StrainInMove, StrainOfLastStep
@@ -58,7 +58,7 @@ class NodeTask(NamedTuple):
 class SceneTask(NamedTuple):
     """A call ``function(s, mode, hooks)`` of what only some scenes have."""
 
-    function: Callable
+    function: Any
 
 
 class Check(NamedTuple):

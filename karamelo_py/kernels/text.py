@@ -44,7 +44,7 @@ POWERS = np.array([_power(k) for k in range(FIRST, 300)])
 MINUS, PLUS, POINT, ZERO, BLANK, NEWLINE, E = b"-+.0 \ne"
 ZEROS = int.from_bytes(b"00000000", "little")
 NAN, INF, NOUGHT = (int.from_bytes(w, "little") for w in (b"nan", b"inf", b"0.000000"))
-BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"
+BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-defined]
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:

@@ -48,7 +48,7 @@ def place_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
 @shared
 def law_of(w: Work, p: Index) -> Tag:
     """Load the law of point `p`, with the parameters of its material."""
-    return record(w.laws, index(w.points.material[p]))
+    return record(w.laws, index(w.points.material[p]))  # type: ignore[arg-type]
 
 
 @shared

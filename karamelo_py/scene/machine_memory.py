@@ -1,5 +1,6 @@
 """Memory of this machine, and of a job on it."""
 
+import warnings
 from math import inf
 from pathlib import Path
 from typing import NamedTuple
@@ -52,7 +53,8 @@ def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory 
     import psutil
 
     try:
-        machine, swap = psutil.virtual_memory(), psutil.swap_memory()
+        with warnings.catch_warnings(action="ignore"):  # of numbers that are not needed
+            machine, swap = psutil.virtual_memory(), psutil.swap_memory()
     except (OSError, RuntimeError):
         return None
     left = machine.available + swap.free + SLACK * machine.total

@@ -4,7 +4,7 @@ import itertools
 import math
 from bisect import bisect_right
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class Placement(NamedTuple):
         Parts of the region thinner than that may be missing, see `Pieces.missed`.
     """
 
-    x0: "np.ndarray | Filled"
+    x0: Any  # np.ndarray or Filled
     volume: float | np.ndarray
     half_size: np.ndarray
     lo: np.ndarray

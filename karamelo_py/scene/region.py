@@ -60,7 +60,7 @@ class Region:
         self.exterior = exterior
         dimension = self.domain.dimension
         self.parts = tuple(parts)
-        self.unknown = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
+        self.unknown: bool = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
         self.box_lo = np.zeros(3)
         self.box_hi = np.zeros(3)
         self.box_lo[:dimension] = -np.inf if exterior else lo

@@ -236,6 +236,7 @@ def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
         domain.set_cell_size(h)
     if own_grids(hub):
         return float(h)
+    assert domain.h is not None
     if abs(h - domain.h) > 1e-9 * domain.h:
         raise ScriptError(
             f"cell size {h:g} differs from that of the domain's grid, {domain.h:g}, "

@@ -48,8 +48,8 @@ class Update:
     def __init__(self, values: Values):
         self.values = values
         self.method: Any = None
-        self.transfer: NamedTuple | None = None
-        self.scheme: NamedTuple = MUSL()
+        self.transfer: Any = None
+        self.scheme: Any = MUSL()
         self.scheme_place: Place | None = None
         self.thermal = False
         self.anti_locking = False
@@ -94,7 +94,7 @@ class Update:
         """The next step."""
         return self.values.get("dt")
 
-    def transfer_tag(self, real: type) -> NamedTuple:
+    def transfer_tag(self, real: type) -> Any:
         """The transfer with its numbers in the precision of the run."""
         numbers = (real(x) if isinstance(x, float) else x for x in self.transfer)
         return type(self.transfer)(*numbers)

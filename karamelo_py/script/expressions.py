@@ -15,7 +15,15 @@ from karamelo_py.compiler import formula
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import compute_quietly
 from karamelo_py.script.programs import in_order, program
-from karamelo_py.script.terms import Term, alike, applied, constant, is_short, text_of
+from karamelo_py.script.terms import (
+    Term,
+    alike,
+    applied,
+    constant,
+    is_short,
+    number_text,
+    text_of,
+)
 from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
@@ -156,6 +164,15 @@ class Expression:
 
 
 Value = float | str | Expression
+
+
+def shown(value: Value) -> str:
+    """Write a value as a script would say it."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, Expression):
+        return value.text
+    return number_text(value)
 
 
 def _term(value: float | Expression) -> Term:
