@@ -326,7 +326,7 @@ def test_of_processes_those_of_one_machine_count(small, on_machine, refused):
     hub.interpreter = Interpreter(hub)
     hub.interpreter.run_text(block(2))
     whole = least_bytes(hub, np.float64, True)
-    hub.settings.crew = SimpleNamespace(size=4, on_machine=on_machine)
+    hub.settings.comm = SimpleNamespace(size=4, on_machine=on_machine)
     small(0.6 * whole)
     with pytest.raises(ScriptError, match="24 points") if refused else nullcontext():
         check_room(hub, copied=True)

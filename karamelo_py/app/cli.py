@@ -25,7 +25,7 @@ from karamelo_py.app.options import (
     threads_option,
 )
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
-from karamelo_py.run.mpi.crew import Crew, launched
+from karamelo_py.run.mpi.comm import MpiComm, launched
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
 
 if TYPE_CHECKING:  # which takes most of the time that the program needs to begin
@@ -307,7 +307,7 @@ def _run(options: argparse.Namespace) -> int:
         debugging = options.debug
         return together(
             options.ranks,
-            lambda crew: _carry_out(options, script, crew),
+            lambda comm: _carry_out(options, script, comm),
             lambda act: outcome_of(act, debugging=debugging),
         )
     if (options.ranks or 1) > 1:
@@ -315,7 +315,7 @@ def _run(options: argparse.Namespace) -> int:
     return _carry_out(options, script)
 
 
-def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = None) -> int:
+def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = None) -> int:
     """Carry out a script; returns the exit status."""
     with leaving_at_once():
         from karamelo_py.language.interpreter import Interpreter
@@ -326,8 +326,8 @@ def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = Non
     hub = Hub(Console(quiet=options.quiet, terminal=has_terminal()))
     hub.settings.threads = options.threads
     hub.settings.ranks = options.ranks or launched()[0]
-    if crew is not None:
-        share(hub, crew)
+    if comm is not None:
+        share(hub, comm)
     hub.settings.debug = options.debug
     hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking

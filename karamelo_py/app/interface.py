@@ -13,7 +13,7 @@ import numpy as np
 
 from karamelo_py.app.options import threads_option
 from karamelo_py.output.console import Console
-from karamelo_py.run.mpi.crew import launched
+from karamelo_py.run.mpi.comm import launched
 from karamelo_py.script.errors import ScriptError
 
 

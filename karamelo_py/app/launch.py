@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from karamelo_py.app.leaving import SIGNALLED
-from karamelo_py.run.mpi.crew import ENDING, INSTALL, heeding
+from karamelo_py.run.mpi.comm import ENDING, INSTALL, handled_signals
 from karamelo_py.script.errors import ScriptError, render_message
 
 # Where the launcher of this program waits for the processes to report.
@@ -107,7 +107,7 @@ class Launcher:
 
     def run(self) -> int:
         """Start them and see them end; returns the exit status."""
-        with socket.socket(socket.AF_UNIX) as self.door, heeding(self._pass_on):
+        with socket.socket(socket.AF_UNIX) as self.door, handled_signals(self._pass_on):
             self.door.bind(self.name)
             self.door.listen(self.ranks)
             environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}

@@ -51,12 +51,10 @@ class AstFunction:
         With the globals that it is to see.
     flow
         Makes what writes the code of edges, when a call begins.
-    rolled
-        Whether loops are left to the compiler to unroll.
     """
 
-    def __init__(self, function: Callable, flow: Callable[[], Flow], rolled: bool):
-        self.function, self.flow, self.rolled = function, flow, rolled
+    def __init__(self, function: Callable, flow: Callable[[], Flow]):
+        self.function, self.flow = function, flow
         self.definition = source_of(function)
         self.unrolled: set[ast.For] = set()  # loops that must be
         self.grown: dict[tuple, dict] = {}  # types of literals that loops begin with, by place
@@ -260,8 +258,6 @@ class AstCompiler(ExpressionCompiler):
 
     def is_rolled(self, node: ast.For, through: range) -> bool:
         """Tell whether a loop over a known range stays a loop: a long one, if it can be."""
-        if self.walked.rolled:
-            return True
         if len(through) <= LONG or node in self.walked.unrolled:
             return False
         if not self.flow.builder:

@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 from numba.core.errors import NumbaError, TypingError
+from numba.core.extending import _Intrinsic
 from numba.core.imputils import impl_ret_borrowed, lower_builtin
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
@@ -51,9 +52,8 @@ from karamelo_py.compiler.values import (
     at_work,
     branching,
     counting,
-    derivatives,
     emit,
-    has_derivatives,
+    implemented,
     is_literal,
     now,
     words,
@@ -111,14 +111,14 @@ _modules: dict[int, Globals] = {}
 _copies: dict[Any, Any] = {}
 
 
-class _Module:
+class Module:
     """Show the functions of a module like globals."""
 
-    def __init__(self, module: python.ModuleType):
-        self._module = module
+    def __init__(self, module: python.ModuleType, seen: Callable[[Any], Any]):
+        self._module, self._seen = module, seen
 
     def __getattr__(self, name: str) -> Any:
-        return _seen(getattr(self._module, name))
+        return self._seen(getattr(self._module, name))
 
 
 class _Dispatched(Emitted):
@@ -127,8 +127,9 @@ class _Dispatched(Emitted):
     def __call__(self, *arguments: Any) -> Any:
         if self.counts(arguments):
             return self.seen(*arguments)
-        if self.seen in derivatives and has_derivatives(arguments):
-            return now().seen(derivatives[self.seen])(*arguments)
+        made = implemented(self.seen, arguments)
+        if made is not None:
+            return _seen(made)(*arguments)
         if self.seen in OF_REALS:
             arguments = alike(arguments)
         lowering = now()
@@ -164,13 +165,13 @@ def _is_instance(thing: Any, kind: Any) -> bool:
 
 
 def _attribute(thing: Any, *name: Any) -> Any:
-    if isinstance(thing, _Module):
+    if isinstance(thing, Module):
         raise Untraceable("what is taken from a module has to be named: module.name")
     return getattr(thing, *name)
 
 
 _OF_NUMBERS = {*OF_WHOLE, float}
-_INSTEAD = {
+INSTEAD = {
     is_literal: is_literal,
     type: _class_of,
     isinstance: _is_instance,
@@ -199,10 +200,10 @@ _CONSTANT = (type(None), type(NotImplemented), bool, int, float, str, np.number,
 
 def _seen(thing: Any) -> Any:
     """Find what takes the place of a global in functions that are run here."""
-    if isinstance(thing, (*_CONSTANT, Emitted, _Module)):
+    if isinstance(thing, (*_CONSTANT, Emitted, Module)):
         return thing
     if isinstance(thing, python.ModuleType):
-        return _Module(thing)
+        return Module(thing, _seen)
     if isinstance(thing, tuple):
         inner = [_seen(item) for item in thing]
         return type(thing)(*inner) if hasattr(thing, "_fields") else tuple(inner)
@@ -226,8 +227,8 @@ def _seen(thing: Any) -> Any:
 
 def _copy(thing: Any) -> Any:
     """Make the same for what is called."""
-    if thing in _INSTEAD:
-        return _INSTEAD[thing]
+    if thing in INSTEAD:
+        return INSTEAD[thing]
     if thing in _SAFE:
         return thing
     if thing in choosers:
@@ -271,11 +272,10 @@ def _copied(function: Callable) -> Callable:
     defaults = function.__defaults__ and tuple(map(_seen, function.__defaults__))
     made = python.FunctionType(code, seen, function.__name__, defaults, cells)
     made.__kwdefaults__ = {k: _seen(v) for k, v in (function.__kwdefaults__ or {}).items()}
-    rolled = code in _rolled
-    if not rolled and code not in branching:
+    if code not in branching:
         return made
     vars(made).update(vars(function))
-    return AstFunction(made, lambda: Flow(now()), rolled)
+    return AstFunction(made, lambda: Flow(now()))
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
@@ -301,7 +301,6 @@ MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with con
 _numbers = itertools.count()
 _begun: set[tuple] = set()  # of what is written now
 _own: set[Callable] = set()  # functions that are not written into what calls them
-_rolled: set[python.CodeType] = set()  # of functions with loops that are left to the compiler
 
 
 def _kinds_of(dispatch: Callable, kinds: Iterable[types.Type]) -> tuple[types.Type, ...]:
@@ -324,8 +323,8 @@ def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
             chosen = _chosen(dispatch, kinds)
             if chosen is None:
                 return None
-            run = _copied(chosen)
-            note([run.__code__])
+            run = _seen(chosen) if isinstance(chosen, _Intrinsic) else _copied(chosen)
+            note([run.__code__] if hasattr(run, "__code__") else ())
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
             result = types.unliteral(lowering.kind_of(found))
         codes = {part for part in parts if isinstance(part, python.CodeType)}
@@ -368,7 +367,21 @@ def forget() -> None:
     resolutions.clear()
 
 
+def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
+    """List the types of numbers among types, and in tuples, that implement functions."""
+    for kind in kinds:
+        one = tag_class(kind) or type(kind)
+        if hasattr(one, "implements"):
+            yield one
+        elif isinstance(kind, types.BaseTuple):
+            yield from _number_types(kind)
+
+
 def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
+    """Find what a function is for arguments of some types; None if Numba has it."""
+    for one in _number_types(kinds):
+        if dispatch in one.implements:
+            return one.implements[dispatch]
     for chooser in choosers[dispatch]:
         found = chooser(*kinds)
         if found is not None:
@@ -387,15 +400,14 @@ def alone(dispatch: Callable) -> None:
     _own.add(dispatch)
 
 
-def roll(function: Callable) -> None:
-    """Leave the loops in a function to the compiler, those over known ranges too."""
-    _rolled.add(function.__code__)
+def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> None:
+    """Let kernels run what `chooser` makes of `dispatch` for types; None if it has nothing.
 
-
-def traced(dispatch: Callable, chooser: Callable) -> None:
-    """Let kernels run what `chooser` makes of `dispatch` for types; None if it has nothing."""
+    It is asked before those that are known already, or as the `last`.
+    """
     if dispatch in choosers:
-        choosers[dispatch].append(chooser)
+        known = choosers[dispatch]
+        known.insert(len(known) if last else 0, chooser)
         return
     choosers[dispatch] = [chooser]
 
@@ -408,11 +420,11 @@ def traced(dispatch: Callable, chooser: Callable) -> None:
             return found and signature(found.result, *kinds)
 
         def get_impl_key(self, called: Any) -> Any:
-            return choosers[dispatch][0]
+            return Template
 
     infer_global(dispatch, types.Function(Template))
 
-    @lower_builtin(chooser, types.VarArg(types.Any))
+    @lower_builtin(Template, types.VarArg(types.Any))
     def lower(context: Any, builder: Any, called: Any, values: list) -> Any:
         lowering = Lowering(_seen, context.typing_context, context, builder)
         with writing(lowering):

@@ -269,13 +269,15 @@ class HeldValue:
     __add__ = __radd__ = __eq__
 
 
-derivatives: dict = {}  # of functions, for numbers with derivatives (`karamelo_py.points.dual`)
-
-
-def has_derivatives(arguments: tuple) -> bool:
-    """Tell whether one of the arguments is such a number."""
-    kind = derivatives.get("class")
-    return kind is not None and any(isinstance(a, kind) for a in arguments)
+def implemented(function: Callable, arguments: tuple) -> Callable | None:
+    """Find what a function is for a type of numbers that are tuples, if there is one among them."""
+    for a in arguments:
+        if isinstance(a, tuple):
+            table = getattr(type(a), "implements", None)
+            made = implemented(function, a) if table is None else table.get(function)
+            if made is not None:
+                return made
+    return None
 
 
 def is_literal(thing: Any) -> bool:
@@ -292,8 +294,9 @@ class Emitted:
     def __call__(self, *arguments: Any) -> Any:
         if self.counts(arguments):
             return self.seen(*arguments)
-        if self.seen in derivatives and has_derivatives(arguments):
-            return now().seen(derivatives[self.seen])(*arguments)
+        made = implemented(self.seen, arguments)
+        if made is not None:
+            return now().seen(made)(*arguments)
         if self.seen in OF_REALS:
             if all(type(a) in (int, float) for a in arguments):
                 return self.seen(*arguments)  # known already

@@ -21,7 +21,7 @@ move (not with splines), and that usl strains by dv, which may only cost.
 """
 
 from karamelo_py.compiler import fields
-from karamelo_py.compiler.compile import accumulate, looping, real, round_off, shared, where
+from karamelo_py.compiler.compile import accumulate, real, round_off, shared, where
 from karamelo_py.compiler.tuples import add_scaled, row, scale, subtract
 from karamelo_py.kernels.arrays import MASS, of_change, of_momentum
 from karamelo_py.kernels.visit import law_of, state_of
@@ -82,7 +82,7 @@ def warm_by_friction(rubbed, w, stencil, p, like):
         fields.store(w.points.state, p, with_temperature(law, w.kin, state, T))
 
 
-@looping
+@shared
 def _heat_of_nodes(rubbed, w, stencil, like):
     heat = like - like
     for k in range(support(w.basis, w.kin)):
@@ -163,7 +163,7 @@ def in_company(w, stencil, p, moment):
     return scale(max(min(kept, one), mass - mass), moment)
 
 
-@looping
+@shared
 def _own_share(lost, w, stencil, mass):
     """The share of a point of this mass in what its nodes have, by its weights."""
     share = mass - mass
@@ -201,7 +201,7 @@ def reflect(reflected, w, stencil, p, term, k):
         fields.store(reflected, p, (gone, *rest))
 
 
-@looping
+@shared
 def gathered_term(w, stencil, term):
     """The present term of XPIC's series at a point."""
     for k in range(support(w.basis, w.kin)):
@@ -210,7 +210,7 @@ def gathered_term(w, stencil, term):
     return term
 
 
-@looping
+@shared
 def _spread(w, stencil, term):
     """sum_i N_i |w_i - term|^2 of the present term w of XPIC's series."""
     spread = term[0] - term[0]
@@ -227,7 +227,7 @@ def _before(w, i, like):
     return subtract(row(w.nodes.update, i, 0, like), row(w.nodes.update, i, of_change(w.kin), like))
 
 
-@looping
+@shared
 def _moment_before(w, stencil, v, moment):
     """Gather the moment of the velocity that the nodes had before the update."""
     for k in range(support(w.basis, w.kin)):
@@ -238,7 +238,7 @@ def _moment_before(w, stencil, v, moment):
     return moment
 
 
-@looping
+@shared
 def _gone(lost, w, stencil, v, moment):
     """Kinetic energy per mass that a point has lost at the nodes and on the way back."""
     none = subtract(v, v)

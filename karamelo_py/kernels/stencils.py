@@ -5,7 +5,6 @@ All at once go sums along the arms of a stencil, what is affine, and the corners
 
 from karamelo_py.compiler.compile import (
     all_lanes,
-    looping,
     point_function,
     prefetch_records,
     shared,
@@ -35,14 +34,14 @@ from karamelo_py.points.basis.cpdi.corners import CornerStencil
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
 
 
-@looping
+@shared
 def _gather(tasks, w, stencil, totals):
     for k in range(support(w.basis, w.kin)):
         totals = gathered_all(tasks, w, stencil, k, totals)
     return totals
 
 
-@looping
+@shared
 def _scatter(quantities, w, stencil, loads):
     for k in range(support(w.basis, w.kin)):
         scattered_all(quantities, w, stencil, k, loads)

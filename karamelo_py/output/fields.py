@@ -73,9 +73,12 @@ class Fields:
             self._cache.clear()
         return simulation
 
-    def pieces(self) -> Iterator["Fields"]:
-        """The fields of all points, so many points at a time, in the order of their ids."""
-        for piece in self._simulation.pieces():
+    def pieces(self, *, to_first: bool = False) -> Iterator["Fields"]:
+        """The fields of all points, so many points at a time, in the order of their ids.
+
+        With `to_first`, of several processes the first alone gets them.
+        """
+        for piece in self._simulation.pieces(to_first=to_first):
             yield Fields(self.hub, piece)
 
     def _cached(self, name: str, make) -> Any:
@@ -193,18 +196,6 @@ class Fields:
         """
         return self._simulation.each(part, name, *arguments)
 
-    def counted(self, part: Any, name: str, size: int, *arguments: Any) -> np.ndarray:
-        """Count the points of a part's group with each of `size` numbers, which its method says."""
-        return self._simulation.counted_of(part, name, size, *arguments)
-
-    def in_order(self, part: Any, name: str, *arguments: Any) -> Iterator[np.ndarray]:
-        """Rows (k, n) of the points of a part's group in the order of their keys, some at a time.
-
-        Its method says both, keys (n,) and rows, of fields of some of the points. Keys are whole
-        numbers, no two alike. How many come together depends on processes.
-        """
-        return self._simulation.in_order(part, name, *arguments)
-
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
         own = [*sorted(self.columns_of_laws()), *self.declared_columns()]
@@ -276,9 +267,13 @@ class Fields:
                 return _column(array, k)
         return np.zeros(simulation.count)
 
-    def node_pieces(self, names: Sequence[str]) -> Iterator[NodeFields]:
-        """Fields of all nodes, of which `names` are asked for, so many nodes at a time."""
-        for rows in self._simulation.node_pieces([name for name in names if name in BROUGHT]):
+    def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:
+        """Fields of all nodes, of which `names` are asked for, so many nodes at a time.
+
+        With `to_first`, of several processes the first alone gets them.
+        """
+        brought = [name for name in names if name in BROUGHT]
+        for rows in self._simulation.node_pieces(brought, to_first=to_first):
             yield NodeFields(self.hub, rows)
 
     def mass_at_nodes(self, group: Any) -> np.ndarray:

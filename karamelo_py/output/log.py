@@ -105,6 +105,8 @@ class Log(Rhythmic):
 
     def _go_on(self) -> None:
         """Go on in the file of an earlier run, behind the line that was its last then."""
+        if not self.hub.output.writes:
+            return
         there = self.path.stat().st_size if self.path.is_file() else 0
         if there < self._end:
             self.hub.warn(

@@ -171,7 +171,7 @@ LOADS = "post_particles_to_grid"
 
 
 def _volume(simulation: Any, block: Any) -> np.ndarray:
-    s = simulation.stepped
+    s = simulation.setup
     points = known_to_laws(block.points)
     rows = np.zeros((len(points.id), EXPORTED))
     export_state(s.kin, s.nodes.sums[0, MASS], points, block.laws, rows)
@@ -198,7 +198,7 @@ BROUGHT: dict[str, Callable[[Any, Any], np.ndarray | None]] = {
 
 def brought(simulation: Any, name: str) -> np.ndarray:
     """(nodes, 2) sums of N value over the points at hand: whole units of all, and what is left."""
-    s = simulation.stepped
+    s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))
     found = [(block, BROUGHT[name](simulation, block)) for block in s.blocks]
     found = [(block, np.ascontiguousarray(of, float)) for block, of in found if of is not None]

@@ -50,6 +50,11 @@ class Output:
         # Who writes to a file.
         self.files: dict[Path, str] = {}
 
+    @property
+    def takes_part(self) -> bool:
+        """Tell whether dumps are written, by this process or by the first."""
+        return self.writes or not self.hub.settings.comm.leads
+
     def check_file(self, file: Path) -> None:
         """Refuse to write to `file` if that is the log or a script, or cannot be done.
 
@@ -138,7 +143,7 @@ class Output:
 
     def write_last(self) -> None:
         """Write what comes after all others alone."""
-        for item in self.last if self.writes else ():
+        for item in self.last if self.takes_part else ():
             if item.last_step != self.hub.update.step:
                 self._do(item, "write")
                 item.last_step = self.hub.update.step
@@ -178,17 +183,18 @@ class Output:
         except ScriptError as error:
             raise _located(error, item) from error.__cause__
 
-    @staticmethod
-    def _do(item: Any, what: str) -> None:
+    def _do(self, item: Any, what: str) -> None:
         """Write or finish; exceptions of a dump say where they come from."""
         style = getattr(item, "style", "")
+        if not self.hub.settings.comm.leads:
+            what = "take_part" if hasattr(item, "take_part") else what
         place = getattr(item, "place", None)
         naming = as_script_error(f"dump {style}", what, type(item), place)
         with naming if style else nullcontext():
             getattr(item, what)()
 
     def _items(self) -> list[Periodic]:
-        if not self.writes:
+        if not self.takes_part:
             return [self.log, *self.plots]
         return [self.log, *self.hub.dumps.values(), *self.plots, *self.last]
 

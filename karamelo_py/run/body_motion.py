@@ -114,7 +114,7 @@ def motions(simulation: Any) -> list[BodyMotion]:
 def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
     """Number of a solid, masses (n,), places and velocities (d, n) of some of its points."""
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
-    for block in simulation.stepped.blocks:
+    for block in simulation.setup.blocks:
         points = block.points
         for begin in range(0, len(points.id), PIECE):
             own = slice(begin, begin + PIECE)

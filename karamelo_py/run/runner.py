@@ -6,12 +6,14 @@ from math import inf, isfinite, isnan
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from karamelo_py.run.advice import known_failures, large_steps
 from karamelo_py.run.advice.report import bytes_per_point, report
 from karamelo_py.run.advice.resting import warn_about_length
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.lower.build import check_scene
-from karamelo_py.run.mpi.crew import heeding
+from karamelo_py.run.mpi.comm import check_same_run, handled_signals
 from karamelo_py.run.recovery import CHUNK, RollBack
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import ruling_limit, words_of_own_step, words_of_share
@@ -126,22 +128,17 @@ class Runner:
         self.rollback = RollBack(hub, halve=halve)
         self.place = hub.place
         self.timings = Timings(hub)
-        self.interrupted = 0  # the signal
+        self.signal = 0  # that this process has been sent
+        self.interrupted = 0  # the signal that all processes end with
 
     def run(self) -> None:
         """Take the steps."""
         hub = self.hub
         hub.running = self
         try:
-            if hub.simulation.follows:
-                hub.simulation.follow()
-            else:
-                with (
-                    self.timings.telling_of_compilation(),
-                    attributed(hub),
-                    hub.simulation.leading(),
-                ):
-                    self._run(hub.simulation)
+            check_same_run(hub)
+            with self.timings.telling_of_compilation(), attributed(hub):
+                self._run(hub.simulation)
         finally:
             hub.running = None
         hub.runs.append({name: hub.values.get(name) for name in hub.values.names()})
@@ -183,7 +180,7 @@ class Runner:
         simulation.compile()
         began = simulation.step
         self._banner(simulation, going_on)
-        with heeding(self._note):
+        with handled_signals(self._note):
             with self.timings.counted("output"):
                 hub.output.begin(within=going_on)
             hub.console.begin_run(simulation.step, 0.0)
@@ -250,13 +247,13 @@ class Runner:
             end = min(hub.output.next_step(step), self.last_step, length.end(step))
             with timings.counted("steps"):
                 status = simulation.advance(int(end) - step)
-            if simulation.signal and not self.interrupted:
-                self._note(simulation.signal)
+            self._agree(simulation)  # what is written shows steps that no process has failed in
             if not rollback.after(status):
                 length.restart()
                 continue
             boundary.tell_of_bounces(hub, simulation)
-            length.next(timings.since(before, "steps"), simulation.step - step)
+            elapsed = simulation.comm.bcast(timings.since(before, "steps"))
+            length.next(elapsed, simulation.step - step)
             with timings.counted("output"):
                 if self._steps_left(simulation):
                     hub.output.write()
@@ -270,7 +267,12 @@ class Runner:
             if simulation.step == self.first_step:
                 self._tell_of_no_first_step()
             return False
+        self._agree(simulation)
         return not self.interrupted
+
+    def _agree(self, simulation: Simulation) -> None:
+        """Learn which signal any of the processes has been sent."""
+        self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
 
     def _steps_left(self, simulation: Simulation) -> bool:
         """Tell whether neither the last step nor the end time is reached."""
@@ -316,9 +318,9 @@ class Runner:
 
         So do the signals of batch systems and of terminals that are closed.
         """
-        if self.interrupted:
+        if self.signal:
             raise KeyboardInterrupt
-        self.interrupted = number
+        self.signal = number
         if number == getattr(signal, "SIGHUP", None):
             self.hub.console.leave()
 

@@ -12,6 +12,7 @@ from karamelo_py.language.unknown import line_below
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
 from karamelo_py.output.schedule import Output
+from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.plugins import attributed
 from karamelo_py.scene.update import Update
@@ -97,7 +98,7 @@ class Settings:
         self.precision = "double"
         self.engine = "processor"
         self.ranks = 1  # processes that are asked for
-        self.crew: Any = None  # the processes that share the scene, where there are several
+        self.comm = SerialComm()  # the processes that share the scene
         self.debug = False
         self.trusts = False  # .geo files, which may run programs
 
@@ -231,6 +232,8 @@ class Hub:
                 name = f"{catalogue.kind} {item.style}"
                 with as_script_error(name, "refresh", type(item), item.place):
                     item.refresh()
+        # A compute of a plug-in may draw lots: all processes go on with the numbers of the first.
+        self.values.array[:] = self.settings.comm.bcast(self.values.array)
 
     def warn(
         self,

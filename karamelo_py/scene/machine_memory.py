@@ -109,13 +109,13 @@ def _number(path: Path) -> float | None:
 
 def on_machine(hub: Scene) -> int:
     """Count the processes that share the scene on this machine."""
-    return 1 if hub.settings.crew is None else hub.settings.crew.on_machine
+    return hub.settings.comm.on_machine
 
 
 def share_of_machine(hub: Scene) -> float:
     """Tell which part of a scene is on this machine, where several share it."""
-    crew = hub.settings.crew
-    return 1.0 if crew is None else on_machine(hub) / crew.size
+    comm = hub.settings.comm
+    return comm.on_machine / comm.size
 
 
 def most_points(hub: Scene, already: int, dimension: int) -> float:

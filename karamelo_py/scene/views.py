@@ -265,7 +265,7 @@ class PointsView(View):
             is small beside a cell. It is not called where no point keeps such a thing.
         """
         simulation, slopes = self._simulation, None
-        s, d = simulation.stepped, simulation.kin.dimension
+        s, d = simulation.setup, simulation.kin.dimension
         here = slice(component * d, component * d + d)
         for block, rows, own in self._at_hand():
             points, kept = block.points, field(block.points.fields, Moment)
@@ -327,7 +327,7 @@ class PointsView(View):
 
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
-        s = self._simulation.stepped
+        s = self._simulation.setup
         names, like = s.kin.symmetric_names, s.nodes.sums[0, arrays.MASS]
         flags = np.array([name in given for name in names])
         values = np.stack(

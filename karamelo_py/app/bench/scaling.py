@@ -25,7 +25,7 @@ from karamelo_py.app.launch import launch
 from karamelo_py.app.together import keep_to_oneself, share, together
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.mpi.crew import Crew
+from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -118,35 +118,32 @@ def _measured(part: ScalingRun, *, weak: bool = False) -> Scaled:
     return Scaled(part.ranks, part.threads, weak, **found)
 
 
-def measure(part: ScalingRun, crew: Crew | None = None) -> int:
+def measure(part: ScalingRun, comm: MpiComm | None = None) -> int:
     """Measure as one of the processes; the first writes what is found."""
     hub = Hub(Console(quiet=True))
     hub.settings.threads = part.threads
-    if crew is not None:
-        share(hub, crew)
+    if comm is not None:
+        share(hub, comm)
     hub.interpreter = Interpreter(hub, presets=part.presets)
     workload = WORKLOADS[part.workload]
     hub.interpreter.run_text(workload.script, "bench")
     simulation = hub.simulation
     hub.running = SimpleNamespace(rollback=None)
-    if simulation.follows:
-        simulation.follow()
-        return 0
-    with simulation.leading():
-        simulation.begin(inf)
-        simulation.compile()
-        timed_steps(simulation, workload.lead)
-        start = simulation.snapshot()
-        count = step_count(timed_steps(simulation, 5) / 5, part.seconds)
-        found = []
-        for _ in range(REPETITIONS):
-            simulation.restore(start)
-            before, begun = simulation.waits(), time.perf_counter()
-            timed_steps(simulation, count)
-            after = simulation.waits()  # all have finished then
-            taken = time.perf_counter() - begun
-            found.append((taken, (after - before) / taken))
-        taken, waits = min(found, key=lambda one: one[0])
+    simulation.begin(inf)
+    simulation.compile()
+    timed_steps(simulation, workload.lead)
+    start = simulation.snapshot()
+    count = simulation.comm.bcast(step_count(timed_steps(simulation, 5) / 5, part.seconds))
+    found = []
+    for _ in range(REPETITIONS):
+        simulation.restore(start)
+        before, begun = simulation.waits(), time.perf_counter()
+        timed_steps(simulation, count)
+        after = simulation.waits()  # all have finished then
+        taken = time.perf_counter() - begun
+        found.append((taken, (after - before) / taken))
+    taken, waits = min(found, key=lambda one: one[0])
+    if simulation.comm.leads:
         least = float(np.min(waits))
         file = {
             "points": simulation.count,
@@ -173,7 +170,7 @@ def main() -> int:
     part = ScalingRun(*json.loads(sys.argv[1]))
     keep_to_oneself()
     if part.ranks > 1:
-        return together(part.ranks, lambda crew: measure(part, crew), outcome_of)
+        return together(part.ranks, lambda comm: measure(part, comm), outcome_of)
     return measure(part)
 
 

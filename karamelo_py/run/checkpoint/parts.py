@@ -66,7 +66,8 @@ class PartStates(NamedTuple):
             if begins:
                 state = {name: state[name] for name in named(part, "carries") if name in state}
             give_state(part, state, self.arrays)
-            if (cut or anew) and not begins and hasattr(part, "resumed"):
+            has_file = hub.settings.comm.leads or key[0] not in OUTPUTS
+            if (cut or anew) and not begins and has_file and hasattr(part, "resumed"):
                 part.resumed()
 
 

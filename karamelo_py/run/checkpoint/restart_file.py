@@ -20,6 +20,7 @@ from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.run.checkpoint.arrays import Stored, reading
 from karamelo_py.run.checkpoint.parts import PartStates, for_json, parts_of
+from karamelo_py.run.checkpoint.rollback import RollbackPoint
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -70,19 +71,23 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
 
     The file appears under its name when all of it is written.
     """
-    path, simulation = path_of(hub, file), hub.simulation
-    if hub.settings.crew is None or within:
+    path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
+    if comm.leads:
         _write(hub, path, within)
-    elif simulation.apart and simulation.follows:
-        simulation.follow()
-    elif simulation.apart:
-        with simulation.leading():
-            _write(hub, path, within)
     else:
-        _ = simulation.setup  # of all processes together
-        if not simulation.follows:
-            _write(hub, path, within)
+        for _ in simulation.stored():
+            pass
+        if point := _good(hub):
+            for _ in simulation.stored_snapshot(point.arrays):
+                pass
+    comm.barrier()
     return path
+
+
+def _good(hub: Hub) -> RollbackPoint | None:
+    """Find the last good state, where the run in progress may go back to it."""
+    run = hub.running and hub.running.rollback
+    return run.point if run and run.halve and run.point.arrays else None
 
 
 def _write(hub: Hub, path: Path, within: bool) -> None:
@@ -92,9 +97,9 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
         if hasattr(part, "filed"):
             part.filed()
     interpreter, states = hub.interpreter, {"parts": PartStates.of(hub)}
-    run, point = hub.running and hub.running.rollback, None
-    if run and run.halve and run.point.arrays:
-        point, states["good parts"] = run.point, run.point.parts
+    run, point = hub.running and hub.running.rollback, _good(hub)
+    if point:
+        states["good parts"] = point.parts
     content = {
         "within": within,
         "statements": interpreter.record.statements,

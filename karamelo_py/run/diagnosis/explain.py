@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -34,6 +34,10 @@ GOES_ON = (
 FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
+
+
+class OthersWait(Exception):
+    """This process cannot write a file, and others go on to give it what belongs there."""
 
 
 class Trouble(NamedTuple):
@@ -85,10 +89,11 @@ def stop(
     `start` on it is the state of the start.
     """
     message, hint, at_fault = trouble(hub, simulation, status)
-    if start is None:
-        hint += _keep_good(hub, simulation, status, good)
-    else:
-        hint += _keep_start(hub, simulation, status, good, start)
+    with suppress(OthersWait):
+        if start is None:
+            hint += _keep_good(hub, simulation, status, good)
+        else:
+            hint += _keep_start(hub, simulation, status, good, start)
     error = ScriptError(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error
@@ -369,7 +374,7 @@ def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) ->
 
 def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
     """Tell whether the domain of a point, whose corners move, is folded over."""
-    s = simulation.stepped
+    s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return False
     return not np.isfinite(extent(s.basis, s.kin, record(s.grids, grid), tuple(place.tolist())))
@@ -401,7 +406,8 @@ def _write_last_good(hub: Hub) -> Path | None:
     """Write the present state to a file to go on from; a file of somebody else is left alone."""
     written: list[Path] = []
     path = restart_file.path_of(hub, Path(LAST_GOOD))
-    if hub.output.writes and (not path.exists() or restart_file.is_restart(path)):
+    may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
+    if hub.output.takes_part and may_be:
         with _as_warnings(hub):
             written.append(restart_file.write(hub, Path(LAST_GOOD), within=True))
             # The files of restart(...) would hold the same once more.
@@ -422,3 +428,6 @@ def _as_warnings(hub: Hub) -> Iterator[None]:
         yield
     except ScriptError as error:
         hub.warn(error.message, hint=error.hint, place=error.place)
+        if hub.settings.comm.size > 1:
+            hub.settings.comm.failed_within = True
+            raise OthersWait from None

@@ -39,7 +39,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
     if count <= FEW or (there := machine_memory(on_machine(hub))) is None:
         return
     check_scene(hub)
-    crew, share = hub.settings.crew, share_of_machine(hub)
+    comm, share = hub.settings.comm, share_of_machine(hub)
     need = share * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
     if need > there.free:
         # Scenes of before, which point to themselves, stay until someone looks.
@@ -49,7 +49,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         return
     place, beside = _largest(hub).place, ""
     if share < 1:
-        beside = f" for {crew.on_machine} of {crew.size} processes"
+        beside = f" for {comm.on_machine} of {comm.size} processes"
     message = (
         f"the scene has {plural(count, 'point')}, which take at least {in_words(need)} of memory"
         f"{beside}; this machine has "

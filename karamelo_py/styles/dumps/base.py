@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from karamelo_py.language.signature import OutputFile
+from karamelo_py.output.files import discarded, folder_of_discarded
 from karamelo_py.output.log import begins_anew
 from karamelo_py.output.rhythm import Every, Rhythmic
 from karamelo_py.scene.hub import Hub
@@ -49,11 +50,18 @@ class Dump(Rhythmic):
 
     def path(self) -> Path:
         """Name the file of the present state."""
-        return self.hub.folder / str(self.file).replace("*", str(self.hub.update.step), 1)
+        folder, file = folder_of_discarded(), self.file
+        folder, file = (self.hub.folder, file) if folder is None else (folder, file.name)
+        return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def write(self) -> None:
         """Write the present state."""
         raise NotImplementedError
+
+    def take_part(self) -> None:
+        """Do the same as the first of several processes, which alone keeps what is written."""
+        with discarded():
+            self.write()
 
     def finish(self) -> None:
         """Complete what is written; called at the end of each run, also of one that breaks off."""

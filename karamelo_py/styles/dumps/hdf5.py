@@ -39,6 +39,7 @@ class Hdf5Dump(TableDump):
     """
 
     remembers = ("_snapshots",)
+    to_first = True
     _snapshots = 0
 
     def write(self) -> None:

@@ -53,6 +53,7 @@ class LammpsDump(TableDump):
     # Of a file with all snapshots: where the next one goes, how much text there is up to there, and
     # the encoder's state.
     remembers = ("_end", "_length")
+    to_first = True
     _end = 0
     _length = 0
     _encoder: Encoder | None = None

@@ -1,6 +1,7 @@
 """dump pyplot: pictures of the points, drawn with Matplotlib."""
 
 import re
+from collections.abc import Iterator
 from typing import Annotated, Any, BinaryIO
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.columns import check_columns
+from karamelo_py.output.fields import Fields
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.snapshots import Snapshot
@@ -179,9 +181,17 @@ class PyPlot(Dump):
         """Take what a picture needs of all points, some of them after others."""
         label, domain, update = self._label(), self.hub.domain, self.hub.update
         names = dict.fromkeys(["id", "x", "y", "z", "volume", label])
-        pieces = [[piece.particle(name) for name in names] for piece in self.hub.fields.pieces()]
+        pieces = [[piece.particle(name) for name in names] for piece in self._pieces()]
         columns = dict(zip(names, map(np.concatenate, zip(*pieces, strict=True)), strict=True))
         return Snapshot(update.step, update.time, columns, domain.lo, domain.hi)
+
+    def _pieces(self) -> Iterator[Fields]:
+        return self.hub.fields.pieces(to_first=True)
+
+    def take_part(self) -> None:
+        """Give the first of several processes the own points."""
+        for _ in self._pieces():
+            pass
 
     def side(self, snapshot: Snapshot) -> float:
         """Measure the side length of a typical point."""

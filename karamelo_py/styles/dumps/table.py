@@ -38,10 +38,16 @@ class TableDump(Dump):
         Columns that are always 0.
     rows_are
         What a row is about.
+    to_first
+        Whether the first of several processes alone gets the tables, which all go through once.
+    counts_rows
+        Whether it asks for the extent before.
     """
 
     absent: Sequence[str] = ()
     rows_are = "points"
+    to_first = False
+    counts_rows = True
 
     def __init__(
         self,
@@ -79,6 +85,16 @@ class TableDump(Dump):
         """Give all rows in the order of their ids, in pieces whose columns fit into memory."""
         raise NotImplementedError
 
+    def take_part(self) -> None:
+        """Give the first of several processes the own rows, or do what it does."""
+        if not self.to_first:
+            super().take_part()
+            return
+        if self.counts_rows:
+            self.extent()
+        for _ in self.tables():
+            pass
+
     def table(self) -> TableRows:
         """Give all rows."""
         ids, types, columns = zip(*self.tables(), strict=True)
@@ -115,7 +131,7 @@ class OfPoints:
 
     def tables(self) -> Iterator[TableRows]:
         """Give number and solid of each point, and its columns."""
-        for fields in self.hub.fields.pieces():
+        for fields in self.hub.fields.pieces(to_first=self.to_first):
             ids, types = (fields.particle(name).astype(np.int64) for name in ("id", "type"))
             yield TableRows(ids, types, [fields.particle(name) for name in self.columns])
 
@@ -166,7 +182,7 @@ class OfNodes:
 
     def tables(self) -> Iterator[TableRows]:
         """Give number and grid of each node, and its columns."""
-        for nodes in self.hub.fields.node_pieces(self.columns):
+        for nodes in self.hub.fields.node_pieces(self.columns, to_first=self.to_first):
             rows = np.flatnonzero(nodes.node("mass") > 0) if self.occupied else slice(None)
             yield TableRows(
                 *(nodes.node(name)[rows] for name in ("id", "type")),

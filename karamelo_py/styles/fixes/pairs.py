@@ -69,7 +69,7 @@ class PairContact(Fix):
         simulation, total = self.hub.simulation, np.zeros(3)
         kin, corners = simulation.kin, self._where_both_are(simulation)
         if corners is not None:
-            blocks = simulation.stepped.blocks
+            blocks = simulation.setup.blocks
             rows = [self._picked(simulation, block, *corners) for block in blocks]
             own = [self._known(simulation, *one) for one in zip(blocks, rows, strict=True)]
             push = partial(self._push, kin, points.dt, points.kick)
@@ -90,7 +90,7 @@ class PairContact(Fix):
 
         Each solid is in a box, and reaches beyond it as far as two points touch.
         """
-        s, d = simulation.stepped, simulation.kin.dimension
+        s, d = simulation.setup, simulation.kin.dimension
         extents = np.full((2, 7), -np.inf)
         for block in s.blocks:
             x = block.points.x[simulation.now]

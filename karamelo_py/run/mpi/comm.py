@@ -1,4 +1,4 @@
-"""The processes that share a scene, and how they talk to each other (MPI, through mpi4py)."""
+"""The processes of MPI that share a scene, through mpi4py."""
 
 import os
 import signal
@@ -10,10 +10,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from math import inf
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.scene.comm import SerialComm
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import Quit, ScriptError
 
 INSTALL = "pip install 'karamelo-py[mpi]'"
 # What the launchers of MPI tell each process: how many there are, and which it is.
@@ -26,13 +29,13 @@ LAUNCHED = (
 # Ctrl-C; batch systems, kill; a terminal that is closed (which Windows does not tell).
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
-# Words at a meeting beside those of runs, which are above zero.
-WELL, FAILED = 0, -1
+# Words of processes beside those of runs, which are above zero.
+WELL, HERE, FAILED = 0, -1, -2
 PAUSE = 0.005  # seconds between two looks whether the others have come
 
 
 @contextmanager
-def heeding(handler: Callable[[int, Any], None]) -> Iterator[None]:
+def handled_signals(handler: Callable[[int, Any], None]) -> Iterator[None]:
     """Have signals that end programs call a handler, but for those that are ignored."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -50,15 +53,15 @@ def heeding(handler: Callable[[int, Any], None]) -> Iterator[None]:
 
 
 def launched() -> tuple[int, int]:
-    """How many processes a launcher of MPI has started, and which of them this is."""
+    """Read how many processes a launcher of MPI has started, and which of them this is."""
     for size, rank in LAUNCHED:
         if os.environ.get(size, "").isdigit():
             return int(os.environ[size]), int(os.environ.get(rank, 0))
     return 1, 0
 
 
-class Crew:
-    """All processes of a run, in the order of their ranks. The first leads.
+class MpiComm(SerialComm):
+    """All processes of a run, in the order of their ranks. The first writes.
 
     Parameters
     ----------
@@ -67,18 +70,8 @@ class Crew:
 
     Attributes
     ----------
-    beside
-        How many of them have the same cores as this one, itself among them.
-    on_machine
-        How many of them share the memory of its machine.
-    waited
-        Seconds in which this process waited for others, or for what they sent, in steps.
-    amid
-        Whether this process has failed in the midst of what all do together.
     parted
         Whether the processes do not go on together: one has failed, or has another script.
-    signal
-        What this process has been sent in a run, which all are to end with.
 
     Raises
     ------
@@ -86,11 +79,8 @@ class Crew:
         If mpi4py is not there, or finds no MPI.
     """
 
-    beside = on_machine = 1
-    waited = 0.0
-    signal = 0
-    amid = parted = False
-    _ends = None
+    parted = False
+    _ends: Callable[[BaseException], None] | None = None
 
     def __init__(self, ends: Callable[[BaseException], None] | None = None):
         self._ends = ends
@@ -106,25 +96,29 @@ class Crew:
         # Its messages may be longer than 2 GB.
         self.world = world = pkl5.Intracomm(MPI.COMM_WORLD)
         self.rank, self.size = world.Get_rank(), world.Get_size()
-        self._aside = world.Dup()  # where they meet, whatever is under way elsewhere
+        self._aside = world.Dup()  # where they agree, whatever is under way elsewhere
         self._between = world.Dup()  # for what is passed on in steps
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
         mine = socket.gethostname(), cores
-        self.beside = self.everyone(mine).count(mine)
+        self.beside = self.allgather(mine).count(mine)
         near = MPI.COMM_WORLD.Split_type(MPI.COMM_TYPE_SHARED)
         self.on_machine = near.Get_size()
         near.Free()
 
-    @property
-    def leads(self) -> bool:
-        """Whether this is the first."""
-        return self.rank == 0
+    def barrier(self) -> None:
+        """Wait for all processes.
 
-    def meet(self, word: int, patience: float = inf) -> np.ndarray | None:
-        """Wait for all to come to such a point; the word of each (size,).
-
-        The word of a run is above zero. None where somebody has not come in `patience` seconds.
+        Raises
+        ------
+        Quit
+            If one of them has failed, which tells of it.
         """
+        if (self.agree(HERE) == FAILED).any():
+            self.parted = True
+            raise Quit
+
+    def agree(self, word: int, patience: float = inf) -> np.ndarray | None:
+        """Gather a word of each process (size,), or None if one has not come in time."""
         own, found = np.array([word], np.int64), np.empty(self.size, np.int64)
         request = self._aside.Iallgather(own, found)
         end = time.monotonic() + patience
@@ -134,65 +128,64 @@ class Crew:
             time.sleep(PAUSE)
         return found
 
-    @contextmanager
-    def joint(self) -> Iterator[None]:
-        """What all do together: where one fails the others would wait for ever."""
-        try:
-            yield
-        except BaseException:
-            self.amid = True
-            raise
-
-    def told(self, thing: Any = None) -> Any:
-        """What the first says to all."""
+    def bcast(self, thing: Any = None) -> Any:
+        """Hand what the first process has to all."""
         return self.world.bcast(thing)
 
-    def gathered(self, thing: Any) -> list | None:
-        """What each has, for the first; None for the others."""
+    def gather(self, thing: Any) -> list | None:
+        """Gather what each process has at the first; None at the others."""
         return self.world.gather(thing)
 
-    def everyone(self, thing: Any) -> list:
-        """What each has, for all."""
+    def allgather(self, thing: Any) -> list:
+        """Gather what each process has at all of them."""
         return self.world.allgather(thing)
 
-    def lined_up(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
-        """Put the numbers of all, one after another, into `out` of the first."""
+    def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        """Put the numbers of all processes, one after another, into `out` of the first."""
         self.world.Gatherv(own, (out, counts) if self.leads else None)
 
-    def handed_out(self, things: Sequence | None) -> Any:
-        """The own one of the things that the first has for each."""
+    def scatter(self, things: Sequence | None) -> Any:
+        """Hand out what the first process has for each."""
         return self.world.scatter(things)
 
-    def traded(self, things: dict[int, Any]) -> dict[int, Any]:
-        """What some others have for this one, by rank, where it has `things` for the same."""
+    def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
+        """Swap things with some other processes, by rank; both sides name each other."""
         sent = [self.world.isend(thing, rank) for rank, thing in things.items()]
         found = {rank: self.world.recv(source=rank) for rank in things}
         for one in sent:
             one.wait()
         return found
 
-    def swapped(self, numbers: np.ndarray) -> np.ndarray:
-        """The number that each has for this one, where this one has `numbers` for each."""
+    def alltoall(self, numbers: np.ndarray) -> np.ndarray:
+        """Swap a number (size,) with each process."""
         out = np.empty_like(numbers)
         self.world.Alltoall(numbers, out)
         return out
 
-    def added(self, array: np.ndarray) -> np.ndarray:
-        """The sum of whole numbers over all: for such, order does not matter."""
+    def allreduce(self, array: np.ndarray) -> np.ndarray:
+        """Add up whole numbers over all processes: for such, order does not matter."""
         out, begun = np.empty_like(array), time.perf_counter()
         self.world.Allreduce(array, out)
         self.waited += time.perf_counter() - begun
         return out
 
-    def largest(self, array: np.ndarray) -> np.ndarray:
-        """Let each number be the largest of all."""
+    def allreduce_max(self, array: np.ndarray) -> np.ndarray:
+        """Take the largest of each number over all processes, in place."""
         begun = time.perf_counter()
         self.world.Allreduce(self.mpi.IN_PLACE, array, self.mpi.MAX)
         self.waited += time.perf_counter() - begun
         return array
 
-    def linked(self, given: list[tuple[int, Any]], taken: list[tuple[int, Any]]) -> Any:
-        """Ways on which arrays go to others (rank, array), again and again, and theirs come."""
+    def in_turn(self, act: Callable[[], None]) -> None:
+        """Let the first process act, and then all others: they find what it has made."""
+        if self.leads:
+            act()
+        self.barrier()
+        if not self.leads:
+            act()
+
+    def connect(self, given: list[tuple[int, Any]], taken: list[tuple[int, Any]]) -> Any:
+        """Make requests by which arrays go to others (rank, array), again and again, and come."""
         requests = [self._between.Recv_init(array, rank) for rank, array in taken]
         return requests + [self._between.Send_init(array, rank) for rank, array in given]
 
@@ -206,8 +199,8 @@ class Crew:
         self.mpi.Request.Waitall(link)
         self.waited += time.perf_counter() - begun
 
-    def unlink(self, link: Any) -> None:
-        """Give up ways."""
+    def disconnect(self, link: Any) -> None:
+        """Free requests."""
         for request in link:
             request.Free()
 
@@ -217,8 +210,36 @@ class Crew:
             self._ends(error)
             return
         traceback.print_exception(error)
-        self.abandon()
+        self.abort()
 
-    def abandon(self, status: int = 1) -> None:
+    def abort(self, status: int = 1) -> None:
         """End all processes at once."""
         self.world.Abort(status)
+
+
+def check_same_run(hub: Hub) -> None:
+    """See that all processes are about to do the same run.
+
+    Raises
+    ------
+    Quit
+        If another process tells what is wrong.
+    ScriptError
+        If the scripts are not the same.
+    """
+    comm = hub.settings.comm
+    if comm.size == 1:
+        return
+    present = [hub.place and (hub.place.file, hub.place.line), len(hub.runs)]
+    words = comm.agree(1 + crc32(repr((present, hub.interpreter.presets)).encode()))
+    if (words == words[0]).all():
+        return
+    comm.parted = True
+    # One that has failed tells of it.
+    if (words == FAILED).any() or comm.rank != int((words > 0).argmax()):
+        raise Quit
+    raise ScriptError(
+        "the processes do not come to the same run",
+        place=hub.place,
+        expected="the same script, files and variables for all of them",
+    )
