@@ -178,7 +178,9 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
-        if not name.startswith("tiling/"):  # of which the lay-out has put those first others wait for
+        if not name.startswith(
+            "tiling/"
+        ):  # of which the lay-out has put those first others wait for
             array[...] = _checked(state, name, array)
     for block in s.blocks:
         block.points.x[:] = block.points.x[s.control.clock[0].now]
