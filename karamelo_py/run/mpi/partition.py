@@ -344,7 +344,7 @@ class SharedTiles(Tiles):
         self.comm.finish(self._under_way)
 
     def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:
-        """Make room for what is packed of arrays of the buffers, and the requests that pass it on."""
+        """Make room for packed rows of the buffers, and the requests that pass them on."""
         packed, given, taken = [], [], []
         for array in arrays:
             for rank, rows in self.given.items():
