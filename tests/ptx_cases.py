@@ -17,7 +17,7 @@ from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.nodes import KeepLoss
 from karamelo_py.language import registry
-from karamelo_py.language.docstrings import sections
+from karamelo_py.language.help import sections_of
 
 REASON = "needs numba-cuda and NVIDIA's compiler libraries: pip install 'karamelo-py[gpu]'"
 pathfinder = pytest.importorskip("cuda.pathfinder", reason=REASON)
@@ -68,7 +68,7 @@ def warm(script: str, *numbers: float) -> str:
 
 def example_of(family: str, name: str) -> str:
     """The words of `method` in the manual of a style."""
-    text = sections(registry.find(family, name).__doc__)[1]["Example"]
+    text = sections_of(registry.find(family, name).__doc__)[1]["Example"]
     return re.search(r"^method\((.*)\)$", text, re.MULTILINE)[1]
 
 
@@ -140,7 +140,7 @@ def examples(family: str, ID: str) -> dict[str, str]:
     """Commands that make every style of a family, under one name."""
     found = {}
     for name in registry.names(family):
-        text = sections(registry.find(family, name).__doc__)[1]["Example"]
+        text = sections_of(registry.find(family, name).__doc__)[1]["Example"]
         lines = re.findall(rf"^{family}\(\w+(,.*)$", text, re.MULTILINE)
         assert lines, name
         for k, rest in enumerate(lines):

@@ -366,7 +366,7 @@ def _real(value: Any, like: Any) -> Any:
     return Known(_writer().constant(kind(value)), kind(value))
 
 
-def _choose(condition: Any, a: Any, b: Any) -> Any:
+def _where(condition: Any, a: Any, b: Any) -> Any:
     if not isinstance(condition, Known):
         return a if condition else b
     if isinstance(a, tuple):
@@ -400,7 +400,7 @@ def _isinstance(thing: Any, kind: Any) -> bool:
 
 INSTEAD = {
     compiling.real: _real,
-    compiling.choose: _choose,
+    compiling.where: _where,
     type: _type,
     isinstance: _isinstance,
 }

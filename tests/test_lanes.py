@@ -9,13 +9,13 @@ from numba.core.errors import TypingError
 
 from karamelo_py.compiler.compile import (
     accumulate,
+    all_lanes,
     beside,
-    choose,
     fma,
-    in_all,
     of_present,
     real,
     shared,
+    where,
 )
 from karamelo_py.compiler.fields import field, load, store
 from karamelo_py.compiler.lanes import EightLanes, FourLanes, group
@@ -93,9 +93,9 @@ def _numbers_alone(a, b, out, n):
 def _number(a, b, out, p):
     x, y = a[p], b[0, p]
     out[0, p] = fma(x, y, real(2, x)) / (x * x + real(1, x))
-    out[1, p] = choose(x > y, min(x, real(0.5, x)), max(x, y, -y)) - abs(y)
+    out[1, p] = where(x > y, min(x, real(0.5, x)), max(x, y, -y)) - abs(y)
     out[3, p] = sin(x) // real(0.3, x) + log1p(abs(y)) % real(0.25, y)
-    out[2, p] = real(int(x + real(3, x)), x) + real(in_all(x < real(9, x)), y)
+    out[2, p] = real(int(x + real(3, x)), x) + real(all_lanes(x < real(9, x)), y)
 
 
 @kernel
@@ -156,7 +156,7 @@ def _branches(a, out):
 
 
 def test_a_branch_says_what_to_write():
-    with pytest.raises(CannotCompile, match="take choose, in_all or in_any"):
+    with pytest.raises(CannotCompile, match="take where, all_lanes or any_lane"):
         _branches(np.ones(4), np.zeros((1, 4)))
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from karamelo_py.compiler.compile import choose
+from karamelo_py.compiler.compile import where
 from karamelo_py.compiler.symbols import Symbol, add_product, call, cofactor, determinant, written
 
 a, b, c = Symbol("a"), Symbol("b"), Symbol("c")
@@ -51,7 +51,7 @@ def test_what_occurs_twice_is_computed_once():
 
 
 def test_items_fields_and_choices():
-    parts = written("a, b", call(choose, a[1] > 0, a[0], b.real), "b")
+    parts = written("a, b", call(where, a[1] > 0, a[0], b.real), "b")
     assert parts((1.0, 2.0), 3.0) == 1.0
     assert parts((1.0, -2.0), 3.0) == 3.0
 

@@ -12,7 +12,7 @@ from numba.core import event
 from numba.core.caching import NullCache
 
 from karamelo_py.compiler import choices
-from karamelo_py.compiler.compile import choose, fma, point_function, real, shared
+from karamelo_py.compiler.compile import fma, point_function, real, shared, where
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.trace import CannotCompile
@@ -74,7 +74,7 @@ def extremes(a, b):
     """Functions of Python and of the library, of numbers."""
     least, most = min(a, b), max(abs(a), abs(b))
     whole = int(most) + 2 // 1
-    return least, most, whole, math.sqrt(most), choose(a > b, a, b), fma(a, b, real(1, a))
+    return least, most, whole, math.sqrt(most), where(a > b, a, b), fma(a, b, real(1, a))
 
 
 @shared

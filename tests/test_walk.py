@@ -9,7 +9,7 @@ from numba import config
 from numba.core import event
 from numba.core.caching import NullCache
 
-from karamelo_py.compiler.compile import looping, shared
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import kernel, subkernel
 from karamelo_py.compiler.trace import CannotCompile
@@ -196,11 +196,9 @@ def in_a_kernel(function):
     return call
 
 
-@pytest.mark.parametrize("mark", [shared, subkernel, looping])
+@pytest.mark.parametrize("mark", [shared, subkernel])
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
 def test_as_python_does(function, mark):
-    if mark is looping and function is long:
-        pytest.skip("an item of a tuple of several kinds cannot be asked for in a loop")
     expected = [function(n, x) for n in range(1, 12) for x in (1.75, -3.0)]
     made = in_a_kernel(mark(lambda_of(function)))
     assert [made(n, x) for n in range(1, 12) for x in (1.75, -3.0)] == expected

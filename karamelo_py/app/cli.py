@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import re
 import sys
 import traceback
@@ -23,7 +24,6 @@ from karamelo_py.app.options import (
     positive,
     threads_option,
 )
-from karamelo_py.app.starting import begun
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
 from karamelo_py.run.mpi.comm import MpiComm, launched
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
@@ -158,8 +158,15 @@ def _dispatch(arguments: list[str]) -> int:
     return options.act(options)
 
 
+def begun() -> None:
+    """Let Python look for cycles again, among what is new: the program itself stays to its end."""
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
+
+
 def _one_file(arguments: list[str]) -> list[str]:
-    """The last of the files behind -restart where a shell has put all that match a pattern.
+    """Take the last of the files behind -restart where a shell has put all that match a pattern.
 
     Raises
     ------
@@ -190,7 +197,7 @@ def _numbers(name: str) -> list[int]:
 
 
 def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError:
-    """The error for words that a command line has no use for."""
+    """Make the error for words that a command line has no use for."""
     option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
     if option == "--ranks":
         return ScriptError(
@@ -216,7 +223,7 @@ class CommandLine(argparse.ArgumentParser):
         super().__init__(**(usual | options))
 
     def options(self) -> list[str]:
-        """All words that begin an option."""
+        """List all words that begin an option."""
         return [word for action in self._actions for word in action.option_strings]
 
     def error(self, message: str) -> NoReturn:
@@ -231,7 +238,7 @@ class CommandLine(argparse.ArgumentParser):
 
 
 def _parser(command: str) -> tuple[CommandLine, Any]:
-    """The command line and its subparsers; what only `command` needs is there only for it."""
+    """Make the command line and its subparsers; what only `command` needs is there only for it."""
     parser = CommandLine(
         prog="karamelo-py",
         usage=USAGE,
@@ -349,7 +356,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
 
 
 def _tell_of_no_run(hub: Hub, script: str) -> None:
-    """A script of calculations needs no run; one that makes a scene may have forgotten it.
+    """Tell of a script without a run: one that makes a scene may have forgotten it.
 
     Raises
     ------

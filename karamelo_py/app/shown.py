@@ -35,7 +35,7 @@ class Columns(Mapping):
         return f"<columns {', '.join(self)}>"
 
     def to_pandas(self) -> Any:
-        """The columns as a DataFrame."""
+        """Give the columns as a DataFrame."""
         import pandas
 
         return pandas.DataFrame(dict(self))

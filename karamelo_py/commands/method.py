@@ -317,7 +317,7 @@ class _Call:
         return words
 
     def _unknown(self, argument: Argument, slots: list[tuple[str, Parameter]]) -> ScriptError:
-        """What is wrong with an option that nothing asks for."""
+        """Return the error for an option that nothing takes."""
         word = argument.word()
         if self._is_number(argument):
             asking = {p.name: self.names[f] for f, p in slots if not p.kind.words}

@@ -3,6 +3,7 @@
 import ctypes
 import inspect
 from collections.abc import Callable
+from typing import Any
 
 import numba
 from llvmlite import ir
@@ -60,7 +61,7 @@ def address_of_python(function: Callable, signature: numba.types.Type) -> int:
     return ctypes.cast(made, ctypes.c_void_p).value
 
 
-def caller_of(signature: numba.types.Type) -> Callable:
+def caller_of(signature: Any) -> Callable:
     """Make ``call(address, ...)``, which calls a function of this signature by its address."""
     result, parameters = signature.return_type, signature.args
 

@@ -21,14 +21,14 @@ SPELLED = "<spelled>"  # the file of functions that are written at compile time
 
 
 class Unknown(Exception):
-    """Something that a kernel depends on cannot be put into a hash."""
+    """Tell that something a kernel depends on cannot be put into a hash."""
 
 
 # --- implementations of point functions that are in a kernel -----------------------------------
 
 
 class Choice(NamedTuple):
-    """That a kernel asked a point function for these classes of tags, all by name."""
+    """Record that a kernel asked a point function for these classes of tags, all by name."""
 
     point_function: str
     classes: tuple[str, ...]
@@ -39,7 +39,7 @@ choosers: dict[Callable, list[Callable]] = {}  # of what kernels choose by type
 
 
 def name_of(thing: Any) -> str:
-    """``module:qualified name`` of a function or class."""
+    """Name a function or class as ``module:qualified name``."""
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
@@ -61,7 +61,7 @@ def note(parts: Iterable[tuple[Callable, tuple] | python.CodeType]) -> None:
 
 @contextmanager
 def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
-    """The set of what is noted meanwhile."""
+    """Collect what is noted meanwhile."""
     _noted.append(set())
     try:
         yield _noted[-1]
@@ -70,12 +70,12 @@ def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
 
 
 def tag_class(numba_type: Any) -> Any:
-    """The Python class that a Numba type stands for, as far as point functions select by it."""
+    """Find the class of a tag, by which point functions select, from its Numba type."""
     return getattr(numba_type, "instance_class", None)
 
 
 def found_by_name(name: str) -> Any:
-    """What `name_of` called so; Unknown if nothing is, or something else."""
+    """Find what `name_of` called so."""
     module, _, path = name.partition(":")
     try:
         return functools.reduce(getattr, path.split("."), sys.modules[module])
@@ -93,7 +93,7 @@ def class_name(tag: type | None) -> str:
 
 
 class Contents(NamedTuple):
-    """What is in compiled code: choices, and the Python functions that it was made of."""
+    """List what is in compiled code: choices, and the Python functions that it was made of."""
 
     choices: frozenset[Choice]
     codes: frozenset[python.CodeType]
@@ -104,14 +104,14 @@ _unfit: WeakKeyDictionary[Any, bool] = WeakKeyDictionary()
 
 
 class _Watch(event.Listener):
-    """Notes which implementation each piece of compiled code is."""
+    """Note what each piece of compiled code consists of."""
 
     def on_start(self, event: Any) -> None:
-        """What is chosen while it is compiled is noted."""
+        """Begin to note what is chosen."""
         _noted.append(set())
 
     def on_end(self, event: Any) -> None:
-        """A function was compiled, or failed to."""
+        """Keep what was noted of a function, if it was compiled."""
         noted = _noted.pop()
         dispatcher, arguments = event.data["dispatcher"], tuple(event.data["args"])
         compiled = dispatcher.overloads.get(arguments)
@@ -140,7 +140,7 @@ def _choice(part: tuple[Callable, tuple]) -> Choice:
 
 
 def contents(library: Any) -> Contents:
-    """What is in the code of a compiled function, and of all that it calls."""
+    """List what is in the code of a compiled function, and of all that it calls."""
     choices: set[Choice] = set()
     codes: set[python.CodeType] = set()
     ahead, seen = [library], set()

@@ -18,7 +18,7 @@ LONGEST = 1000  # range that is gone through
 
 
 class Lowering:
-    """Where code goes to: to a builder, or nowhere while only types are asked for.
+    """Write code with a builder, or none while only types are asked for.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Lowering:
         self.read: dict[tuple, Any] = {}
 
     def wrapped(self, kind: types.Type, value: Any) -> Any:
-        """What point functions see of a value."""
+        """Wrap a value as point functions see it."""
         if isinstance(kind, types.Literal):
             return kind.literal_value
         if isinstance(kind, types.NoneType):
@@ -69,7 +69,7 @@ class Lowering:
         return Value(kind, value)
 
     def kind_of(self, thing: Any) -> types.Type:
-        """The Numba type of what point functions see; whole numbers keep their value in it."""
+        """Find the Numba type of what point functions see; whole numbers keep their value in it."""
         if isinstance(thing, Value | HeldValue):
             return thing._kind
         if isinstance(thing, int):
@@ -87,7 +87,7 @@ class Lowering:
         return self.typing.resolve_value_type(thing)
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
-        """Code that gives what point functions see, in the type `wanted`."""
+        """Write code that gives what point functions see, in the type `wanted`."""
         kind = self.kind_of(thing)
         if isinstance(thing, Value | HeldValue):
             return self.context.cast(self.builder, thing._value, kind, wanted)
@@ -105,14 +105,14 @@ class Lowering:
         return self.context.get_dummy_value()
 
     def constant(self, array: np.ndarray) -> Value:
-        """An array that is part of the code."""
+        """Make an array part of the code."""
         kind = self.typing.resolve_value_type(array)
         return Value(
             kind, self.builder and self.context.get_constant_generic(self.builder, kind, array)
         )
 
     def call(self, function: Callable, arguments: tuple) -> Any:
-        """What `function` gives for these arguments."""
+        """Write a call of `function`."""
         self.operations += 1
         if self.operations > MOST_OPERATIONS:
             raise Untraceable(f"it has more than {MOST_OPERATIONS} operations: take a loop")
@@ -132,7 +132,7 @@ class Lowering:
         return self.wrapped(called.return_type, made(self.builder, values))
 
     def in_type_of(self, thing: Any, like: Any) -> Any:
-        """A whole number as a real one of the type of `like`."""
+        """Make a whole number a real one of the type of `like`."""
         if hasattr(thing._kind, "width"):
             return self.call(self.converted, (thing, like))
         kind = getattr(like._kind, "scalar", like._kind)
@@ -140,7 +140,7 @@ class Lowering:
         return Value(kind, value)
 
     def call_bound(self, method: Value, arguments: tuple) -> Any:
-        """What a method of a number or an array gives."""
+        """Write a call of a method of a number or an array."""
         if not isinstance(method._kind, types.BoundFunction):
             raise Untraceable(f"{words(method._kind)} cannot be called")
         kinds = tuple(map(self.kind_of, arguments))
@@ -152,7 +152,7 @@ class Lowering:
         return self.wrapped(called.return_type, made(self.builder, [method._value, *values]))
 
     def attribute(self, thing: Value, name: str) -> Any:
-        """An attribute of an array or a record."""
+        """Read an attribute of an array or a record."""
         kind = self.typing.resolve_getattr(thing._kind, name)
         if kind is None:
             raise AttributeError(f"{words(thing._kind)} has no attribute '{name}'")
@@ -172,7 +172,7 @@ class Lowering:
             write(self.builder, (thing._value, self.lowered(value, called.args[1])))
 
     def item(self, held: HeldValue, k: int) -> Any:
-        """An item of a held tuple."""
+        """Read an item of a held tuple."""
         key = id(held), k
         if key not in self.read:
             value = self.builder and item_of(self.context, self.builder, held._kind, held._value, k)
@@ -180,7 +180,7 @@ class Lowering:
         return self.read[key][0]
 
     def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
-        """A function of its own in the module that is written, which does what `run` does."""
+        """Write what `run` does as a function of its own in the module."""
         module = self.builder.module
         if name in module.globals:
             return module.globals[name]
@@ -229,7 +229,7 @@ class _Resolved:
         self.typed, self.called, self._made = typed, called, None
 
     def made(self, context: Any) -> Callable:
-        """What makes code of it; Numba looks for that in all its registries, often twice."""
+        """Find what makes code of it; Numba looks for that in all its registries, often twice."""
         if self._made is None:
             self._made = context.get_function(self.typed, self.called)
         return self._made
@@ -244,7 +244,7 @@ def numbers_of(kinds: tuple) -> tuple[int, ...]:
 
 
 def _resolved(typing: Any, function: Callable, kinds: tuple) -> _Resolved:
-    """What Numba knows of a function for arguments of these types, for the target of `typing`."""
+    """Look up what Numba knows of a function for arguments of these types."""
     key = typing, function, numbers_of(kinds)
     if key not in resolutions:
         typed = typing.resolve_value_type(function)
@@ -253,7 +253,7 @@ def _resolved(typing: Any, function: Callable, kinds: tuple) -> _Resolved:
 
 
 def _typed(typing: Any, typed: types.Type, kinds: tuple, name: str) -> Any:
-    """The signature of a function for arguments of these types."""
+    """Find the signature of a function for arguments of these types."""
     try:
         called = typing.resolve_function_type(typed, kinds, {})
     except TypingError as error:
@@ -266,5 +266,5 @@ def _typed(typing: Any, typed: types.Type, kinds: tuple, name: str) -> Any:
 
 
 def name_of(function: Callable) -> str:
-    """What a text calls a function."""
+    """Name a function in a text."""
     return getattr(function, "__name__", str(function))

@@ -12,7 +12,7 @@ _GENERATED = {*vars(namedtuple("_", ())), "__orig_bases__", "__annotations__", "
 
 @functools.cache
 def _functions_of(one: type) -> frozenset[str]:
-    """The names of what a class of tuples does with its numbers by functions of its own."""
+    """List the names of the functions that a class of tuples has of its own."""
     if not getattr(one, "_fields", ()) or getattr(one, "is_followed", False):
         return frozenset()
     own = {name: value for base in one.__mro__[:-2] for name, value in vars(base).items()}

@@ -6,7 +6,8 @@ first compilation. Where a kernel calls a function marked for it, it is run by P
 meets one is lowered at once, into the function that calls. Tuples are Python's own, so that what
 only takes them apart costs nothing. The bits are the same. A function that asks what only a run can
 know (`if x > 0`) is walked through instead, statement by statement
-(:mod:`~karamelo_py.compiler.walk`). What cannot be written so is refused: :class:`CannotCompile`.
+(:mod:`~karamelo_py.compiler.statements`). What cannot be written so is refused:
+:class:`CannotCompile`.
 
 Functions run here see their globals through :class:`~karamelo_py.compiler.values.Globals`: what
 other code chooses by type is lowered for the types at hand, Python's functions are run in the same
@@ -28,6 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 from numba.core.errors import NumbaError, TypingError
+from numba.core.extending import _Intrinsic
 from numba.core.imputils import impl_ret_borrowed, lower_builtin
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
@@ -36,6 +38,7 @@ from karamelo_py.compiler.choices import choosers, note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of, resolutions
 from karamelo_py.compiler.methods import refuse_methods
+from karamelo_py.compiler.statements import AstFunction, place_in_text
 from karamelo_py.compiler.values import (
     OF_REALS,
     OF_WHOLE,
@@ -49,15 +52,13 @@ from karamelo_py.compiler.values import (
     at_work,
     branching,
     counting,
-    derivatives,
     emit,
-    has_derivatives,
+    implemented,
     is_literal,
     now,
     words,
     writing,
 )
-from karamelo_py.compiler.walk import Walked, place_in_text
 
 # --- what cannot be compiled ------------------------------------------------------------------
 
@@ -72,7 +73,7 @@ class CannotCompile(TypeError):
 
 
 class Undefined(TypeError):
-    """A point function is not defined for classes that need it."""
+    """Tell that a point function is not defined for classes that need it."""
 
     def __init__(self, function: str, classes: tuple):
         names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
@@ -81,7 +82,7 @@ class Undefined(TypeError):
 
 
 def _reason(error: BaseException) -> str:
-    """What is wrong, in one line; of Numba, the cause that it gives."""
+    """Say what is wrong, in one line; of Numba, the cause that it gives."""
     if isinstance(error, Untraceable):
         return str(error)
     if not isinstance(error, NumbaError):
@@ -94,7 +95,7 @@ def _reason(error: BaseException) -> str:
 
 
 def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
-    """Files and lines that took part in an exception, the innermost first."""
+    """List the files and lines that took part in an exception, the innermost first."""
     if isinstance(error, CannotCompile):
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
@@ -110,24 +111,25 @@ _modules: dict[int, Globals] = {}
 _copies: dict[Any, Any] = {}
 
 
-class _Module:
-    """A module, whose functions are seen like globals."""
+class Module:
+    """Show the functions of a module like globals."""
 
-    def __init__(self, module: python.ModuleType):
-        self._module = module
+    def __init__(self, module: python.ModuleType, seen: Callable[[Any], Any]):
+        self._module, self._seen = module, seen
 
     def __getattr__(self, name: str) -> Any:
-        return _seen(getattr(self._module, name))
+        return self._seen(getattr(self._module, name))
 
 
 class _Dispatched(Emitted):
-    """A point function: what the classes of its tags choose."""
+    """Call what the classes of tags, or the types of numbers, choose."""
 
     def __call__(self, *arguments: Any) -> Any:
         if self.counts(arguments):
             return self.seen(*arguments)
-        if self.seen in derivatives and has_derivatives(arguments):
-            return now().seen(derivatives[self.seen])(*arguments)
+        made = implemented(self.seen, arguments)
+        if made is not None:
+            return _seen(made)(*arguments)
         if self.seen in OF_REALS:
             arguments = alike(arguments)
         lowering = now()
@@ -142,7 +144,7 @@ class _Dispatched(Emitted):
         return found.run(*arguments)
 
     def defined(self, *classes: type) -> bool:
-        """Whether a point function has an implementation for these classes."""
+        """Tell whether a point function has an implementation for these classes."""
         return self.seen.defined(*classes)
 
 
@@ -163,13 +165,13 @@ def _is_instance(thing: Any, kind: Any) -> bool:
 
 
 def _attribute(thing: Any, *name: Any) -> Any:
-    if isinstance(thing, _Module):
+    if isinstance(thing, Module):
         raise Untraceable("what is taken from a module has to be named: module.name")
     return getattr(thing, *name)
 
 
 _OF_NUMBERS = {*OF_WHOLE, float}
-_INSTEAD = {
+INSTEAD = {
     is_literal: is_literal,
     type: _class_of,
     isinstance: _is_instance,
@@ -197,11 +199,11 @@ _CONSTANT = (type(None), type(NotImplemented), bool, int, float, str, np.number,
 
 
 def _seen(thing: Any) -> Any:
-    """What takes the place of a global in functions that are run here."""
-    if isinstance(thing, (*_CONSTANT, Emitted, _Module)):
+    """Find what takes the place of a global in functions that are run here."""
+    if isinstance(thing, (*_CONSTANT, Emitted, Module)):
         return thing
     if isinstance(thing, python.ModuleType):
-        return _Module(thing)
+        return Module(thing, _seen)
     if isinstance(thing, tuple):
         inner = [_seen(item) for item in thing]
         return type(thing)(*inner) if hasattr(thing, "_fields") else tuple(inner)
@@ -214,7 +216,7 @@ def _seen(thing: Any) -> Any:
     if thing not in _copies:
         _copies[thing] = _copy(thing)
     made = _copies[thing]
-    if isinstance(made, Walked) or (
+    if isinstance(made, AstFunction) or (
         isinstance(made, python.FunctionType) and type(made.__globals__) is Globals
     ):
         note([made.__code__])
@@ -224,9 +226,9 @@ def _seen(thing: Any) -> Any:
 
 
 def _copy(thing: Any) -> Any:
-    """The same for what is called."""
-    if thing in _INSTEAD:
-        return _INSTEAD[thing]
+    """Make the same for what is called."""
+    if thing in INSTEAD:
+        return INSTEAD[thing]
     if thing in _SAFE:
         return thing
     if thing in choosers:
@@ -244,14 +246,14 @@ def _copy(thing: Any) -> Any:
 
 
 def _numba_knows(thing: Any) -> bool:
-    """Whether Numba has a version of its own; also before it compiled anything for processors."""
+    """Tell whether Numba has a version of its own; also before it compiled anything."""
     cpu_target.typing_context.refresh()
     return bool(cpu_target.typing_context._lookup_global(thing))
 
 
 @functools.cache
 def _fault_of(code: python.CodeType) -> str:
-    """Why a function is not run: where it catches what is raised here, or nothing follows it."""
+    """Say why a function is not run: it catches what is raised here, or nothing follows it."""
     if code.co_exceptiontable and not code.co_flags & inspect.CO_GENERATOR:
         return "kernels know no `try` and no `with`"
     if any(i.opname == "IMPORT_NAME" for i in dis.get_instructions(code)):
@@ -260,7 +262,7 @@ def _fault_of(code: python.CodeType) -> str:
 
 
 def _copied(function: Callable) -> Callable:
-    """The same function with other globals; walked through where it asks what only a run knows."""
+    """Copy a function with other globals; one that asks what only a run knows, from its text."""
     code = function.__code__
     if _fault_of(code):
         raise Untraceable(_fault_of(code))
@@ -270,15 +272,14 @@ def _copied(function: Callable) -> Callable:
     defaults = function.__defaults__ and tuple(map(_seen, function.__defaults__))
     made = python.FunctionType(code, seen, function.__name__, defaults, cells)
     made.__kwdefaults__ = {k: _seen(v) for k, v in (function.__kwdefaults__ or {}).items()}
-    rolled = code in _rolled
-    if not rolled and code not in branching:
+    if code not in branching:
         return made
     vars(made).update(vars(function))
-    return Walked(made, lambda: Flow(now()), rolled)
+    return AstFunction(made, lambda: Flow(now()))
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
-    """What a point function gives where one that nothing sees through calls it, as methods do."""
+    """Call a point function for one that nothing sees through, as methods do."""
     return _seen(dispatch)(*arguments)
 
 
@@ -286,7 +287,7 @@ def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
 
 
 class _Formula(NamedTuple):
-    """What is run for arguments of some types, the type of its result, what it consists of."""
+    """Keep what is run for arguments of some types, its type, and what it consists of."""
 
     run: Callable
     result: types.Type
@@ -300,11 +301,10 @@ MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with con
 _numbers = itertools.count()
 _begun: set[tuple] = set()  # of what is written now
 _own: set[Callable] = set()  # functions that are not written into what calls them
-_rolled: set[python.CodeType] = set()  # of functions with loops that are left to the compiler
 
 
 def _kinds_of(dispatch: Callable, kinds: Iterable[types.Type]) -> tuple[types.Type, ...]:
-    """The types of arguments: one function serves all numbers."""
+    """List the types of arguments: one function serves all numbers."""
     return tuple(map(types.unliteral, kinds) if dispatch in _own else kinds)
 
 
@@ -315,7 +315,7 @@ def _is_plain(thing: Any) -> bool:
 
 
 def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
-    """What :func:`_formula` gives, found by running it."""
+    """Find by a run what :func:`_formula` gives."""
     chosen = dispatch
     try:
         lowering = Lowering(_seen, typing)
@@ -323,8 +323,8 @@ def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
             chosen = _chosen(dispatch, kinds)
             if chosen is None:
                 return None
-            run = _copied(chosen)
-            note([run.__code__])
+            run = _seen(chosen) if isinstance(chosen, _Intrinsic) else _copied(chosen)
+            note([run.__code__] if hasattr(run, "__code__") else ())
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
             result = types.unliteral(lowering.kind_of(found))
         codes = {part for part in parts if isinstance(part, python.CodeType)}
@@ -340,7 +340,7 @@ def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
 
 
 def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
-    """What to run for arguments of these types; None if Numba has it."""
+    """Find what to run for arguments of these types; None if Numba has it."""
     key = typing, dispatch, numbers_of(kinds)
     if len(_formulas) > MOST_FORMULAS and not at_work():
         forget()
@@ -367,7 +367,21 @@ def forget() -> None:
     resolutions.clear()
 
 
+def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
+    """List the types of numbers among types, and in tuples, that implement functions."""
+    for kind in kinds:
+        one = tag_class(kind) or type(kind)
+        if hasattr(one, "implements"):
+            yield one
+        elif isinstance(kind, types.BaseTuple):
+            yield from _number_types(kind)
+
+
 def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
+    """Find what a function is for arguments of some types; None if Numba has it."""
+    for one in _number_types(kinds):
+        if dispatch in one.implements:
+            return one.implements[dispatch]
     for chooser in choosers[dispatch]:
         found = chooser(*kinds)
         if found is not None:
@@ -386,15 +400,14 @@ def alone(dispatch: Callable) -> None:
     _own.add(dispatch)
 
 
-def roll(function: Callable) -> None:
-    """Leave the loops in a function to the compiler, those over known ranges too."""
-    _rolled.add(function.__code__)
+def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> None:
+    """Let kernels run what `chooser` makes of `dispatch` for types; None if it has nothing.
 
-
-def traced(dispatch: Callable, chooser: Callable) -> None:
-    """Let kernels run what `chooser` makes of `dispatch` for types; None if it has nothing."""
+    It is asked before those that are known already, or as the `last`.
+    """
     if dispatch in choosers:
-        choosers[dispatch].append(chooser)
+        known = choosers[dispatch]
+        known.insert(len(known) if last else 0, chooser)
         return
     choosers[dispatch] = [chooser]
 
@@ -407,11 +420,11 @@ def traced(dispatch: Callable, chooser: Callable) -> None:
             return found and signature(found.result, *kinds)
 
         def get_impl_key(self, called: Any) -> Any:
-            return choosers[dispatch][0]
+            return Template
 
     infer_global(dispatch, types.Function(Template))
 
-    @lower_builtin(chooser, types.VarArg(types.Any))
+    @lower_builtin(Template, types.VarArg(types.Any))
     def lower(context: Any, builder: Any, called: Any, values: list) -> Any:
         lowering = Lowering(_seen, context.typing_context, context, builder)
         with writing(lowering):

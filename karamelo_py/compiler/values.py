@@ -24,7 +24,7 @@ class Untraceable(BaseException):
 
 
 class DataDependentBranch(Untraceable):
-    """The same, of a function that may be walked through (:mod:`karamelo_py.compiler.walk`)."""
+    """Say the same of a function that may be compiled from its text (`compiler/statements.py`)."""
 
 
 def words(kind: types.Type) -> str:
@@ -50,7 +50,7 @@ _WORDS = (
 
 
 class Globals(dict):
-    """The globals of a module, as functions that are run for kernels see them."""
+    """Show the globals of a module to functions that are run for kernels."""
 
     def __init__(self, true: dict, seen: Callable[[Any], Any]):
         super().__init__()
@@ -88,13 +88,13 @@ _lowerings: list = []  # at work, innermost last
 
 
 def now() -> Any:
-    """What writes down now (:mod:`karamelo_py.compiler.lowering`)."""
+    """Return what writes code now (:mod:`karamelo_py.compiler.lowering`)."""
     return _lowerings[-1]
 
 
 @contextmanager
 def writing(lowering: Any) -> Iterator[None]:
-    """Within this, operations become code of `lowering`."""
+    """Let operations become code of `lowering` meanwhile."""
     _lowerings.append(lowering)
     try:
         yield
@@ -103,19 +103,19 @@ def writing(lowering: Any) -> Iterator[None]:
 
 
 def at_work() -> bool:
-    """Whether functions are run for a kernel now."""
+    """Tell whether functions are run for a kernel now."""
     return bool(_lowerings)
 
 
 def _real_kind(thing: Any) -> Any:
-    """The number type of a real number or of lanes of these; None of all else."""
+    """Find the number type of a real number or of lanes of these; None of all else."""
     kind = thing._kind if isinstance(thing, Value) else None
     kind = getattr(kind, "scalar", kind)
     return kind if isinstance(kind, types.Float) else None
 
 
 def alike(arguments: tuple) -> tuple:
-    """Literals, and numbers of things, as numbers of the type of the real numbers beside them.
+    """Give literals, and whole numbers, the type of the real numbers beside them.
 
     A literal has no precision of its own: `2 * x` is single where x is.
     """
@@ -140,7 +140,7 @@ def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
 
 
 def emit(function: Callable, *arguments: Any) -> Any:
-    """What `function` gives for these arguments: code of Numba's, or of what was chosen by type."""
+    """Write a call: of code of Numba's, or of what was chosen by type."""
     return now().call(function, arguments)
 
 
@@ -148,7 +148,7 @@ def emit(function: Callable, *arguments: Any) -> Any:
 
 
 class Value:
-    """A number, lanes or an array of the function that is compiled."""
+    """Stand for a number, lanes or an array of the function that is compiled."""
 
     __slots__ = ("_kind", "_value")
     __array_ufunc__ = None  # NumPy's numbers leave operations to this
@@ -184,7 +184,7 @@ class Value:
 
 
 def _place(place: Any) -> Any:
-    """What stands in the brackets of an array."""
+    """Write what stands in the brackets of an array."""
     if isinstance(place, tuple):
         return tuple(map(_place, place))
     if isinstance(place, slice):
@@ -198,7 +198,7 @@ _BITS = ("and_", "or_", "xor", "lshift", "rshift")
 
 
 def _operated(operation: Callable, a: Any, b: Any) -> Any:
-    """What an operator gives; of tensors and the like, what these make of it."""
+    """Write an operation; of tensors and the like, leave it to these."""
     if isinstance(a if isinstance(b, Value) else b, tuple):
         return NotImplemented
     if operation is operator.pow and type(b) is int and 1 < b <= 4 and _real_kind(a):
@@ -236,7 +236,7 @@ _operators()
 
 
 class HeldValue:
-    """A held tuple: its items are read when they are asked for, once on each way."""
+    """Stand for a held tuple: its items are read when they are asked for, once on each way."""
 
     __slots__ = ("_kind", "_value")
 
@@ -269,22 +269,24 @@ class HeldValue:
     __add__ = __radd__ = __eq__
 
 
-derivatives: dict = {}  # of functions, for numbers with derivatives (`karamelo_py.points.dual`)
-
-
-def has_derivatives(arguments: tuple) -> bool:
-    """Whether one of the arguments is such a number."""
-    kind = derivatives.get("class")
-    return kind is not None and any(isinstance(a, kind) for a in arguments)
+def implemented(function: Callable, arguments: tuple) -> Callable | None:
+    """Find what a function is for a type of numbers that are tuples, if there is one among them."""
+    for a in arguments:
+        if isinstance(a, tuple):
+            table = getattr(type(a), "implements", None)
+            made = implemented(function, a) if table is None else table.get(function)
+            if made is not None:
+                return made
+    return None
 
 
 def is_literal(thing: Any) -> bool:
-    """Whether a number stands in the text, so that it is known."""
+    """Tell whether a number stands in the text, so that it is known."""
     return type(thing) in (int, float)
 
 
 class Emitted:
-    """A function that compiled code has a version of its own of."""
+    """Call a function that compiled code has a version of its own of."""
 
     def __init__(self, function: Callable):
         self.seen = function
@@ -292,8 +294,9 @@ class Emitted:
     def __call__(self, *arguments: Any) -> Any:
         if self.counts(arguments):
             return self.seen(*arguments)
-        if self.seen in derivatives and has_derivatives(arguments):
-            return now().seen(derivatives[self.seen])(*arguments)
+        made = implemented(self.seen, arguments)
+        if made is not None:
+            return now().seen(made)(*arguments)
         if self.seen in OF_REALS:
             if all(type(a) in (int, float) for a in arguments):
                 return self.seen(*arguments)  # known already
@@ -301,7 +304,7 @@ class Emitted:
         return emit(self.seen, *arguments)
 
     def counts(self, arguments: tuple) -> bool:
-        """Whether it is about whole numbers that are known, as lengths of loops are."""
+        """Tell whether all arguments are whole numbers that are known, as lengths of loops are."""
         return self.seen in OF_WHOLE and all(isinstance(a, int) for a in arguments)
 
 
@@ -314,7 +317,7 @@ LONG = 8  # range that is gone through where it need not be
 
 
 def counting(*bounds: int) -> range:
-    """`range`, in functions that are run."""
+    """Count as `range` does, in functions that are run."""
     frame = sys._getframe(1)
     if any(isinstance(bound, Value) for bound in bounds):
         _branch(frame, "the end of a range")

@@ -1,4 +1,4 @@
-"""What points give to nodes as N_I times an affine field: mass, momentum, and the force of MLS.
+"""Scatter and gather of quantities that are affine around a point: mass, momentum, force of MLS.
 
 In lanes such a quantity is brought into the order of the nodes' records once a point, not once a
 node: half of the work of a scatter, in space two thirds.
@@ -10,11 +10,11 @@ from karamelo_py.compiler.lanes import EightLanes, FourLanes
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.tuples import add, add_scaled, nested_as, scale
 from karamelo_py.kernels import p2g
-from karamelo_py.kernels.arrays import MASS, of_force
+from karamelo_py.kernels.arrays import MASS, Tag, of_force
 from karamelo_py.kernels.averaging import NodalStress
 from karamelo_py.kernels.g2p import Move, update_at, zero_vector
 from karamelo_py.kernels.loss import EnergyLoss
-from karamelo_py.kernels.visit import for_tags
+from karamelo_py.kernels.visit import Work, for_tags
 from karamelo_py.points.basis import entry, reach, support
 from karamelo_py.points.basis.product import inverse_spread, spacing
 from karamelo_py.points.frames import force_columns
@@ -33,7 +33,7 @@ def affine_part(quantity, w, stencil, load):
 
 @shared
 def _lacks(w, kinds):
-    """Whether the nodes have none of these fields."""
+    """Return True if the nodes have none of these fields."""
     return not any(field(w.nodes.fields, kind) is not None for kind in kinds)
 
 
@@ -131,8 +131,8 @@ def gathered_by_arms(w):
 
 
 @point_function(otherwise=True)
-def gathered_at_once(task, w, stencil, total):
-    """What a gather sums up over all nodes of a stencil; () where that goes node by node."""
+def gathered_at_once(task: Tag, w: Work, stencil: tuple, total: tuple) -> tuple:
+    """Return the total of a gather over all nodes of a stencil; () where that goes node by node."""
     return ()
 
 

@@ -33,7 +33,7 @@ from karamelo_py.kernels.heat import (
     Warming,
 )
 from karamelo_py.kernels.hook_loop import (
-    Warmth,
+    HeatedPoints,
     clear_totals,
     node_hooks,
     point_hooks,
@@ -69,7 +69,7 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
 def _supply_blocks(block, s, hooks):
     points = block.points
     fields = points.fields
-    warmth = Warmth(
+    warmth = HeatedPoints(
         points.id,
         s.kin,
         field(fields, Capacity),

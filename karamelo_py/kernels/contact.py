@@ -126,7 +126,7 @@ class Touched(NamedTuple):
 
 @point_function()
 def _belongs(which, contact, d, nodes, n, m, b):
-    """Whether the bodies at `n` and `m`, the latter of field `b`, are such a pair."""
+    """Return True if the bodies at `n` and `m`, the latter of field `b`, are such a pair."""
 
 
 @_belongs.on(Approaching)
@@ -331,7 +331,7 @@ def stay_node(contact, kin, nodes, step, n):
 
 @entered
 def _stay_nodes(contact, kin, nodes, spans, step):
-    """Where contact acted in `step`, keep the velocity that deforms from opening or closing it.
+    """Keep the velocity that deforms from opening or closing contact that acted in `step`.
 
     Where that velocity is mapped apart from v*, the surfaces would seem to move in it although they
     are pressed together, and stress would do work on nothing: a collision of bars then quadruples

@@ -7,12 +7,13 @@ through.
 from math import inf, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, fma, in_all, point_function, real, shared
+from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, shared, where
 from karamelo_py.compiler.fields import field, increase, load_vector, store, store_from
 from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
 from karamelo_py.kernels import averaging, visit
-from karamelo_py.kernels.arrays import of_change
+from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
+from karamelo_py.kernels.visit import Work
 from karamelo_py.points import frames, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi.corners import AtCorners
@@ -40,6 +41,7 @@ class Move(NamedTuple):
     """Gather v* and its change; settle velocity and new position."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "g2p, move"
     reads = ("x", "v")
     writes = ("x moved", "v", "moment", "bounces")
@@ -49,6 +51,7 @@ class Strain(NamedTuple):
     """Gather the gradient of the nodal velocity; settle the state of the law."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "stress"
     reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
     writes = ("state", "deformation gradient")
@@ -58,6 +61,7 @@ class StrainOfLastStep(NamedTuple):
     """The same by the velocity that has led here, at the places that it has led to."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -67,6 +71,7 @@ class SecondStrain(NamedTuple):
     """The same for the second of two strain increments of a step."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "second half of the stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -76,6 +81,7 @@ class StrainInMove(NamedTuple):
     """`Strain` in one visit with `Move`, behind it: what v* gave already is not gathered again."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -89,6 +95,7 @@ class TrialStrain(NamedTuple):
     """Gather the gradient; settle only by what factor it would change the volume (F-bar)."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "trial volume"
     reads = Strain.reads
     writes = ("volume ratio",)
@@ -98,6 +105,7 @@ class TrialStrainOfLastStep(NamedTuple):
     """The same of `StrainOfLastStep`."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "trial volume"
     reads = Strain.reads
     writes = TrialStrain.writes
@@ -107,6 +115,7 @@ class SetMeanStress(NamedTuple):
     """Gather the averaged mean stress of F-bar."""
 
     in_lanes = True
+    not_at_corners = ()
     says = "averaged mean stress"
     reads = ("x",)
     writes = ("averaged stress",)
@@ -118,6 +127,7 @@ class SeriesTerm(NamedTuple):
     k: int
 
     in_lanes = True
+    not_at_corners = ()
     says = "term of the series to the points"
     reads = ("x",)
     writes = ("term of series",)
@@ -127,8 +137,8 @@ class SeriesTerm(NamedTuple):
 
 
 @point_function()
-def empty(task, w, x):
-    """What a gather sums up, before the first node."""
+def empty(task: Tag, w: Work, x: tuple) -> tuple:
+    """Return the totals of a gather before the first node: zeros."""
 
 
 @empty.on(Move)
@@ -178,7 +188,7 @@ def _records_of_strain_of_last_step(task, nodes):
 
 
 @point_function()
-def gathered(task, w, stencil, k, total):
+def gathered(task: Tag, w: Work, stencil: tuple, k: int, total: tuple) -> tuple:
     """`total` with the part of the k-th node of the stencil."""
 
 
@@ -199,8 +209,8 @@ def _gathered_move(task, w, stencil, k, total):
 
 
 @shared
-def moves_corners(basis, kin):
-    """Whether what is gathered is corners of domains that go with the velocity there."""
+def moves_corners(basis: Tag, kin: Tag) -> bool:
+    """Return True for a gather at corners of domains that move with the velocity there."""
     return isinstance(basis, AtCorners) and carried(basis.basis, kin) > 0
 
 
@@ -211,7 +221,7 @@ def zero_vector(kin, like):
 
 
 @shared
-def update_at(kin, nodes, i, like):
+def update_at(kin: Tag, nodes: Nodes, i: Index, like: Number) -> tuple:
     """v* and v* - v of a node: one record in the plane, two in space."""
     if kin.dimension == 2:
         both = row(nodes.update, i, 0, like + like)
@@ -266,7 +276,16 @@ def _gathered_series_term(task, w, stencil, k, total):
 
 
 @point_function()
-def settled(task, w, stencil, p, dt, total, totals, fastest):
+def settled(
+    task: Tag,
+    w: Work,
+    stencil: tuple,
+    p: Index,
+    dt: Number,
+    total: tuple,
+    totals: tuple,
+    fastest: Number,
+) -> tuple:
     """Store what follows from `total`; return how far the point moved in cells, and its rate.
 
     The rate, c + max |v_i - common_i|, bounds the stable step; what is returned is the larger of it
@@ -378,7 +397,7 @@ def _move(w, stencil, p, dt, total):
             new = carry(w.basis, w.kin, new, before, corner, scale(dt, u))
         store(w.places.y, p, new)
         moved += further_reach(w.basis, w.kin, w.grid, before, new)
-    return choose(inside(w.grid, w.kin, y), moved, real(inf, moved))
+    return where(inside(w.grid, w.kin, y), moved, real(inf, moved))
 
 
 @shared
@@ -403,17 +422,17 @@ def _strain(w, x, p, dt, dl, ratio, fastest):
         after = deformed(w.basis, w.kin, before, increment)
         store_from(w.places.y, p, dimension(w.kin), after)
         grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
-    if not in_all(j > 0):
-        return choose(j > 0, grown, real(inf, j)), fastest
+    if not all_lanes(j > 0):
+        return where(j > 0, grown, real(inf, j)), fastest
     # The speed of waves is only asked of the few points that may be faster than all before them.
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
     most = wave_speed_bound(law, w.kin, state) * shorter
     speed = largest_component(w.kin, subtract(load_vector(w.kin, w.points.v, p), w.common))
     slack = fastest - speed
-    if in_all((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
         return grown, fastest
     rate = sqrt(wave_speed_squared(law, w.kin, state) * shorter) + speed
-    return grown, choose(fastest > rate, fastest, rate)
+    return grown, where(fastest > rate, fastest, rate)
 
 
 @shared

@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import (
     accumulate,
-    choose,
     fma,
     of_present,
     real,
     round_off,
     shared,
+    where,
 )
 from karamelo_py.compiler.fields import Field, StepField, field, load, load_vector, store, vector
 from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
@@ -254,10 +254,10 @@ def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
     T = field(fields, Temperature)[0, p]
     capacity = field(fields, Capacity)[0, p]
     some = capacity > 0
-    rate = field(fields, Conductance)[0, p] / choose(some, capacity, real(1, capacity))
+    rate = field(fields, Conductance)[0, p] / where(some, capacity, real(1, capacity))
     hidden = real(4 * dimension(w.kin), dt) * (rate * w.grid.inv_h * w.grid.inv_h) * dt
     change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
-    T = choose(some, fma(field(fields, TemperatureShare)[0, p], change, T), T)
+    T = where(some, fma(field(fields, TemperatureShare)[0, p], change, T), T)
     store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
     # By what factor conduction has become faster than in the undeformed body.
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)

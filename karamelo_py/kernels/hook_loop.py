@@ -1,8 +1,8 @@
 """The loop of compiled hooks of fixes over the members of their groups, at nodes and at points.
 
-What hooks act on is a tuple (`AtNodes`, `Motion`, `Warmth`), whose class says how the next members
-are chosen and what is done with a block of them. The functions of the hooks are described in
-`karamelo_py.kernels.hooks`.
+What hooks act on is a tuple (`HookedNodes`, `MovingPoints`, `HeatedPoints`), whose class says how
+the next members are chosen and what is done with a block of them. The functions of the hooks are
+described in `karamelo_py.kernels.hooks`.
 """
 
 from typing import NamedTuple
@@ -29,7 +29,8 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import dimension, planar
 
-NONE = np.int64(0)  # a bare 0 would be a type of its own
+# Bare numbers would be types of their own.
+NONE, VALUE, BEFORE = np.int64(0), np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
 END = np.iinfo(np.int64).max  # behind the last of the members
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # what is done with the members of a hook
@@ -41,8 +42,8 @@ _call_point_function = caller_of(kinds.POINT_FUNCTION)
 _call_heat_function = caller_of(kinds.HEAT_FUNCTION)
 
 
-class AtNodes(NamedTuple):
-    """What node functions change, those of heat too.
+class HookedNodes(NamedTuple):
+    """Nodes that node functions change, those of heat too.
 
     `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
     """
@@ -55,8 +56,8 @@ class AtNodes(NamedTuple):
     kept: float
 
 
-class Motion(NamedTuple):
-    """What point functions change: velocity, and the places y that follow from x.
+class MovingPoints(NamedTuple):
+    """Points whose velocity point functions change, and the places y that follow from x.
 
     Behind the d coordinates of a point, `y` has those of `corners` corners of its domain.
     """
@@ -69,8 +70,8 @@ class Motion(NamedTuple):
     corners: int
 
 
-class Warmth(NamedTuple):
-    """What heat functions change: the heat that points get."""
+class HeatedPoints(NamedTuple):
+    """Points that get heat, which heat functions change."""
 
     ids: np.ndarray
     kin: NamedTuple
@@ -87,22 +88,22 @@ class Warmth(NamedTuple):
 
 @point_function()
 def turns(what, k, parts):
-    """Where the turns of thread `k` of so many begin, end, and how far it is to the next."""
+    """Return where the turns of thread `k` of so many begin and end, and the step between them."""
 
 
 @point_function()
 def bounds(what, turn, parts):
-    """From where to before where members are chosen in a turn."""
+    """Return from where to before where members are chosen in a turn."""
 
 
 @point_function()
 def choose(what, hooks, h, place, end, member):
-    """Choose the next members, up to a block: how many, and where to go on."""
+    """Choose the next members, up to a block; return how many, and where to go on."""
 
 
 @point_function()
 def act(what, task, hooks, control, dt, h, count, share):
-    """Do `task` with the chosen members, add to the totals; the number of those that count."""
+    """Do `task` with the chosen members, add to the totals; return how many count."""
 
 
 @subkernel
@@ -123,7 +124,7 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
 
 @subkernel
 def _act_apart(what, task, hooks, control, dt, h, share, k):
-    """The part of thread `k`, with a scratch and totals of its own: totals do not round."""
+    """Act in the part of thread `k`, with a scratch and totals of its own: totals do not round."""
     own = record(hooks.apart, k)
     for i in range(control.values.size):
         own.values[i] = control.values[i]
@@ -145,7 +146,7 @@ def _act_apart(what, task, hooks, control, dt, h, share, k):
 
 @shared
 def _with_items_of(values, others):
-    """A NamedTuple with the items of another in the place of those with their names."""
+    """Put the items of another NamedTuple in the place of those with their names."""
     new = dict(zip(others._fields, others, strict=True))
     items = zip(values._fields, values, strict=True)
     return type(values)(*(new.get(name, item) for name, item in items))
@@ -171,10 +172,8 @@ def _act_on_all_threaded(mode, what, task, hooks, control, dt, h, share):
     clock = control.clock[0]
     for k in range(parts):
         own = hooks.apart.clock[k, 0]
-        clock.set_low, clock.set_high = (
-            min(clock.set_low, own.set_low),
-            max(clock.set_high, own.set_high),
-        )
+        clock.set_low = min(clock.set_low, own.set_low)
+        clock.set_high = max(clock.set_high, own.set_high)
         clock.rise, clock.fall = max(clock.rise, own.rise), min(clock.fall, own.fall)
         clock.coldest = min(clock.coldest, own.coldest)
         clock.hottest = max(clock.hottest, own.hottest)
@@ -185,13 +184,13 @@ def _act_on_all_threaded(mode, what, task, hooks, control, dt, h, share):
 
 @shared
 def directions(hooks):
-    """How many there are: a number that is read, so that no loop over them is unrolled."""
+    """Read their number: so that no loop over them is unrolled."""
     return hooks.x0.shape[1]
 
 
 @subkernel
 def evaluate(hooks, h, component, count, control, result, shift):
-    """Formula of one component over the chosen members, at the present time plus `shift`.
+    """Evaluate the formula of a component for the chosen members, at the present time plus `shift`.
 
     The results go to the row `result` of the scratch. A formula without code is a number.
     """
@@ -204,24 +203,25 @@ def evaluate(hooks, h, component, count, control, result, shift):
     time = control.values[arrays.TIME]
     control.values[arrays.TIME] = time + shift
     call_evaluate(
-        hooks.evaluate,
-        hooks.code,
-        hooks.constants,
-        control.values,
-        hooks.scratch,
-        program.begin,
-        program.end,
-        program.first,
-        program.last,
-        count,
-        result,
-    )
+        hooks.evaluate, hooks.code, hooks.constants, control.values, hooks.scratch,
+        program.begin, program.end, program.first, program.last, count, result,
+    )  # fmt: skip
     control.values[arrays.TIME] = time
 
 
 @subkernel
+def _evaluate_now_and_before(hooks, h, c, count, control):
+    """Evaluate the formula of direction `c`, and that of one step earlier where it is used."""
+    evaluate(hooks, h, c, count, control, VALUE, 0.0)
+    if hooks.table[h].uses_before:
+        # Nothing was before time 0.
+        step_back = min(control.clock[0].last_dt, control.values[arrays.TIME])
+        evaluate(hooks, h, c, count, control, BEFORE, -step_back)
+
+
+@subkernel
 def _published(hooks, h):
-    """The first of the totals of a hook, and how many it publishes."""
+    """Return the first of the totals of a hook, and how many it publishes."""
     slot = hooks.table[h].slot
     rubs = hooks.programs[h, FRICTION].begin >= 0
     first, last = 3, -1
@@ -233,7 +233,7 @@ def _published(hooks, h):
 
 @subkernel
 def _clear_total(hooks, h, control):
-    """The totals of a hook start from zero."""
+    """Let the totals of a hook start from zero."""
     first, count = _published(hooks, h)
     for row in range(first, first + count):
         control.totals[row] = 0
@@ -251,20 +251,20 @@ def _publish_total(hooks, h, control):
 # --- nodes ------------------------------------------------------------------------------------
 
 
-@turns.on(AtNodes)
+@turns.on(HookedNodes)
 def _turns_of_nodes(what, k, parts):
     shares = what.ranges[0, 0]
     return shares * k // parts, shares * (k + 1) // parts, NONE + 1
 
 
-@bounds.on(AtNodes)
+@bounds.on(HookedNodes)
 def _bounds_of_nodes(what, turn, parts):
     return what.ranges[turn, 0], what.ranges[turn, 1]
 
 
-@choose.on(AtNodes)
+@choose.on(HookedNodes)
 def _choose_nodes(what, hooks, h, row, end, member):
-    """Those in use, with mass. Members ascend as rows do: a wall may have more than are in use."""
+    """Take those in use, with mass. Members ascend as rows do: a wall may have more than in use."""
     ranges, sums = what.ranges, what.nodes.sums
     of_all = what.target == LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
@@ -291,11 +291,11 @@ def _choose_nodes(what, hooks, h, row, end, member):
 
 @subkernel
 def _node(hooks, h, m):
-    """The number of a member of the group."""
+    """Return the number of a member of the group."""
     return hooks.members[m] if m < hooks.table[h].end else END
 
 
-@act.on(AtNodes)
+@act.on(HookedNodes)
 def _act_at_nodes(what, task, hooks, control, dt, h, count, share):
     if task == COUNT:
         found = 0
@@ -316,7 +316,7 @@ def _act_at_nodes(what, task, hooks, control, dt, h, count, share):
 
 @subkernel
 def _locate_nodes(grids, hooks, count):
-    """Positions of the chosen nodes."""
+    """Find the positions of the chosen nodes."""
     where = hooks.scratch
     for q in range(count):
         n = hooks.chosen[q]
@@ -331,7 +331,7 @@ def _locate_nodes(grids, hooks, count):
 
 @subkernel
 def _clear_held(what, held):
-    """Nobody holds a node yet."""
+    """Forget who has held nodes."""
     kin, ranges = what.kin, what.ranges
     if held.size > 0:
         for r in range(ranges[0, 0], ranges[ranges[0, 0] - 1, 1]):
@@ -342,7 +342,7 @@ def _clear_held(what, held):
 
 @subkernel
 def _take_over(hooks, control, h, n, c, force):
-    """Hook `h` holds node `n` by `force`: what those had of it that held it before."""
+    """Let hook `h` hold node `n` by `force`; return what those had of it that held it before."""
     before = 0.0
     if hooks.held.size > 0 and hooks.table[h].holds:
         held = hooks.held[n, c]
@@ -359,22 +359,17 @@ def _take_over(hooks, control, h, n, c, force):
 def _change_nodes(what, hooks, control, dt, h, count, share):
     """Act on the chosen nodes; add to the totals, and to the work that is done."""
     target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
-    step_back = min(
-        control.clock[0].last_dt, control.values[arrays.TIME]
-    )  # nothing was before time 0
     slot = hooks.table[h].slot
     stage = hooks.table[h].stage
     remaps = target == arrays.ON_VELOCITY and stage == arrays.POST_VELOCITIES_TO_GRID
     # What is strained by before the forces belongs to the last step, and to what held it then.
     strains_first = target == arrays.ON_VELOCITY and stage == arrays.POST_UPDATE_GRID_STATE
     strains_first = strains_first and hooks.table[h].holds > 0
-    given = arrays.BEFORE if strains_first and hooks.table[h].uses_before else arrays.VALUE
+    given = BEFORE if strains_first and hooks.table[h].uses_before else VALUE
     for c in range(directions(hooks)):
         if hooks.programs[h, c].begin < 0:
             continue
-        evaluate(hooks, h, c, count, control, np.int64(arrays.VALUE), 0.0)
-        if hooks.table[h].uses_before:
-            evaluate(hooks, h, c, count, control, np.int64(arrays.BEFORE), -step_back)
+        _evaluate_now_and_before(hooks, h, c, count, control)
         for q in range(count):
             n = hooks.chosen[q]
             work = before = 0.0
@@ -394,23 +389,16 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
             old, old_star = v, star
             old_force = nodes.sums[n, arrays.of_force(kin) + c]
             v, star, force, total = _call_node_function(
-                hooks.table[h].address,
-                mass,
-                v,
-                star,
-                old_force,
-                hooks.scratch[given, q],
-                hooks.scratch[arrays.BEFORE, q],
-                dt,
-                share,
-            )
+                hooks.table[h].address, mass, v, star, old_force,
+                hooks.scratch[given, q], hooks.scratch[BEFORE, q], dt, share,
+            )  # fmt: skip
             if target == arrays.ON_UPDATE:
                 # Points that keep their velocity take the change v* - v: another v is an impulse.
                 total += kept * mass * (old - v) / dt
-                if star == hooks.scratch[arrays.VALUE, q]:
+                if star == hooks.scratch[VALUE, q]:
                     before = _take_over(hooks, control, h, n, c, total)
             if target == arrays.ON_SUMS:
-                hooks.loads[n, c] += force - old_force  # see _work_of_loads
+                hooks.loads[n, c] += force - old_force  # see _work_at_nodes
                 nodes.sums[n, arrays.of_force(kin) + c] = force
             elif target == arrays.ON_UPDATE:
                 # Impulse times the mean of the velocities before and after it.
@@ -423,31 +411,30 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
                 nodes.velocity[n, c] = star if strains_first else v
             # Formulas have been taken: their rows hold what is to be added up.
             own = totals.counts(control.ranks, n)
-            hooks.scratch[arrays.VALUE, q] = total if own else 0.0
-            hooks.scratch[arrays.BEFORE, q] = work if own else 0.0
+            hooks.scratch[VALUE, q] = total if own else 0.0
+            hooks.scratch[BEFORE, q] = work if own else 0.0
             if own and before != 0:
                 totals.add_to(control.totals, slot + c, before)
-        totals.add_many(control.totals, totals.WORK, hooks.scratch[arrays.BEFORE], count)
+        totals.add_many(control.totals, totals.WORK, hooks.scratch[BEFORE], count)
         if slot >= 0:
-            totals.add_many(control.totals, slot + c, hooks.scratch[arrays.VALUE], count)
+            totals.add_many(control.totals, slot + c, hooks.scratch[VALUE], count)
 
 
 @subkernel
 def _rub_at_nodes(what, hooks, control, dt, h, count):
-    """Friction of the chosen nodes along their wall."""
+    """Rub the chosen nodes along their wall."""
     target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
     programs = hooks.programs[h]
     if target == arrays.ON_VELOCITY:
-        if (
-            hooks.table[h].stage == arrays.POST_VELOCITIES_TO_GRID
-        ):  # else v* is that of the step before
+        # Else v* is that of the step before.
+        if hooks.table[h].stage == arrays.POST_VELOCITIES_TO_GRID:
             for q in range(count):
                 stick(kin, nodes, programs, hooks.chosen[q])
         return
-    evaluate(hooks, h, FRICTION, count, control, np.int64(arrays.VALUE), 0.0)
+    evaluate(hooks, h, FRICTION, count, control, VALUE, 0.0)
     slot = hooks.table[h].slot
     for q in range(count):
-        n, mu = hooks.chosen[q], hooks.scratch[arrays.VALUE, q]
+        n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
         rub(kin, nodes, programs, hooks.held, n, mu, dt, kept, control, slot)
 
 
@@ -459,7 +446,7 @@ def _work_at_nodes(what, hooks, control, dt, count):
     node do to it in the same step counts, or the work would be of first order.
     """
     update, change = what.nodes.update, arrays.of_change(what.kin)
-    terms = hooks.scratch[arrays.VALUE]
+    terms = hooks.scratch[VALUE]
     for c in range(dimension(what.kin)):
         for q in range(count):
             n = hooks.chosen[q]
@@ -472,7 +459,7 @@ def _work_at_nodes(what, hooks, control, dt, count):
 
 @shared
 def _rubbed_alone(nodes):
-    """The nodes with that of their declared fields which walls know."""
+    """Return the nodes with that of their declared fields which walls know."""
     fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
     return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
 
@@ -492,7 +479,7 @@ def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kep
 
 @entered
 def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
-    what = hold(AtNodes(target, kin, grids, nodes, ranges, kept))
+    what = hold(HookedNodes(target, kin, grids, nodes, ranges, kept))
     if target == LOADS:
         if hooks.loads.size > 0:
             act_on_all(hooks.mode, what, ACT, hooks, control, dt, NONE, 1.0)
@@ -562,7 +549,7 @@ def _bounds_of_points(what, turn, parts):
 
 @shared
 def _choose_points(what, hooks, h, p, end, member):
-    """Those from `p` to before `end`; where they are before the step."""
+    """Take those from `p` to before `end`; note where they are before the step."""
     begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
     count = 0
     while p < end and count < BLOCK:
@@ -578,37 +565,27 @@ def _choose_points(what, hooks, h, p, end, member):
     return count, p, member
 
 
-for kind in (Motion, Warmth):
+for kind in (MovingPoints, HeatedPoints):
     turns.on(kind)(_turns_of_points)
     bounds.on(kind)(_bounds_of_points)
     choose.on(kind)(_choose_points)
 
 
-@act.on(Motion)
+@act.on(MovingPoints)
 def _act_on_motion(what, task, hooks, control, dt, h, count, share):
     v, y = what.v, what.y
-    step_back = min(control.clock[0].last_dt, control.values[arrays.TIME])
     d = directions(hooks)
     for c in range(d):
         if hooks.programs[h, c].begin < 0:
             continue
-        evaluate(hooks, h, c, count, control, np.int64(arrays.VALUE), 0.0)
-        if hooks.table[h].uses_before:
-            evaluate(hooks, h, c, count, control, np.int64(arrays.BEFORE), -step_back)
+        _evaluate_now_and_before(hooks, h, c, count, control)
         slot = hooks.table[h].slot
         for q in range(count):
             p = hooks.chosen[q]
             velocity, place, total = _call_point_function(
-                hooks.table[h].address,
-                what.mass[p],
-                v[c, p],
-                what.x[c, p],
-                y[c, p],
-                hooks.scratch[arrays.VALUE, q],
-                hooks.scratch[arrays.BEFORE, q],
-                dt,
-                control.clock[0].kick,
-            )
+                hooks.table[h].address, what.mass[p], v[c, p], what.x[c, p], y[c, p],
+                hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], dt, control.clock[0].kick,
+            )  # fmt: skip
             speed = float(v[c, p])
             work = 0.5 * float(what.mass[p]) * (velocity * velocity - speed * speed)
             totals.add_to(control.totals, totals.WORK, work)
@@ -622,26 +599,21 @@ def _act_on_motion(what, task, hooks, control, dt, h, count, share):
     return 0
 
 
-@act.on(Warmth)
+@act.on(HeatedPoints)
 def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
-    evaluate(hooks, h, 0, count, control, np.int64(arrays.VALUE), 0.0)
+    evaluate(hooks, h, 0, count, control, VALUE, 0.0)
     if hooks.programs[h, 1].begin >= 0:
-        evaluate(hooks, h, 1, count, control, np.int64(arrays.BEFORE), 0.0)
+        evaluate(hooks, h, 1, count, control, BEFORE, 0.0)
     slot = hooks.table[h].slot
     clock = control.clock[0]
     for q in range(count):
         p = hooks.chosen[q]
         before = what.supply[0, p]
         share, supply, T = _call_heat_function(
-            hooks.table[h].address,
-            what.capacity[0, p],
-            what.temperature[0, p],
+            hooks.table[h].address, what.capacity[0, p], what.temperature[0, p],
             face(what.kin, what.volume[0, p], load_vector(what.kin, what.x, p)),
-            before,
-            hooks.scratch[arrays.VALUE, q],
-            hooks.scratch[arrays.BEFORE, q],
-            dt,
-        )
+            before, hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], dt,
+        )  # fmt: skip
         what.share[0, p] = min(what.share[0, p], share)
         what.supply[0, p] = supply
         what.temperature[0, p] = T
@@ -649,7 +621,7 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
             totals.add_to(control.totals, slot, supply - before)
         # What a temperature is led to bounds it: what it has come to be says nothing.
         if hooks.table[h].holds > 0:
-            T = hooks.scratch[arrays.BEFORE, q]
+            T = hooks.scratch[BEFORE, q]
         elif what.capacity[0, p] > 0:
             # What the fastest point takes, another may have got before.
             rate = supply / what.capacity[0, p]
@@ -660,21 +632,17 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
 
 
 @entered
-def _point_hooks(stage, what, hooks, control, dt):
+def point_hooks(stage, what, hooks, control, dt):
+    """Call the point functions of `stage` on the members in a block."""
+    dt = float(dt)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage == stage:
             act_on_all(hooks.mode, what, ACT, hooks, control, dt, h, 1.0)
 
 
-@shared
-def point_hooks(stage, what, hooks, control, dt):
-    """Call the point functions of `stage` on the members in a block."""
-    _point_hooks(stage, what, hooks, control, float(dt))
-
-
 @entered
 def clear_totals(stage, hooks, control):
-    """Totals of point functions start from zero: they are summed over the blocks."""
+    """Let totals of point functions start from zero: they are summed over the blocks."""
     for h in range(len(hooks.table)):
         if hooks.table[h].stage == stage:
             _clear_total(hooks, h, control)
@@ -690,7 +658,7 @@ def publish_totals(stage, hooks, control):
 
 @shared
 def corners_that_move(s):
-    """How many corners stand behind the position of a point, and move with it."""
+    """Count the corners that stand behind the position of a point, and move with it."""
     return placed(s.basis, s.kin) if follows(s.frame) else 0
 
 
@@ -698,7 +666,7 @@ def corners_that_move(s):
 def _hook_points(block, s, hooks, stage, now, then):
     points = block.points
     corners = corners_that_move(s)
-    motion = Motion(points.id, points.v, points.mass, points.x[now], points.x[then], corners)
+    motion = MovingPoints(points.id, points.v, points.mass, points.x[now], points.x[then], corners)
     point_hooks(stage, motion, hooks, s.control, step_size(s))
 
 

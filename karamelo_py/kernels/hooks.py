@@ -23,7 +23,7 @@ The node functions of heat see capacity, temperature before and after the step, 
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from numba import types
 
@@ -68,12 +68,12 @@ class CompiledHook(NamedTuple):
 
     @property
     def on_nodes(self) -> bool:
-        """Whether it acts on nodes."""
+        """True where it acts on nodes."""
         return self.where == "nodes"
 
     @property
-    def signature(self) -> types.Type:
-        """What its function takes and returns."""
+    def signature(self) -> Any:
+        """The Numba type of its function."""
         return FUNCTIONS[self.where]
 
 
@@ -93,17 +93,17 @@ def node_hook(
     shares: bool = False,
     holds: bool = False,
 ) -> CompiledHook:
-    """A compiled hook on nodes: `function` as described at the head of this file."""
+    """Make a compiled hook on nodes, of a function as described at the head of this file."""
     return CompiledHook(function, "nodes", publishes, uses_before, shares, holds)
 
 
 def point_hook(
     function: Callable, *, publishes: bool = False, uses_before: bool = False
 ) -> CompiledHook:
-    """A compiled hook on points: `function` as described at the head of this file."""
+    """Make a compiled hook on points, of a function as described at the head of this file."""
     return CompiledHook(function, "points", publishes, uses_before, False, False)
 
 
 def heat_hook(function: Callable, *, publishes: bool = False, holds: bool = False) -> CompiledHook:
-    """A compiled hook for ``supply_heat``: `function` as described at the head of this file."""
+    """Make a compiled hook for ``supply_heat``, of a function as described there."""
     return CompiledHook(function, "heated points", publishes, False, False, holds)

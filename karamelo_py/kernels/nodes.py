@@ -1,11 +1,20 @@
-"""What is done at the nodes between two visits of the points."""
+"""Tasks at the nodes between two visits of the points."""
 
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_first
-from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
+from karamelo_py.kernels.arrays import (
+    MASS,
+    Index,
+    Nodes,
+    Number,
+    Tag,
+    of_change,
+    of_force,
+    of_momentum,
+)
 from karamelo_py.kernels.averaging import NodalMean, NodalStress
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat, keep_loss
 from karamelo_py.kernels.p2g import SquaredMass
@@ -38,7 +47,7 @@ class ExtendSeries(NamedTuple):
 
 
 class KeepLoss(NamedTuple):
-    """What a node does not keep of the kinetic energy that it was brought."""
+    """Energy loss of a node: kinetic energy that points brought, less that of the node."""
 
     goes_through = ("sums", "energy loss", "energy loss")
 
@@ -85,12 +94,12 @@ class UpdateToVelocity(NamedTuple):
 
 
 @point_function()
-def at_node(task, kin, nodes, n, dt):
+def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
     """Do `task` at node `n`. Nodes without mass stay at rest."""
 
 
 @shared
-def per_mass(nodes, n, like):
+def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
     """One over the mass of a node, 0 where it has none."""
     mass = nodes.sums[n, MASS]
     return real(1, like) / mass if mass > 0 else real(0, like)

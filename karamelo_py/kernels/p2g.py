@@ -5,11 +5,19 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.compile import accumulate, of_present, point_function, real, shared
 from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, vector
 from karamelo_py.compiler.tuples import add_optional, leading, scale, subtract
-from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, VELOCITY_WIDTH, of_force
+from karamelo_py.kernels.arrays import (
+    MASS,
+    SUMS_WIDTH,
+    VELOCITY_WIDTH,
+    Index,
+    Number,
+    Tag,
+    of_force,
+)
 from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.g2p import zero_vector
 from karamelo_py.kernels.loss import EnergyLoss, bring_energy
-from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, records_of, state_of
+from karamelo_py.kernels.visit import Work, deformation_of, for_tags, law_of, records_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, add_force, force_stress
 from karamelo_py.points.kinematics import add_pressure, dimension, stretching_mean, zero_symmetric
@@ -27,6 +35,7 @@ class MassMomentum(NamedTuple):
     """Scatter mass and momentum."""
 
     in_lanes = True
+    not_at_corners = ("moments", "loss")
     says = "p2g mass and momentum"
     reads = ("x moved", "mass", "v", "moment")
 
@@ -48,6 +57,7 @@ class InternalForce(NamedTuple):
     """Scatter the internal force, and that of fixes on points."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "internal force"
     reads = ("mass", "state", "material", "deformation gradient", "force")
 
@@ -61,6 +71,7 @@ class MomentumAgain(NamedTuple):
     """Scatter momentum to the velocity array."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "momentum to grid"
     reads = ("mass", "v", "moment")
 
@@ -74,6 +85,7 @@ class Volumes(NamedTuple):
     """Scatter volume, after and before the trial increment (F-bar)."""
 
     in_lanes = True
+    not_at_corners = ()
     says = "volumes to grid"
     reads = ("mass", "state", "material", "volume ratio")
 
@@ -87,6 +99,7 @@ class AveragedForce(NamedTuple):
     """Scatter the internal force of the averaged mean stress less that of a point's own (F-bar)."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"
     reads = ("mass", "state", "material", "deformation gradient", "averaged stress")
     adds = True  # to a force that is there
@@ -101,6 +114,7 @@ class SeriesBack(NamedTuple):
     """Scatter the term of the series of XPIC, times mass."""
 
     in_lanes = True
+    not_at_corners = ()
     says = "term of the series to the grid"
     reads = ("mass", "term of series")
 
@@ -128,7 +142,7 @@ class SquaredMass(SummedField):
 
     @staticmethod
     def needed(basis: Any) -> bool:
-        """Whether a basis makes light nodes that the gradient feels."""
+        """Return True if a basis makes light nodes that the gradient feels."""
         return basis.steep_edge
 
 
@@ -139,7 +153,7 @@ class Centre(SummedField):
 
 
 class RigidSums(SummedField):
-    """What rigid points give a node: mass, momentum and the force on them, as in `Nodes.sums`."""
+    """Sums of the rigid points at a node: mass, momentum, force on them, as in `Nodes.sums`."""
 
     @staticmethod
     def shape(kin):
@@ -148,8 +162,8 @@ class RigidSums(SummedField):
 
 
 @point_function()
-def load_of(quantity, w, p, like):
-    """What a point brings to the nodes."""
+def load_of(quantity: Tag, w: Work, p: Index, like: Number) -> tuple:
+    """Return the load of a point: the numbers that it scatters, before they are weighted."""
 
 
 @records_of.on(MassMomentum)
@@ -163,7 +177,7 @@ def _records_of_momentum_again(quantity, nodes):
 
 
 @point_function()
-def scattered(quantity, w, stencil, k, load):
+def scattered(quantity: Tag, w: Work, stencil: tuple, k: int, load: tuple) -> None:
     """Give the k-th node of the stencil its part."""
 
 
@@ -210,7 +224,9 @@ def _load_of_mass_momentum(quantity, w, p, like):
 
 
 @shared
-def momentum_part(w, stencil, k, weight, mass, v, moment):
+def momentum_part(
+    w: Work, stencil: tuple, k: int, weight: Number, mass: Number, v: tuple, moment: tuple
+) -> tuple:
     """The momentum that a point gives to the k-th node."""
     none = subtract(v, v)
     return add_momentum(

@@ -8,6 +8,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels import arrays, p2g, table
+from karamelo_py.kernels.arrays import Number, Setup, Tag
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.g2p import Move, SeriesTerm, SetMeanStress
@@ -35,17 +36,17 @@ class Insulated(NamedTuple):
 
 
 @point_function(otherwise=True)
-def conduct(heat, s, mode, hooks):
+def conduct(heat: Tag, s: Setup, mode: Tag, hooks: Tag) -> None:
     """Let heat flow between points for the length of a step; by default none does."""
 
 
 @point_function(otherwise=True)
-def touch(contact, s):
+def touch(contact: Tag, s: Setup) -> None:
     """Let solids with velocity fields of their own act on each other; by default there are none."""
 
 
 @point_function(otherwise=True)
-def touch_velocity(contact, s, steps):
+def touch_velocity(contact: Tag, s: Setup, steps: int) -> None:
     """See that the velocity that deforms the points agrees with contact, where it is not v*.
 
     `steps` is 1 when v* of this step is known, and 0 before: what touched in the last step counts.
@@ -68,7 +69,7 @@ def _clear_radial(kin, nodes, grids):
 
 
 @point_function(otherwise=True)
-def hold_axis(kin, s):
+def hold_axis(kin: Tag, s: Setup) -> None:
     """Let no node on an axis of symmetry leave it; by default there is none."""
 
 
@@ -80,7 +81,7 @@ def _hold_axis_axisymmetric(kin, s):
 
 
 @point_function(otherwise=True)
-def sum_series(transfer, s, mode):
+def sum_series(transfer: Tag, s: Setup, mode: Tag) -> None:
     """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
 
 
@@ -97,7 +98,7 @@ def _sum_series_xpic(transfer, s, mode):
 
 
 @point_function(otherwise=True)
-def average_volumes(averaging, s, mode, dt, trial):
+def average_volumes(averaging: Tag, s: Setup, mode: Tag, dt: Number, trial: Tag) -> None:
     """Average the change of volume of the strain to come at the nodes; by default it is not.
 
     `trial` is the task that finds it.
@@ -112,7 +113,7 @@ def _average_volumes_f_bar(averaging, s, mode, dt, trial):
 
 
 @point_function(otherwise=True)
-def average_stress(averaging, s, mode):
+def average_stress(averaging: Tag, s: Setup, mode: Tag) -> None:
     """Put the averaged mean stress in the place of the points' own; by default each has its own."""
 
 
@@ -125,7 +126,7 @@ def _average_stress_f_bar(averaging, s, mode):
 
 
 @shared
-def sum_loss(s, mode):
+def sum_loss(s: Setup, mode: Tag) -> None:
     """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
     if field(s.nodes.fields, FrictionalHeat) is not None:
         sweep_nodes(mode, ClearFrictionalHeat(), s.kin, s.nodes, s.ranges, step_size(s))
@@ -146,10 +147,10 @@ def light_node(s):
     return UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
 
 
-light_node.goes_through = UpdateToVelocity.goes_through
+light_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defined]
 
 
-def _call(do: Callable, says: Callable[[Any], str | None]) -> table.SceneTask:
+def _call(do: Any, says: Callable[[Any], str | None]) -> table.SceneTask:
     """A row that does something; `says` tells what in a scene."""
     do.says = says
     return table.SceneTask(do)

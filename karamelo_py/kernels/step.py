@@ -15,7 +15,7 @@ from karamelo_py.compiler.loops import loop
 from karamelo_py.compiler.threads import by_team
 from karamelo_py.compiler.tuples import record, subtract
 from karamelo_py.kernels import table
-from karamelo_py.kernels.arrays import DT, TIME, NoHooks
+from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
 from karamelo_py.kernels.clock import common_velocity, finish, kick, last_step_size, step_size
 from karamelo_py.kernels.g2p import STRAINS, TrialStrain, TrialStrainOfLastStep
 from karamelo_py.kernels.hook_loop import at_nodes, at_points
@@ -37,12 +37,12 @@ class Staged(NamedTuple):
     """One visit for each stage, so that hooks on points can act in between."""
 
 
-def rows_of(scheme: type, visits: type) -> list[Any]:
+def rows_of(scheme: Any, visits: Any) -> list[Any]:
     """The rows of a step of `scheme`."""
     return table.fused(scheme.rows) if visits is Fused else table.staged(scheme.rows)
 
 
-def _first_rows(scheme: type, visits: type) -> list[Any]:
+def _first_rows(scheme: Any, visits: Any) -> list[Any]:
     """Fused steps expect the sums on the nodes: the scatter of the last visit, alone."""
     if visits is not Fused:
         return []
@@ -86,10 +86,11 @@ def _take_all(rows, s, mode, hooks, more):
     return True
 
 
-_step_rows, _begin_rows = functools.cache(rows_of), functools.cache(_first_rows)  # interpreted
+_step_rows: Any = functools.cache(rows_of)  # interpreted
+_begin_rows: Any = functools.cache(_first_rows)
 
 
-def step(scheme, visits, mode, s, hooks, more):
+def step(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, more: bool) -> bool:
     """One step of `scheme`. With `more`, a fused step leaves the next step's sums on the nodes.
 
     Returns whether all points went well.
@@ -103,7 +104,7 @@ def _step(scheme, visits, mode, s, hooks, more):
     return lambda scheme, visits, mode, s, hooks, more: _take_all(rows, s, mode, hooks, more)
 
 
-def begin(scheme, visits, mode, s):
+def begin(scheme: Tag, visits: Tag, mode: Tag, s: Setup) -> bool:
     """Before the first of several steps; returns whether all points are on the grid."""
     return _take_all(_begin_rows(type(scheme), type(visits)), s, mode, NoHooks(), True)
 
@@ -121,7 +122,7 @@ PATIENCE = 50  # steps above the stable limit before a run is stopped
 SMALLEST = 1e-6  # share of the first stable step at which a run is stopped: it would never end
 
 
-def run_steps(scheme, visits, mode, s, hooks, count):
+def run_steps(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: int) -> int:
     """Take up to `count` steps, as far as the end time; say why it stopped.
 
     Returns DONE, STOPPED (a point went wrong), ABOVE_LIMIT (the step is above the stable limit),
@@ -164,7 +165,7 @@ _by_team = by_team(_led, "scheme, visits, s, hooks, count")
 
 
 @loop
-def advance(scheme, visits, mode, s, hooks, count):
+def advance(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: int) -> int:
     """`run_steps`, by a team of threads where there are some."""
     return _by_team(mode, scheme, visits, s, hooks, count)
 
@@ -194,7 +195,7 @@ def measure_blocks(block, s):
 
 
 @shared
-def measure(s):
+def measure(s: Setup) -> None:
     """The rate of the present state, for the first dt."""
     s.control.clock[0].rate = 0.0
     measure_blocks(s)

@@ -21,14 +21,14 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import (
-    choose,
-    first_failing,
-    in_all,
+    all_lanes,
+    first_false_lane,
     index,
     largest,
     point_function,
     real,
     shared,
+    where,
 )
 from karamelo_py.compiler.fields import load, load_vector, store
 from karamelo_py.compiler.held import at_hand, hold
@@ -148,7 +148,7 @@ def _stays_in_box_old_weights(weights, room, moved):
 
 @stays_in_box.on(PresentWeights)
 def _stays_in_box_present_weights(weights, room, moved):
-    return in_all(moved <= room)
+    return all_lanes(moved <= room)
 
 
 @point_function()
@@ -255,10 +255,10 @@ def visit_tile(
                     totals = gathered_by(lanes, visit.tasks, w, stencil, position_of(w, p))
                 moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
             elif follows(s.frame):
-                moved = choose(inside(grid, s.kin, position_of(w, p)), moved, real(inf, moved))
+                moved = where(inside(grid, s.kin, position_of(w, p)), moved, real(inf, moved))
             good = (moved <= 1) & (rate < 1e300)  # so written, NaN counts as wrong too
-            if not in_all(good):
-                wrong = q + 1 + first_failing(good)
+            if not all_lanes(good):
+                wrong = q + 1 + first_false_lane(good)
                 continue
             furthest = max(furthest, moved)
             fastest = rate

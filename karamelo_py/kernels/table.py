@@ -10,7 +10,7 @@ A scheme names its rows once, stage by stage, as its class attribute ``rows``. F
 Averaged volumes, XPIC, heat and contact are calls that do nothing in scenes without them.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from karamelo_py.kernels.g2p import Move, Strain, StrainInMove, StrainOfLastStep
@@ -58,7 +58,7 @@ class NodeTask(NamedTuple):
 class SceneTask(NamedTuple):
     """A call ``function(s, mode, hooks)`` of what only some scenes have."""
 
-    function: Callable
+    function: Any
 
 
 class Check(NamedTuple):
@@ -94,7 +94,7 @@ def _tasks(gathers: list[Gather]) -> tuple:
 
 
 def _kinds(tags: tuple) -> tuple:
-    """What tells tags apart: tuples without numbers are all equal."""
+    """Return the classes of tags: as tuples, tags without numbers are all equal."""
     return tuple(type(tag) for tag in tags)
 
 
@@ -164,7 +164,7 @@ def staged(rows: Iterable[Any]) -> list[Any]:
 
 
 def says(row: Any, setup: Any) -> str | None:
-    """What a row does, in words; None where it does nothing in this scene."""
+    """Describe a row in words; None where it does nothing in this scene."""
     if isinstance(row, Sweep):
         parts = [tag.says for tag in row.visit.tasks if row.gathers]
         parts += [tag.says for tag in row.visit.quantities if row.scatters]

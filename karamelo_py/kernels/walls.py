@@ -19,7 +19,7 @@ FRICTION = 3  # the program of the coefficient, behind those of the components
 
 @subkernel
 def _is_free(held, programs, n, c):
-    """Whether no fix holds node `n` in direction `c`, as far as the fix of `programs` knows."""
+    """Return True if no fix holds node `n` in direction `c`, as far as that of `programs` knows."""
     return programs[c].begin < 0 and (held.size == 0 or held[n, c].slot == 0)
 
 

@@ -59,7 +59,7 @@ class Argument:
         return self.text == NULL
 
     def word(self) -> str | None:
-        """The word it is: bare, in quotes, or the content of a text variable; None for arithmetic.
+        """Find the word it is: bare, in quotes, or in a text variable; None for arithmetic.
 
         Words such as ``neo-hookean`` or ``dump.*.gz`` count unless a name in them is known, which
         makes them arithmetic.
@@ -77,7 +77,7 @@ class Argument:
         return None if known else self.text
 
     def words(self, known: Sequence[str] = ()) -> str:
-        """The text it stands for where only a word will do, arithmetic or not.
+        """Find the text it stands for where only a word will do, arithmetic or not.
 
         Raises
         ------
@@ -107,7 +107,7 @@ class Argument:
         return self.text
 
     def value(self, hub: Scene | None) -> Value:
-        """The number, text or formula it stands for.
+        """Find the number, text or formula it stands for.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class Argument:
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
     def value_with(self, seeds: Sequence[str]) -> Value:
-        """The same, where the names `seeds` stand for what a formula is of, whatever they are else.
+        """Find the value where the names `seeds` are those that a formula depends on.
 
         Raises
         ------
@@ -141,7 +141,7 @@ class Argument:
         return self._interpreter.knows(name)
 
     def part(self, text: str) -> Argument:
-        """The last place of `text` in it, as an argument of its own."""
+        """Find the last place of `text` in it, as an argument of its own."""
         source = self._raw.source
         start = source.text.rindex(text, self._raw.start, self._raw.end)
         return Argument(Raw(source, start, start + len(text)), self._interpreter)
@@ -179,7 +179,7 @@ class _Seeds:
             raise
 
     def command(self, node: Any, raw: Raw) -> Value:
-        """The value of a call that is not a function."""
+        """Find the value of a call that is not a function."""
         return self.outer.command(node, raw)
 
     def hides(self, name: str) -> bool:
@@ -188,12 +188,12 @@ class _Seeds:
 
 
 def with_gap(arguments: Sequence[Argument]) -> Argument | None:
-    """The first argument that may be two, with a comma forgotten between them."""
+    """Find the first argument that may be two, with a comma forgotten between them."""
     return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 
 def look_up(catalogue: Any, argument: Argument):
-    """The part of the scene that `argument` names.
+    """Find the part of the scene that `argument` names.
 
     Raises
     ------

@@ -38,12 +38,12 @@ NonNegative = Constraint("of at least 0", lambda value: value >= 0)
 
 
 def AtLeast(least: float) -> Constraint:
-    """A number of at least `least`."""
+    """Ask for a number of at least `least`."""
     return Constraint(f"of at least {least:g}", lambda value: value >= least)
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """A number between `lo` and `hi`; the ends named by `open` (True: both) are excluded."""
+    """Ask for a number from `lo` to `hi`; ends named by `open` (True: both) are excluded."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -72,7 +72,7 @@ class InputFile:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
-        """The path of the file."""
+        """Read the path of the file."""
         name = _file_name(argument)
         folders = [getattr(hub, "folder", Path()), Path(), argument._interpreter.folder]
         for folder in folders:
@@ -106,7 +106,7 @@ class OutputFile:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
-        """The path of the file."""
+        """Read the path of the file."""
         name = _file_name(argument)
         path = getattr(hub, "folder", Path()) / name
         try:
@@ -245,7 +245,7 @@ class StyleOf:
     script_kind = "a word"
 
     def from_script(self, hub: Any, argument: Argument) -> str:
-        """The name as it stands, or what a text variable of another name holds."""
+        """Read the name as it stands, or what a text variable of another name holds."""
         if registry.knows(self.family, argument.text):
             return argument.text
         joined = "-".join(argument.text.split())

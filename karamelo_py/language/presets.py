@@ -109,7 +109,7 @@ class Presets(dict[str, str]):
                 )
 
     def refuse_unused(self, statements: list[Statement]) -> None:
-        """A variable of the command line that nothing reads or assigns is a slip of the pen."""
+        """Refuse a variable of the command line that nothing reads or assigns."""
         words = set(re.findall(_WORD, " ".join(self.values())))
         assigned: dict[str, None] = {}
         if not self or not self._collect(statements, self._script.folder, words, assigned, []):

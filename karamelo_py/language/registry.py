@@ -54,12 +54,12 @@ def _origin(entry: EntryPoint) -> str:
 
 
 def families() -> list[str]:
-    """Names of all families of words for scripts, such as command, fix, region."""
+    """List names of all families of words for scripts, such as command, fix, region."""
     return [family for family in _families() if family != "engine"]
 
 
 def names(family: str) -> list[str]:
-    """Names of all styles of `family`, sorted."""
+    """List names of all styles of `family`, sorted."""
     return sorted(_families().get(family, {}), key=lambda name: (name.lower(), name))
 
 
@@ -78,12 +78,12 @@ def name_of(family: str, style: type) -> str:
 
 
 def origin(family: str, name: str) -> str:
-    """The package that offers a style, with its version."""
+    """Name the package that offers a style, with its version."""
     return " and ".join(_origin(entry) for entry in _entries(family, name))
 
 
 def find(family: str, name: str) -> Any:
-    """The class or function behind a style; imported when it is first asked for.
+    """Find the class or function behind a style; imported when it is first asked for.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """The same of a statement that has an ID in front of it.
+    """Find the same for a statement that has an ID in front of it.
 
     Raises
     ------

@@ -11,7 +11,7 @@ _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 
 
 def spelled(statement: Statement) -> str:
-    """The text of a statement without what means nothing: blanks, comments, line ends."""
+    """Write the text of a statement without what means nothing: blanks, comments, line ends."""
     return _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
 
 
@@ -35,7 +35,7 @@ class Record:
         self.values = dict(values or {})
 
     def note(self, value: float) -> None:
-        """A call of value(...) in the last statement gave `value`."""
+        """Note that a call of value(...) in the last statement gave `value`."""
         self.values.setdefault(len(self.statements) - 1, []).append(value)
 
 
@@ -65,7 +65,7 @@ class Replay:
         return self.number == len(self.record.statements) - 1
 
     def next(self, text: str, place: Place | None) -> None:
-        """The next statement is `text`.
+        """Go on to the next statement, which is `text`.
 
         Raises
         ------
@@ -97,7 +97,7 @@ class Replay:
         return self._values.pop(0) if self._values else nan
 
     def other_script(self, message: str, place: Place | None = None) -> ScriptError:
-        """The error for a script that is not the one that wrote the file."""
+        """Make the error for a script that is not the one that wrote the file."""
         return ScriptError(
             f"{self.file} was written by another script: {message}",
             place=place,

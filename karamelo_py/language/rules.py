@@ -23,40 +23,11 @@ from collections.abc import Callable, Iterator
 from math import inf
 from typing import Any, NamedTuple
 
-
-class Rule(NamedTuple):
-    """Warn of, save or explain something, where a part of this class is used so.
-
-    Attributes
-    ----------
-    kind
-        ``failure``, ``saving`` or ``gain``.
-    name
-        Of a failure, which is told once in a script.
-    when
-        Whether it speaks, and the numbers in its words.
-    reason, cure
-        Words for what is wrong, or costs, or feeds energy; and for what to write instead.
-    """
-
-    kind: str
-    name: str
-    when: Callable[[Any, Any], Any]
-    reason: str
-    cure: str
+When = Callable[[Any, Any], Any]
 
 
 class Advice(NamedTuple):
-    """Tell what a rule says of a scene.
-
-    Attributes
-    ----------
-    share
-        Of noise, which feeds energy the sooner the larger it is: how much it takes of what a body
-        bears. What fails or feeds for sure has an infinite one.
-    place
-        Where the script asks for the part, if the part knows.
-    """
+    """Words of a rule on a scene: what is wrong, costs or feeds energy, and what to write."""
 
     name: str
     reason: str
@@ -65,41 +36,40 @@ class Advice(NamedTuple):
     place: Any = None
 
 
-_rules: dict[type, list[Rule]] = {}
+_rules: dict[tuple[str, type], list[tuple[When, str, str, str]]] = {}
 
 
 def known_failure(
-    part: type, name: str, *, when: Callable[[Any, Any], Any], reason: str, cure: str
+    part: type, name: str, *, when: When, reason: str, cure: str, cause: str = ""
 ) -> None:
-    """Declare what is known to go wrong with a part, told before a run."""
-    _rules.setdefault(part, []).append(Rule("failure", name, when, reason, cure))
+    """Declare what is known to go wrong with a part, by a name by which it is told once.
+
+    With a `cause`, it is noise: told where its share is above 1, and as the cause of a gain.
+    """
+    _rules.setdefault(("failure", part), []).append((when, name, reason, cure))
+    if cause:
+        gain(part, when=when, cause=cause, cure=cure)
 
 
-def saving(part: type, *, when: Callable[[Any, Any], Any], cost: str, instead: str) -> None:
+def suggestion(part: type, *, when: When, cost: str, instead: str) -> None:
     """Declare what a part costs without need, told by `check`."""
-    _rules.setdefault(part, []).append(Rule("saving", "", when, cost, instead))
+    _rules.setdefault(("suggestion", part), []).append((when, "", cost, instead))
 
 
-def gain(part: type, *, when: Callable[[Any, Any], Any], cause: str, cure: str) -> None:
+def gain(part: type, *, when: When, cause: str, cure: str) -> None:
     """Declare how a part feeds energy, told where energy comes from nowhere."""
-    _rules.setdefault(part, []).append(Rule("gain", "", when, cause, cure))
+    _rules.setdefault(("gain", part), []).append((when, "", cause, cure))
 
 
 def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
     """Tell what the rules of one kind say of a part (or of a field, which is a class)."""
     for one in (part if isinstance(part, type) else type(part)).__mro__:
-        for rule in _rules.get(one, ()):
-            if rule.kind == kind:
-                yield from _said(rule, part, owner, scene)
-
-
-def _said(rule: Rule, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
-    found = rule.when(part, scene)
-    if not found:
-        return
-    for one in found if isinstance(found, list) else [found]:
-        numbers = one if isinstance(one, dict) else {}
-        named = {"part": part, "owner": owner, "scene": scene, **numbers}
-        words = (text.format(**named) for text in (rule.name, rule.reason, rule.cure))
-        place = numbers.get("place", getattr(owner or part, "place", None))
-        yield Advice(*words, numbers.get("share", inf), place)
+        for when, *words in _rules.get((kind, one), ()):
+            found = when(part, scene)
+            for case in found if isinstance(found, list) else [found] if found else []:
+                numbers = case if isinstance(case, dict) else {}
+                share = numbers.get("share", inf)
+                if kind != "failure" or share > 1:
+                    names = {"part": part, "owner": owner, "scene": scene, **numbers}
+                    place = numbers.get("place", getattr(owner or part, "place", None))
+                    yield Advice(*(text.format(**names) for text in words), share, place)

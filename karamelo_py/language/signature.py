@@ -73,7 +73,7 @@ class Parameter:
 
 @cache
 def parameters(target: Callable) -> list[Parameter]:
-    """The parameters of a command or style, without the hub; of a record, its fields.
+    """List the parameters of a command or style, without the hub; of a record, its fields.
 
     Raises
     ------
@@ -251,7 +251,7 @@ def _bind(
 
 
 def _left_out(slots: list[Parameter], given: Sequence[Argument]) -> list[Parameter]:
-    """The parameters that words which fit only further back have left out; none where unclear."""
+    """List the parameters that were left out, by words that fit only further back."""
     missing, rest = [], list(given)
     for slot in slots:
         words = () if slot.shown == slot.name else slot.kind.words
@@ -359,7 +359,7 @@ def _misfit(
 def _guilty(
     error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
 ) -> Place | None:
-    """The place of the argument that an error names, or else of the word it quotes."""
+    """Find the place of the argument that an error names, or else of the word it quotes."""
     if isinstance(error.argument, int) and 0 <= error.argument < len(arguments):
         return arguments[error.argument].place
     if isinstance(error.argument, str) and bound.get(error.argument):
@@ -372,7 +372,7 @@ def _guilty(
 
 
 def _joined(expected: list[Parameter]) -> str:
-    """``a, b[, c[, d]][, e=...]``: arguments as they are written."""
+    """Write ``a, b[, c[, d]][, e=...]``: arguments as they are written."""
     text, open_brackets = "", 0
     for parameter in expected:
         comma = ", " if text else ""
@@ -393,7 +393,7 @@ _HOMES = {"transfer": "method", "basis": "method"}
 
 
 def syntax(target: Callable, name: str) -> str:
-    """The line that shows how a command or style is called."""
+    """Write the line that shows how a command or style is called."""
     own = getattr(target, "syntax", None)
     if not isinstance(own, str):
         own = _joined(documented(target))
@@ -414,7 +414,7 @@ def syntax(target: Callable, name: str) -> str:
 
 
 def documented(target: Callable) -> list[Parameter]:
-    """Parameters for help: with the word that chooses a variant of a style."""
+    """List parameters for help: with the word that chooses a variant of a style."""
     variants = getattr(target, "variants", None)
     if not variants:
         return parameters(target)

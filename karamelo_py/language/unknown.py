@@ -1,10 +1,8 @@
 """Names that nothing answers to, or that cannot be given: what may have been meant."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from karamelo_py.language import registry
 from karamelo_py.language.own_words import in_own_words
@@ -16,9 +14,6 @@ from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.other_programs import instead, of_karamelo, table
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
-if TYPE_CHECKING:
-    from karamelo_py.language.interpreter import Interpreter as Script
-
 MEANINGS = {
     "time": "the time of the run",
     "timestep": "the number of the step",
@@ -27,7 +22,7 @@ MEANINGS = {
 }
 
 
-def unknown_statement(script: Script, name: str) -> ScriptError:
+def unknown_statement(script: Any, name: str) -> ScriptError:
     """Make the error for a statement that is no more than a name nobody knows."""
     meaning = "quit" if name.lower() in ("exit", "stop", "end") else name
     known = ["quit", *registry.names("command"), *script.variables]
@@ -38,7 +33,7 @@ def unknown_statement(script: Script, name: str) -> ScriptError:
     )
 
 
-def unknown_call(script: Script, name: str, place: Any, statement: bool) -> ScriptError:
+def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptError:
     """Make the error for a call of what is no command, or no function."""
     commands = registry.names("command")
     what = "command" if statement else "function"
@@ -72,7 +67,7 @@ def no_value(name: str, place: Any) -> ScriptError:
     )
 
 
-def unknown_name(script: Script, name: str, place: Any) -> ScriptError:
+def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
     """Make the error for a name in an expression."""
     what, kind = "", "command" if registry.knows("command", name) else "function"
     if name in WORDS:
@@ -105,7 +100,7 @@ def unknown_name(script: Script, name: str, place: Any) -> ScriptError:
     )
 
 
-def _meant_by(script: Script, name: str, known: list[str]) -> str:
+def _meant_by(script: Any, name: str, known: list[str]) -> str:
     """Guess what a name in an expression stands for; the surest guess first."""
     own, energies = script.statement, table()["energies"]
     if name.lower() in ("true", "false"):
@@ -135,14 +130,14 @@ def _meant_by(script: Script, name: str, known: list[str]) -> str:
     return energies.get(name) or f"set it first: {name} = ..."
 
 
-def _publishing(script: Script) -> Iterator[tuple[str, str, Any]]:
+def _publishing(script: Any) -> Iterator[tuple[str, str, Any]]:
     """List the fixes and computes of a scene: what they are, ID and object."""
     for kind, items in (("fix", "fixes"), ("compute", "computes")):
         for ID, item in getattr(script.hub, items, {}).items():
             yield kind, ID, item
 
 
-def _not_published(script: Script, name: str, place: Any) -> ScriptError | None:
+def _not_published(script: Any, name: str, place: Any) -> ScriptError | None:
     """Make the error for a value that the fix or compute of this ID does not set."""
     for kind, ID, item in _publishing(script):
         if name in (ID, f"{ID}_{name[-1]}"):
@@ -175,7 +170,7 @@ def line_below(script: Any, kind: str, ID: str) -> int | None:
     return next(found, None)
 
 
-def _needs(script: Script, name: str, other: str) -> bool:
+def _needs(script: Any, name: str, other: str) -> bool:
     """Tell if the variable `name`, as it is set further down, comes to need `other`."""
     set_there = [s for s, kind, *_ in _ahead(script) if not kind]
     below = {s.name: set(re.findall(r"\w+", s.right.code)) for s in reversed(set_there)}
@@ -187,7 +182,7 @@ def _needs(script: Script, name: str, other: str) -> bool:
     return other in reached
 
 
-def defined_later(script: Script, name: str, place: Any) -> ScriptError | None:
+def defined_later(script: Any, name: str, place: Any) -> ScriptError | None:
     """Make the error for a `name` that is defined further down."""
     ID = re.sub(r"_[^_]+$", "", name)
     own = script.statement.name if isinstance(script.statement, Assignment) else ""

@@ -240,7 +240,7 @@ def _print(stream: TextIO, text: str) -> None:
 
 
 def show(value: Any) -> str:
-    """A value as a table shows it: 1 234 567, 0.333333, text as it is."""
+    """Write a value as a table shows it: 1 234 567, 0.333333, text as it is."""
     if isinstance(value, bool) or value is None:
         return str(value)
     if isinstance(value, int):
@@ -251,7 +251,7 @@ def show(value: Any) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Seconds as people say them: 42 s, 3 min 20 s, 2 h 5 min."""
+    """Write seconds as people say them: 42 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

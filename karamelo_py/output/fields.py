@@ -190,7 +190,7 @@ class Fields:
         return self._simulation.added_up(part, name, *arguments)
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
-        """What a method of a part says of fields of some points of its group after others.
+        """List what a method of a part says of fields of some points of its group after others.
 
         Which points are together, and in what order they come, depends on processes and steps.
         """
@@ -211,7 +211,7 @@ class Fields:
         return {name for law in laws for name in columns_of(law)}
 
     def rate_is_asked_for(self) -> bool:
-        """Whether a dump or a compute has the column ``epdot``, which points keep for it alone."""
+        """Tell whether a dump or a compute has the column ``epdot``, which points keep for it."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in getattr(asker, "columns", ()) for asker in askers)
 
@@ -283,7 +283,7 @@ class Fields:
 
     @property
     def occupied_nodes(self) -> tuple[int, int]:
-        """How many nodes have mass, and the last of them."""
+        """The number of nodes with mass, and the last of them."""
         self._simulation.show_on_nodes()
         return self._simulation.occupied_nodes()
 
@@ -297,7 +297,7 @@ class Fields:
 
 
 def _of_points(simulation: Any, filler: Callable, *columns: int) -> np.ndarray:
-    """What `filler(laws)(kin, like, points, laws, rows)` says of all points, by id, (N, *columns).
+    """Collect what `filler(laws)(kin, like, points, laws, rows)` says of all points, (N, *columns).
 
     Points are left at 0 where their laws do not have it, and `filler(laws)` is false.
     """

@@ -86,7 +86,7 @@ def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
 
 
 def picture_format(path: Path) -> str:
-    """The format that the name of a picture asks for.
+    """Read the format that the name of a picture asks for.
 
     Raises
     ------

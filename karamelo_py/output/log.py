@@ -93,7 +93,7 @@ class Log(Rhythmic):
         self.hub.console.log_line(_row(cells, self._widths))
 
     def resumed(self) -> None:
-        """Rows behind those that are remembered go, where the file is open."""
+        """Drop rows behind those that are remembered, where the file is open."""
         if self._file is not None:
             self._file.truncate(self._end)
 

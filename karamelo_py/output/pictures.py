@@ -145,7 +145,7 @@ class Picture:
         """Mark the ends of the colours beyond which there are values."""
 
     def _add_legend(self) -> None:
-        """Names of the solids, beside the picture."""
+        """Write names of the solids, beside the picture."""
         names = self.options.solids[:MOST_IN_LEGEND]
         if len(names) < 2:
             return
@@ -256,14 +256,14 @@ class Picture:
         self.figure.draw_without_rendering()
 
     def _pixels_per_unit(self) -> float:
-        """Points (1/72 inch) on paper per unit of x."""
+        """Count points (1/72 inch) on paper per unit of x."""
         box = self.axes.get_position()
         lo, hi = self.axes.get_xlim()
         return box.width * self.figure.get_figwidth() * 72 / (hi - lo)
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Limits that hold the old ones and the finite values.
+    """Find limits that hold the old ones and the finite values.
 
     They are rounded outwards to eighths of a power of two, so that they change rarely while a field
     grows and the pictures of a run stay comparable.
@@ -283,7 +283,7 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
 
 
 def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> Picture:
-    """The picture that suits the domain's dimension."""
+    """Make the picture that suits the domain's dimension."""
     kind = {1: LinePicture, 2: PlanePicture, 3: SpacePicture}[domain.dimension]
     return kind(domain, size, dpi, options)
 
@@ -293,7 +293,7 @@ def _number(value: float, _: Any = None) -> str:
 
 
 def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
-    """Arrows at the lower and the upper end of a bar of colours, not to be seen yet."""
+    """Make arrows at the lower and the upper end of a bar of colours, not to be seen yet."""
     looks = {"transform": of_bar, "clip_on": False, "edgecolor": "black", "linewidth": 0.8}
     return [
         Polygon(
@@ -389,7 +389,7 @@ class SpacePicture(PlanePicture):
         return (x - self.middle) @ self.view.T
 
     def _draw_edges(self, axis: int, reach: float) -> None:
-        """The four edges along an axis; ticks at the lowest one, of z at the leftmost."""
+        """Draw the four edges along an axis; ticks at the lowest one, of z at the leftmost."""
         others = [k for k in range(3) if k != axis]
         edges = []
         for low_high in product(*((self.lo[k], self.hi[k]) for k in others)):

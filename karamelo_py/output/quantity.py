@@ -67,7 +67,7 @@ class Quantity:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument, words: bool = False) -> Quantity:
-        """The quantity that a script's argument means; errors mark the argument."""
+        """Read the quantity that a script's argument means; errors mark the argument."""
         text = argument.text.strip().strip('"')
         try:
             if text in cls.names(hub) or (words and text == LIMIT):
@@ -91,7 +91,7 @@ class Quantity:
 
     @staticmethod
     def names(hub: Scene) -> list[str]:
-        """Every name that can be logged now."""
+        """List every name that can be logged now."""
         return [*KEYWORDS, *_variables(hub), *hub.values.names()]
 
     @property
@@ -100,7 +100,7 @@ class Quantity:
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
-        """The number now, or the word; of the first that is no number the user is told."""
+        """Read the number now, or the word; of the first that is no number the user is told."""
         if self.is_word:
             return self.hub.simulation.ruling_limit
         number = self._number()
@@ -122,7 +122,7 @@ class Quantity:
         return source
 
     def _source(self) -> Any:
-        """The formula, the content of the variable, or the number behind the name.
+        """Find the formula, the content of the variable, or the number behind the name.
 
         Looked up each time, as the script may set a variable anew between two runs.
         """

@@ -73,7 +73,7 @@ def is_due(every: int | ByTime, step: int, time: float) -> bool:
 
 
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
-    """The first step after `step` that may be due.
+    """Find the first step after `step` that may be due.
 
     While the step is not `fixed` it may grow, so that a longer way is gone by halves.
     """

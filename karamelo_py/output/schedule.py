@@ -109,7 +109,7 @@ class Output:
             self.write(last=True)
 
     def next_step(self, step: int) -> int:
-        """The first step after `step` at which something is due."""
+        """Find the first step after `step` at which something is due."""
         update = self.hub.update
         fixed = update.fixed_dt is not None
         return min(
@@ -200,7 +200,7 @@ class Output:
 
 
 def _located(error: ScriptError, item: Any) -> ScriptError:
-    """The error of an output, with the place of the command that asked for it."""
+    """Make the error of an output, with the place of the command that asked for it."""
     place = getattr(item, "place", None)
     if error.place is None and place is not None:
         error.place = place

@@ -1,4 +1,4 @@
-"""What a run does where a step went wrong, or energy has grown: half the step, or an end."""
+"""Recovery of a run where a step went wrong, or energy has grown: half the step, or an end."""
 
 from typing import Any
 
@@ -89,10 +89,10 @@ class RollBack:
             elif not self._halve_step(status=status):
                 start = None
                 if self.smaller and not simulation.control.clock[0].watch_limit:
-                    start = explain.TooLarge(self.smaller, self.point.step == self.begun_at)
+                    start = explain.StepTooLarge(self.smaller, self.point.step == self.begun_at)
                 explain.stop(hub, simulation, status, self.point, start, self.place)
             return False
-        found = None if simulation.told_of_growth else energy.growth(hub, simulation)
+        found = None if simulation.told_of_growth else energy.words_of_growth(hub, simulation)
         if found is not None:
             if self.returns < RETURNS and self._halve_step(found[0]):
                 self.returns += 1
@@ -107,7 +107,7 @@ class RollBack:
         self.returns = 0
 
     def _keeps_start(self) -> bool:
-        """Whether no state but the first is a good one: the step was too large from there on."""
+        """Tell whether the first state alone is good: the step was too large from there on."""
         return self.point.step == self.begun_at and not self.simulation.control.clock[0].watch_limit
 
     def _halve_step(self, message: str = "", status: int = DONE) -> bool:

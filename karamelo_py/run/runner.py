@@ -150,7 +150,7 @@ class Runner:
 
     @property
     def duration(self) -> float:
-        """How long this run is to be, as far as that is known."""
+        """The length of this run, as far as that is known."""
         simulation = self.hub.simulation
         steps = inf if self.steps is None else self.steps * simulation.dt
         return min(self.end_time - simulation.time, steps)
@@ -229,7 +229,7 @@ class Runner:
             self.hub.console.say(render_message("note", message, hint=hint))
 
     def _tell_of_no_first_step(self) -> None:
-        """A comparison that was forgotten, or turned round, ends a run at once."""
+        """Warn of a comparison that was forgotten, or turned round: it ends a run at once."""
         holds = "holds" if self.until else "does not hold"
         self.hub.warn(
             f"the condition {holds} before the first step of this run: it takes none",
@@ -260,7 +260,7 @@ class Runner:
                 self._show_progress(simulation, anew=timings.since(before, "compilation") > 0)
 
     def _goes_on(self, simulation: Simulation) -> bool:
-        """Whether there is a step to take."""
+        """Tell whether there is a step to take."""
         if not self._steps_left(simulation):
             return False
         if not self._condition_allows():
@@ -275,11 +275,11 @@ class Runner:
         self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
 
     def _steps_left(self, simulation: Simulation) -> bool:
-        """Whether neither the last step nor the end time is reached."""
+        """Tell whether neither the last step nor the end time is reached."""
         return simulation.step < self.last_step and simulation.time < self.end_time
 
     def _condition_allows(self) -> bool:
-        """Whether the condition, if there is one, lets the run go on."""
+        """Tell whether the condition, if there is one, lets the run go on."""
         if self.condition is None:
             return True
         values = self.hub.values
@@ -314,7 +314,7 @@ class Runner:
     # --- around the loop ----------------------------------------------------------------------
 
     def _note(self, number: int, _: Any = None) -> None:
-        """Ctrl-C ends the run after the present chunk; a second one at once.
+        """Note a signal: Ctrl-C ends the run after the present chunk; a second one at once.
 
         So do the signals of batch systems and of terminals that are closed.
         """

@@ -91,7 +91,7 @@ class Timings(event.Listener):
                 cache.keep_time(scene, spent)
 
     def on_start(self, _: Any) -> None:
-        """Numba compiles a function, or another process does, and this one waits for it."""
+        """Note that Numba compiles a function, or that this process waits for one that does."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()
@@ -100,7 +100,7 @@ class Timings(event.Listener):
                 self._words = ""
 
     def on_end(self, _: Any) -> None:
-        """It has."""
+        """Count the time of a compilation that has ended."""
         self._depth -= 1
         if self._depth == 0:
             self.on["compilation"] += _clocks() - self._begun

@@ -1,4 +1,4 @@
-"""What a region leaves of the boxes of points at its edge: volumes and middles.
+"""Clipping of the boxes of points at the edge of a region: volumes and middles.
 
 A region says how far its surface is at least (`Region.depth`), so that a box is looked at only
 where the surface may pass through it. There the surface is a plane, found from that distance at the
@@ -27,7 +27,7 @@ SLOPE = 1e-3  # over the largest: one that is less is none (sums would lose thei
 
 
 class Pieces(NamedTuple):
-    """What lies in a region of boxes through which its surface passes.
+    """Clipped boxes: the parts in a region of boxes through which its surface passes.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Pieces(NamedTuple):
         return cls(*map(np.concatenate, zip(*pieces, strict=True)))
 
     def missed(self, size: float) -> float:
-        """How thick a part must be for its mass to be known; 0 where nothing is as thin."""
+        """Return the least thickness whose mass is known; 0 where nothing is as thin."""
         mostly = self.rough.sum() > MOSTLY * self.share.sum()
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
 
@@ -109,7 +109,7 @@ def join(region: Region, boxes: CellBoxes, pieces: Pieces) -> Pieces:
     nearest, taker = np.full(len(small), np.inf), np.full(len(small), -1)
     # It leans to the side of its box beyond which there is more.
     lean = np.where(middle > boxes.middles(pieces.number[small]), 1, -1)
-    for step in itertools.product((0, 1), repeat=d):
+    for step in np.array(list(itertools.product((0, 1), repeat=d))):
         number = boxes.beside(pieces.number[small], step * lean)
         row = np.minimum(np.searchsorted(pieces.number, number), len(pieces.number) - 1)
         known = pieces.number[row] == number
@@ -141,13 +141,16 @@ def join(region: Region, boxes: CellBoxes, pieces: Pieces) -> Pieces:
     return Pieces(number, middle, share, pieces.rough)
 
 
-def _measure(region: Region, lo: np.ndarray, edges: np.ndarray, size: float):
-    """What is left of boxes of which the surface may pass through: share (n,), its moment (n, d).
+def _measure(
+    region: Region, lo: np.ndarray, edges: np.ndarray, size: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Measure boxes clipped by a surface: share (n,) of a box, its moment (n, d).
 
     In shares of a whole box. Third, how much is rough, see `Pieces`.
     """
     n, d = lo.shape
-    sums, rough = np.zeros((1 + d, n)), np.empty(0)
+    sums: np.ndarray = np.zeros((1 + d, n))
+    rough: np.ndarray = np.empty(0)
     box = np.flatnonzero((edges > NOTHING * size).all(axis=1))
     # One direction after another, as regions look at them: rows are contiguous.
     lo, edges = lo[box].T, edges[box].T
@@ -191,7 +194,7 @@ def _measure(region: Region, lo: np.ndarray, edges: np.ndarray, size: float):
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where a linear function is above 0 in a cube of edge length 1: share (n,), middle (d, n).
+    """Clip a unit cube by a linear function: share (n,) and middle (d, n) of its positive part.
 
     It is `mean` (n,) at the middle of the cube.
     """
@@ -203,7 +206,8 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
         rows = np.flatnonzero(ways == way)
         if len(rows):
             axes = [k for k in range(len(m)) if way >> k & 1]
-            share[rows], middle[np.ix_(axes, rows)] = _simplices(mean[rows], m[np.ix_(axes, rows)])
+            here = np.ix_(np.array(axes), rows)
+            share[rows], middle[here] = _simplices(mean[rows], m[here])
     return share, np.where(slopes > 0, 1 - middle, middle)
 
 

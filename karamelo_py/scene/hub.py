@@ -85,13 +85,13 @@ PARTS = ("eos", "strength", "damage", "temperature")
 
 
 def _group_of(kind: str, ID: str) -> str:
-    """How to make a group of a region or a solid."""
+    """Word the hint that makes a group of a region or a solid."""
     who = f"{ID}, all" if kind == "region" else f"regionID, solid, {ID}"
     return f"group({ID}, particles, region, {who}) makes a group of a {kind}"
 
 
 class Settings:
-    """What the command line or the script chose about how to compute."""
+    """Settings of the command line or the script: threads, precision, processes."""
 
     def __init__(self) -> None:
         self.threads: int | None = None
@@ -192,7 +192,7 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """Whether there is a state that a run has led to, or will have in a rehearsal."""
+        """True once a run has changed the state, or will have in a rehearsal."""
         return bool(self.begun or self.update.step)
 
     @property
@@ -257,7 +257,7 @@ class Hub:
             self._tell_of_late(other)
 
     def lasting(self) -> list[Any]:
-        """What acts, is written or drawn in runs: fixes, dumps and curves."""
+        """List the parts that act in runs: fixes, dumps and curves."""
         return [*self.fixes.values(), *self.dumps.values(), *self.output.plots]
 
     def _tell_of_late(self, rehearsed: Hub) -> None:

@@ -1,6 +1,7 @@
-"""Memory of this machine, and what is said where a scene needs more."""
+"""Memory of this machine, and of a job on it."""
 
-from math import ceil, inf
+import warnings
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,11 +11,9 @@ except ImportError:  # Windows
     resource = None
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import Place, ScriptError
 
 # Of all memory: what the system keeps for itself and gives back when it has to.
 SLACK = 0.03
-GIB = 2**30
 
 # Files of a group of processes, of version 2 and 1: its limit, what it has, and what of that is
 # in caches that can be dropped, as memory.stat calls it.
@@ -54,7 +53,8 @@ def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory 
     import psutil
 
     try:
-        machine, swap = psutil.virtual_memory(), psutil.swap_memory()
+        with warnings.catch_warnings(action="ignore"):  # of numbers that are not needed
+            machine, swap = psutil.virtual_memory(), psutil.swap_memory()
     except (OSError, RuntimeError):
         return None
     left = machine.available + swap.free + SLACK * machine.total
@@ -127,63 +127,3 @@ def most_points(hub: Scene, already: int, dimension: int) -> float:
     found = machine_memory(on_machine(hub))
     whole = inf if found is None else found.whole
     return max(whole / share_of_machine(hub) / of_one - already, 0.0)
-
-
-def in_words(count: float) -> str:
-    """Write a number of bytes."""
-    size = count / GIB
-    return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
-
-
-class MemoryShortage(NamedTuple):
-    """A scene that needs more than is there.
-
-    Attributes
-    ----------
-    what
-        What it has, such as ``400000000 points``.
-    need
-        Bytes, at least.
-    dimension
-        Of the scene: bytes go with that power of the number of cells along a side.
-    place
-        Of the solid.
-    beside
-        What else is to be said of the need, such as of how many processes it is.
-    single
-        What single precision would need; 0 where nobody asks.
-    """
-
-    what: str
-    need: float
-    dimension: int
-    place: Place | None
-    beside: str = ""
-    single: float = 0.0
-
-    @property
-    def words(self) -> str:
-        """Write what it needs."""
-        need = in_words(self.need)
-        return f"the scene has {self.what}, which take at least {need} of memory{self.beside}"
-
-    def ways(self, there: float) -> str:
-        """Write what would bring it down to what is `there`."""
-        # Two digits, rounded up.
-        larger = ceil(10 * (self.need / max(there, 1.0)) ** (1 / self.dimension)) / 10
-        ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
-        if 0 < self.single < there:
-            ways.append(f"precision(single), which needs at least {in_words(self.single)}")
-        ways.append("processes on several machines (mpiexec), which share the points out")
-        return "; ".join(ways)
-
-    def error(self, there: MachineMemory) -> ScriptError:
-        """Make the error for more than there ever is."""
-        message = f"{self.words}; this machine has {in_words(there.whole)} in all"
-        error = ScriptError(message, place=self.place, hint=self.ways(there.whole))
-        error.command = "solid"
-        return error
-
-    def warning(self, there: MachineMemory) -> str:
-        """Write the warning of more than is free: who may have it the system knows alone."""
-        return f"{self.words}; this machine has {in_words(there.free)} free: it may not fit"

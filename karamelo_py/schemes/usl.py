@@ -47,7 +47,7 @@ class USL(NamedTuple):
 
 
 def _thin_edges(scheme, scene):
-    """Whether boxes have edges that moments push."""
+    """Return True if boxes have edges that moments push."""
     boxes = scene.basis.steep_edge and scene.basis.cells > 1
     return scene.moments and boxes and not gradient_weight.defined(type(scene.transfer))
 
@@ -69,7 +69,7 @@ def any_node(s):
     return UpdateToVelocity(real(0, s.nodes.sums[0, MASS]))
 
 
-any_node.goes_through = UpdateToVelocity.goes_through
+any_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defined]
 
 
 class USLUnlimited(NamedTuple):

@@ -18,7 +18,7 @@ class NameScope(Protocol):
         """Find the value of a name."""
 
     def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value:
-        """The value of a call that is not a function."""
+        """Find the value of a call that is not a function."""
 
     def hides(self, name: str) -> bool:
         """Tell if the script uses the name of a function for something else."""
@@ -50,7 +50,7 @@ def evaluate(node: syntax.Node, raw: syntax.Raw, scope: NameScope) -> Value:
 
 
 def mark(raw: syntax.Raw, node: syntax.Node) -> Any:
-    """The place of `node`, a part of `raw`."""
+    """Find the place of `node`, a part of `raw`."""
     return raw.source.place(raw.start + node.start, raw.start + node.end)
 
 
@@ -132,7 +132,7 @@ def usage(name: str) -> str:
 
 
 def _apply(operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw) -> float | Expression:
-    """The operation on numbers, or a formula if one of the values is."""
+    """Do the operation on numbers, or a formula if one of the values is."""
     if any(isinstance(value, Expression) for value in values):
         terms = [Expression(value)._term for value in values]
         try:
@@ -149,7 +149,7 @@ def _apply(operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw) ->
 def _impossible(
     operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw, error: Exception
 ) -> ScriptError:
-    """The error for an operation on constants that has no result."""
+    """Make the error for an operation on constants that has no result."""
     operands = _operands(node)
     shown = ", ".join(f"{value:g}" for value in values)
     if isinstance(error, ZeroDivisionError) or (operation in ("^", "pow") and values[0] == 0):

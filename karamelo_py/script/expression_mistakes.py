@@ -84,7 +84,7 @@ class _Stop(NamedTuple):
         return call and types.count("LPAR") == 1
 
     def mistake(self, message: str, expected: str = _VALUE, hint: str | None = None) -> Mistake:
-        """A mistake that marks what stands here."""
+        """Make a mistake that marks what stands here."""
         return Mistake(message, self.start, self.end, expected, hint)
 
 

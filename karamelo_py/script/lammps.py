@@ -3,9 +3,9 @@
 import math
 import re
 
-from karamelo_py.script import syntax
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script import grammar, syntax
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
+from karamelo_py.script.mistakes import Mistake
 from karamelo_py.script.other_programs import instead, of_karamelo, table
 
 _UNSIGNED = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?[0-2]?\d?\d)?"
@@ -140,8 +140,6 @@ def _formula(text: str, *, of_points: bool) -> str | None:
 
     Of the style atom (`of_points`) x, y and z are positions.
     """
-    from karamelo_py.script.parser import parse_text
-
     same = {"PI", "time", "dt", *("xyz" if of_points else "")}
     tokens = _TOKEN.findall(text)
     compared = [token for token in tokens if re.fullmatch(_COMPARISON, token)]
@@ -162,9 +160,10 @@ def _formula(text: str, *, of_points: bool) -> str | None:
         spaced = re.fullmatch(rf"{_COMPARISON}|&&|\|\|", word)
         ours += f" {word} " if spaced else f"{word} " if word == "," else word
     try:
-        return ours if "**" not in ours and _one_order(parse_text(ours)[1]) else None
-    except ScriptError:
+        tree = grammar.parser_of("expression").parse(ours)
+    except (grammar.refused(), Mistake):
         return None
+    return ours if "**" not in ours and _one_order(tree) else None
 
 
 def _one_order(node: syntax.Node) -> bool:

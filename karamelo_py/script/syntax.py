@@ -23,7 +23,7 @@ class Source:
         return [0] + [m.end() for m in re.finditer("\n", self.text)]
 
     def place(self, start: int, end: int) -> Place:
-        """The place of the characters from offset `start` up to `end`."""
+        """Find the place of the characters from offset `start` up to `end`."""
         start = min(max(start, 0), len(self.text))
         line = bisect_right(self._starts, start) - 1
         first = self._starts[line]
@@ -33,7 +33,7 @@ class Source:
         return Place(self.file, line + 1, start - first + 1, length, self.text[first:last])
 
     def code(self, start: int, end: int) -> str:
-        """The characters from `start` to `end` with comments and line ends made blank."""
+        """Read the characters from `start` to `end` with comments and line ends made blank."""
         text = self.text[start:end]
         if "#" in text or "\n" in text:
             text = _COMMENT_OR_BREAK.sub(

@@ -27,7 +27,7 @@ COMMAND = (sys.executable, "-m", "karamelo_py.app.bench.apart")
 
 
 class Measurement(NamedTuple):
-    """What is to be measured; `triad` is the bandwidth of the memory (bytes/s)."""
+    """Arguments of one measurement; `triad` is the bandwidth of the memory (bytes/s)."""
 
     workload: str
     threads: int

@@ -41,7 +41,7 @@ HEADING = (
 
 
 class ScalingRun(NamedTuple):
-    """What one measurement is to be, and the file for what it finds."""
+    """Arguments of one measurement, and the file for its result."""
 
     workload: str
     ranks: int
@@ -52,7 +52,7 @@ class ScalingRun(NamedTuple):
 
 
 class Scaled(NamedTuple):
-    """What was measured with some processes of some threads each.
+    """Measured speed with some processes of some threads each.
 
     Attributes
     ----------

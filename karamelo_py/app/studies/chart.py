@@ -9,7 +9,7 @@ import numpy as np
 from karamelo_py.app.studies import histories, keeping, look, page, pictures, records, versus
 from karamelo_py.app.studies.curves import Family, missing, order
 from karamelo_py.app.studies.options import add_axes, along, new_parser, out_file, split
-from karamelo_py.app.studies.study import shown, terminal
+from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import holds
 from karamelo_py.script.errors import ScriptError
 
@@ -218,15 +218,9 @@ def keeps(options: Any, rows: list, by: list[str], variables: list[str], made: d
 
 def tell(family: Family, made: dict, *, costs: bool = True) -> None:
     """Print the runs, by cost with the Pareto front marked, and the order of each line."""
-    from rich.table import Table
-
     front = {id(row) for row in family.front()} if costs else set()
-    table = Table(box=None, pad_edge=False)
-    for name in family.by:
-        table.add_column(name, style="cyan", no_wrap=True)
-    for name in [family.along, family.cost if costs else None, family.accuracy]:
-        if name:
-            table.add_column(name, justify="right", no_wrap=True)
+    named = family.along, family.cost if costs else None, family.accuracy
+    table = plain_table(family.by, list(filter(None, named)))
     table.add_column("Pareto" if costs else "", no_wrap=True)
     members = [
         (cost, x, error, line, row)
@@ -238,7 +232,7 @@ def tell(family: Family, made: dict, *, costs: bool = True) -> None:
     for cost, x, error, line, row in members:
         numbers = [shown(float(x))] if family.along else []
         measured = (cost, error) if costs else (error,)
-        numbers += [shown(float(a)) if np.isfinite(a) else "–" for a in measured]
+        numbers += [shown(float(a)) for a in measured]
         end = "front" if id(row) in front else ""
         if np.isnan(error):
             end = (row.get("status", "") + ": " + row.get("reason", ""))[:70]
@@ -250,11 +244,7 @@ def tell(family: Family, made: dict, *, costs: bool = True) -> None:
         pairs[f"{family.accuracy} by {family.along}"] = ("x", "error")
     if family.along and costs:
         pairs[f"{family.cost} by {family.along}"] = ("x", "cost")
-    orders = Table(box=None, pad_edge=False, title="\norders, of all and between neighbours",
-                   title_justify="left")  # fmt: skip
-    orders.add_column("", style="cyan", no_wrap=True)
-    for heading in pairs:
-        orders.add_column(heading, justify="right")
+    orders = plain_table([""], list(pairs), "\norders, of all and between neighbours")
     for line in family.lines:
         fits = (order(getattr(line, x), getattr(line, y)) for x, y in pairs.values())
         orders.add_row(line.label, *map(str, fits))

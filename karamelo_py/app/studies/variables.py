@@ -119,7 +119,7 @@ def cases(
     return found
 
 
-class Scope:
+class NamesOfCase:
     """The names in a formula of an option: numbers and texts, and words that stand for themselves.
 
     Parameters
@@ -158,9 +158,9 @@ class Scope:
 
 
 def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) -> bool:
-    """Whether a condition in the language of scripts holds for a case."""
+    """Evaluate a condition in the language of scripts for a case."""
     raw, node = parse_text(condition, "-where")
-    value = evaluate(node, raw, Scope("-where", case, words))
+    value = evaluate(node, raw, NamesOfCase("-where", case, words))
     if not isinstance(value, float):
         raise ScriptError(f"-where {condition} is neither true nor false")
     return value != 0

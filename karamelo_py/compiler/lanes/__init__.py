@@ -4,7 +4,7 @@ A kernel that indexes arrays of points, (components, points), with a `Group` ins
 gets `Lanes`: one number for each of 4 or 8 points that lie one after another. Lanes add, multiply
 and compare like numbers, node numbers made of them gather from arrays of nodes, (nodes,
 components), and `accumulate` scatters to them, lane after lane in the order of the points. Point
-functions need not know; powers and logarithms are taken one lane after another (`one_by_one`).
+functions need not know; powers and logarithms are taken one lane after another (`scalarised`).
 Results of a lane are those of the same operations on numbers, to the last bit; sums at nodes
 differ from those of points one by one by their rounding.
 

@@ -13,6 +13,8 @@ from numba.np.arrayobj import populate_array
 from karamelo_py.compiler.compile import (
     beside,
     by_type,
+    implements,
+    index,
     is_one,
     lanes_of,
     of_present,
@@ -25,7 +27,6 @@ from karamelo_py.compiler.lanes.registers import (
     I64,
     Lanes,
     constant,
-    known,
     lane,
     pack,
     shape,
@@ -152,11 +153,9 @@ def _present(typing_context, p):
     return mask(p), codegen
 
 
-@by_type(of_present)
+@implements(of_present, LaneGroup)
 def _of_present(p, value):
-    if isinstance(p, LaneGroup):
-        return lambda p, value: select(_present(p), value, real(0, value))
-    return None
+    return select(_present(p), value, real(0, value))
 
 
 def pointer_to(context, builder, kind, array, indices, last=None):
@@ -306,9 +305,7 @@ def _prefetch(typing_context, array, at):
     return types.void(array, at), codegen
 
 
-@by_type(prefetch)
-def _prefetch_by_type(array, at):
-    return (lambda array, at: _prefetch(array, at)) if isinstance(_last(at), LaneGroup) else None
+implements(prefetch, LaneGroup)(_prefetch)
 
 
 @intrinsic
@@ -367,16 +364,16 @@ def _head(at: Any) -> Any:
 @by_type(operator.getitem)
 def _get(array, at):
     if isinstance(array, types.Array) and isinstance(_last(at), LaneGroup):
-        return lambda array, at: _load_points(array, at)
+        return _load_points
     if isinstance(array, types.Array) and isinstance(_head(at), Lanes | Beside):
-        return lambda array, at: _gather(array, at)
+        return _gather
     return None
 
 
 @by_type(operator.setitem)
 def _set(array, at, value):
     if isinstance(array, types.Array) and isinstance(_last(at), LaneGroup):
-        return lambda array, at, value: _store_points(array, at, value)
+        return _store_points
     return None
 
 
@@ -391,7 +388,7 @@ def _is_one(typing_context, nodes):
     return types.boolean(nodes), codegen
 
 
-known(is_one, _is_one)
+implements(is_one, Lanes)(_is_one)
 
 
 @intrinsic
@@ -406,4 +403,5 @@ def _beside(typing_context, first, steps):
     return made(first, types.intp), codegen
 
 
-known(beside, _beside)
+implements(beside, Lanes)(_beside)
+implements(index, Beside)(lambda i: i)

@@ -4,7 +4,7 @@ from math import prod
 from types import MappingProxyType
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, choose, index, real, shared
+from karamelo_py.compiler.compile import Weighted, index, real, shared, where
 from karamelo_py.compiler.powers import power
 from karamelo_py.compiler.symbols import Symbol, call
 from karamelo_py.compiler.tuples import scale
@@ -290,7 +290,7 @@ def _carry(kin, place: Vector, corner: Number, u: Vector):
     d = kin.dimension
 
     def half(i):
-        outward = call(choose, Symbol(f"{{}} & {1 << i}", corner), u[i], -u[i])
+        outward = call(where, Symbol(f"{{}} & {1 << i}", corner), u[i], -u[i])
         return place[d + i] + 0.5**d * outward
 
     return kin.vector(lambda i: place[i]) + kin.vector(half)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, in_all, real, shared
+from karamelo_py.compiler.compile import all_lanes, real, shared, where
 from karamelo_py.points.basis.noise import CUBIC
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.basis.wide import wide
@@ -77,9 +77,9 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
     )
     line = Along(cell - 1, r, weights, gradients, affine)
     bulk = (cell >= 1) & (cell < last - 1)
-    if in_all(bulk):
+    if all_lanes(bulk):
         return line
-    return choose(bulk, line, _at_wall(grid, a, last))
+    return where(bulk, line, _at_wall(grid, a, last))
 
 
 @shared
@@ -93,14 +93,14 @@ def _at_wall(grid, a, last):
         gradients = (zero - grid.inv_h, zero + grid.inv_h, zero, zero)
         return Along(first, r, (one - r, r, zero, zero), gradients, gradients)
     lower = cell == 0
-    n, g, c = _beside_wall(grid, choose(lower, a, real(last, a) - a))
-    n = choose(lower, n, (n[2], n[1], n[0]))
-    g = choose(lower, g, (-g[2], -g[1], -g[0]))
-    c = choose(lower, c, (-c[2], -c[1], -c[0]))
+    n, g, c = _beside_wall(grid, where(lower, a, real(last, a) - a))
+    n = where(lower, n, (n[2], n[1], n[0]))
+    g = where(lower, g, (-g[2], -g[1], -g[0]))
+    c = where(lower, c, (-c[2], -c[1], -c[0]))
     behind = (cell > 0) & (last > 2)  # they are the last three of the four
-    n = choose(behind, (zero,) + n, n + (zero,))
-    g = choose(behind, (zero,) + g, g + (zero,))
-    c = choose(behind, (zero,) + c, c + (zero,))
+    n = where(behind, (zero,) + n, n + (zero,))
+    g = where(behind, (zero,) + g, g + (zero,))
+    c = where(behind, (zero,) + c, c + (zero,))
     return Along(first, r, n, g, c)
 
 

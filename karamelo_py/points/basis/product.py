@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import (
     beside,
-    choose,
     define,
     first_lane,
     is_one,
     point_function,
     real,
     shared,
+    where,
 )
 from karamelo_py.compiler.symbols import Symbol, call, written
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
@@ -90,14 +90,14 @@ def evenly(basis, grid, stencil):
 @shared
 def hoop(weight, gradient, inv_r):
     """N / r at an axisymmetric point; at r = 0 its limit, dN/dr (`inv_r` is 0 there)."""
-    return choose(inv_r > 0, weight * inv_r, gradient)
+    return where(inv_r > 0, weight * inv_r, gradient)
 
 
 @shared
 def inverse_radius(r):
     """1 / r, or 0 on the axis and so close to it that 1 / r would overflow."""
     least = real(1e-30, r)
-    return choose(r > least, real(1, r) / max(r, least), real(0, r))
+    return where(r > least, real(1, r) / max(r, least), real(0, r))
 
 
 @shared

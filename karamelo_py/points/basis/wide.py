@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from karamelo_py.language.rules import saving
+from karamelo_py.language.rules import suggestion
 
 
 def wide(basis: type) -> None:
     """Let functions of four nodes a direction be judged where no point crosses cells."""
-    saving(
+    suggestion(
         basis,
         when=_seen,
         cost="{scene.basis_name} sees {nodes} nodes a point; in a total Lagrangian method no point "

@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import choose, point_function, real, round_off, shared
+from karamelo_py.compiler.compile import point_function, real, round_off, shared, where
 from karamelo_py.compiler.tuples import add, scale, subtract
 from karamelo_py.points.kinematics.components import Number, formula
 from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
@@ -38,8 +38,8 @@ def _principal_axisymmetric(kin, s):
     values = (mean + radius, mean - radius, s[2])
     one = real(1, s[0])
     turned = radius > 0
-    over = choose(turned, radius, one)
-    return values, (choose(turned, apart / over, one), s[3] / over)
+    over = where(turned, radius, one)
+    return values, (where(turned, apart / over, one), s[3] / over)
 
 
 @from_principal.on(PlaneStrain)
@@ -57,9 +57,9 @@ def _from_principal_axisymmetric(kin, values, frame):
 def _rotation(a, b, c):
     """Cosine, sine and tangent of the rotation that makes c vanish in [[a, c], [c, b]]."""
     one = real(1, a)
-    cotangent = (b - a) / choose(c == 0, one, c + c)
+    cotangent = (b - a) / where(c == 0, one, c + c)
     t = one / (abs(cotangent) + sqrt(cotangent * cotangent + one))
-    t = choose(c == 0, real(0, a), choose(cotangent < 0, -t, t))
+    t = where(c == 0, real(0, a), where(cotangent < 0, -t, t))
     cosine = one / sqrt(t * t + one)
     return cosine, t * cosine, t
 

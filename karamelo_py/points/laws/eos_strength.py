@@ -11,9 +11,9 @@ a plug-in's, are chained (`karamelo_py.points.laws.further`).
 from math import inf, isinf, log
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose
+from karamelo_py.compiler.compile import where
 from karamelo_py.compiler.tuples import added, increased, only
-from karamelo_py.language.rules import saving
+from karamelo_py.language.rules import suggestion
 from karamelo_py.points.kinematics import tensors
 from karamelo_py.points.laws import (
     Absent,
@@ -146,13 +146,13 @@ def _idle_heat(law, scene):
     return not (isinstance(law.temperature, Absent) or softens or presses or wears)
 
 
-saving(
+suggestion(
     EosStrength,
     when=_idle_damage,
     cost="material {owner.id} has a damage by plastic strain, and never yields",
     instead="leave the damage out",
 )
-saving(
+suggestion(
     EosStrength,
     when=_idle_heat,
     cost="the temperature of material {owner.id} changes nothing but its column T",
@@ -240,7 +240,7 @@ def _energy_density_eos_strength(law, kin, state):
     volume += only(thermal_pressure(law.temperature, m.heat)) * (1 - J)
     tension = composed.intact_pressure(law, J, m) < 0
     share = composed.borne_share(law.damage, m.damage, J)
-    volume = choose(tension, share * volume, volume)
+    volume = where(tension, share * volume, volume)
     return volume + J * (share * strengths.shear_energy(law.strength, kin, s))
 
 

@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, real
+from karamelo_py.compiler.compile import real, where
 from karamelo_py.points import laws
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.further import Further, initial_part, part_after
@@ -36,7 +36,7 @@ def _initial_part_plastic_rate(part, like):
 @part_after.on(PlasticRate)
 def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
     ep = equivalent_plastic_strain(law.strength, memories.strength)
-    before = choose(memory[1] < 0, ep, memory[1])
+    before = where(memory[1] < 0, ep, memory[1])
     change = (ep - before - dt * memory[0]) / part.time
     return (max(memory[0] + change, real(0, j)), ep)
 

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from karamelo_py.language.rules import saving
+from karamelo_py.language.rules import suggestion
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics.tensors import I, symmetric_tensor
 from karamelo_py.points.laws.elasticity import LameParameters
@@ -32,7 +32,7 @@ class Thermoelastic(NamedTuple):
     heat: Any
 
 
-saving(
+suggestion(
     Thermoelastic,
     when=lambda law, scene: not scene.hub.update.thermal,
     cost="material {owner.id} has a temperature, and no heat flows",

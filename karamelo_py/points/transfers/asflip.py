@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import choose, real
+from karamelo_py.compiler.compile import real, where
 from karamelo_py.compiler.tuples import add_scaled, subtract
 from karamelo_py.language.kinds import In
 from karamelo_py.language.rules import known_failure
@@ -69,7 +69,7 @@ def _known_volume_asflip(transfer, law, kin, state):
 @displacing_velocity.on(ASFLIP)
 def _displacing_velocity_asflip(transfer, v, v_pic, j):
     one = real(1, j)
-    beta = choose(one - j < real(COMPRESSED, j), transfer.beta * one, j - j)
+    beta = where(one - j < real(COMPRESSED, j), transfer.beta * one, j - j)
     return add_scaled(v_pic, beta, subtract(v, v_pic))
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from functools import cached_property
+from itertools import chain
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -35,28 +36,43 @@ class SceneFacts:
         The scene, and what steps it.
     duration
         Of the run; that of some hundred steps where a condition ends it.
-    d
-        Number of dimensions.
+    d, corners
+        Number of dimensions, and of the corners of a cell.
     method, basis, transfer, scheme
         Its parts.
     basis_name, transfer_name
         Words of the script for two of them.
-    moves
-        Whether points move through the grid.
+    moves, moments, vanishing
+        Whether points move through the grid; with moments or gradients of their velocity; through
+        places at which D of the affine transfers vanishes.
+    kept
+        The share of FLIP, of transfers that keep velocities alone.
+    linear
+        Whether gradients jump at the faces of cells, with nodes at their corners alone.
+    elastic
+        The solids of laws that store all work, and bear tension.
+    single, sparse
+        IDs of the solids with about one point a cell and direction, and whether there are some.
     """
 
     def __init__(self, hub: Hub, simulation: Any, duration: float):
         self.hub, self.simulation = hub, simulation
         self.duration = duration if isfinite(duration) else 300 * simulation.dt
-        self.method, self.transfer, self.scheme = (
-            getattr(hub.update, name) for name in ("method", "transfer", "scheme")
-        )
-        self.basis, self.basis_name = self.method.basis, self.method.basis_name
+        self.method, self.scheme = hub.update.method, hub.update.scheme
+        self.transfer, self.basis = hub.update.transfer, self.method.basis
+        self.basis_name = self.method.basis_name
         self.transfer_name = registry.name_of("transfer", type(self.transfer))
-        self.moves = self.method.frame.moves
-        self.d = hub.domain.dimension
-
-    # --- parts ---------------------------------------------------------------------------------
+        self.d, self.moves = hub.domain.dimension, self.method.frame.moves
+        self.corners, keeps = 2**self.d, Moment in getattr(self.transfer, "point_fields", ())
+        self.moments = self.moves and keeps
+        self.vanishing = self.moves and not self.basis.steady_moment
+        self.kept = 0.0 if keeps else getattr(self.transfer, "alpha", 0.0)
+        jumps = getattr(self.basis, "gradient_jumps", False)
+        self.linear = jumps and self.basis.nodes_per_cell == 1
+        solids = hub.solids.values()
+        self.elastic = [s for s in solids if getattr(s.material.law, "rebounds", False)]
+        self.single = [s.id for s in solids if timestep.one_a_cell(s)]
+        self.sparse = bool(self.single)
 
     def parts(self) -> Iterator[tuple[Any, Any]]:
         """Give the parts, each once, and the materials that laws and their parts belong to."""
@@ -64,12 +80,11 @@ class SceneFacts:
         found = [(fix, None) for fix in self.hub.fixes.values()]
         found += [(part, one) for one in materials for part in law_parts(one.law)]
         found += [(one, None) for one in (self.method, self.basis, self.transfer, self.scheme)]
-        fields: dict[type, None] = {}
-        for part, _ in found:
-            fields |= dict.fromkeys(getattr(part, "point_fields", ()))
-            fields |= dict.fromkeys(getattr(part, "node_fields", ()))
         yield from found
-        yield from ((field, None) for field in fields)
+        fields = [
+            getattr(part, f"{at}_fields", ()) for part, _ in found for at in ("point", "node")
+        ]
+        yield from ((field, None) for field in dict.fromkeys(chain(*fields)))
 
     def advice(self, kind: str) -> Iterator[rules.Advice]:
         """Tell what the rules of the parts say, of one kind."""
@@ -79,62 +94,19 @@ class SceneFacts:
                 said = list(rules.advice(kind, part, owner, self))
             yield from said
 
-    @property
-    def elastic(self) -> list[Any]:
-        """The solids of laws that store all work, and bear tension."""
-        return [s for s in self.hub.solids.values() if getattr(s.material.law, "rebounds", False)]
-
-    @property
-    def moments(self) -> bool:
-        """Whether points move through the grid, with moments or gradients of their velocity."""
-        return self.moves and Moment in getattr(self.transfer, "point_fields", ())
-
-    @property
-    def vanishing(self) -> bool:
-        """Whether points move through places at which D of the affine transfers vanishes."""
-        return self.moves and not self.basis.steady_moment
-
-    @property
-    def kept(self) -> float:
-        """The share of FLIP, of transfers that keep velocities alone."""
-        moments = Moment in getattr(self.transfer, "point_fields", ())
-        return 0.0 if moments else getattr(self.transfer, "alpha", 0.0)
-
-    @property
-    def linear(self) -> bool:
-        """Whether gradients jump at the faces of cells, with nodes at their corners alone."""
-        return getattr(self.basis, "gradient_jumps", False) and self.basis.nodes_per_cell == 1
-
-    @property
-    def corners(self) -> int:
-        """Number of corners of a cell."""
-        return 2**self.d
-
-    @property
-    def sparse(self) -> bool:
-        """Whether a solid has about one point a cell and direction."""
-        return timestep.sparse(self.hub)
-
-    @property
-    def single(self) -> list[str]:
-        """The solids with one point a cell."""
-        return [s.id for s in self.hub.solids.values() if timestep.one_a_cell(s)]
-
-    # --- motion --------------------------------------------------------------------------------
-
     @cached_property
     def motions(self) -> list[BodyMotion]:
-        """How the solids move."""
+        """Motions of the solids."""
         return self.simulation.motions()
 
     @cached_property
     def drift(self) -> Noise | None:
-        """What a drift through the grid feeds, at most."""
+        """Noise of a drift through the grid, at most."""
         return drift_of(self)
 
     @cached_property
     def rotation(self) -> Noise | None:
-        """What a turn through the grid feeds, at most."""
+        """Noise of a turn through the grid, at most."""
         return turn_of(self)
 
     @cached_property
@@ -146,7 +118,7 @@ class SceneFacts:
 
     @property
     def turns(self) -> bool:
-        """Whether a solid turns by an angle that counts."""
+        """Tell whether a solid turns by an angle that counts."""
         return self.turn > TURN
 
     @cached_property
@@ -177,7 +149,7 @@ class SceneFacts:
 
     @cached_property
     def vibration(self) -> Vibration:
-        """How the solid swings that does so most."""
+        """Vibration of the solid that swings most."""
         most = Vibration(0.0, 0.0)
         for one in self.motions if self.waves > 0 else ():
             strain = one.rate * one.size / (2 * self.waves)

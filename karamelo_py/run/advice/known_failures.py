@@ -85,8 +85,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     _warn_about_precision(scene)
     warn_about_rest(hub, simulation, duration)
     for one in (*scene.advice("failure"), *_impossible_speeds(scene), *_other_units(scene)):
-        if one.name not in hub.update.foreseen:
-            hub.update.foreseen.append(one.name)
+        if hub.update.first_time(one.name):
             place = one.place or hub.update.method.place
             hub.warn(f"{one.name}: {one.reason}", place=place, hint=one.cure)
 

@@ -28,7 +28,7 @@ class Step(NamedTuple):
 
     @property
     def command(self) -> str:
-        """What the script asks for it by."""
+        """Command by which the script asks for it."""
         return "set_dt" if self.fixed_dt else "dt_factor"
 
     @property
@@ -49,8 +49,8 @@ def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> S
 
 
 def step_was_told(hub: Hub) -> bool:
-    """Whether a warning has said that the step is above the stable limit, and what to write."""
-    return step_of(hub, False).name in hub.update.foreseen
+    """Tell whether a warning has said that the step is above the stable limit."""
+    return step_of(hub, False).name in hub.update.warned_of
 
 
 def warn_about_steps(
@@ -63,7 +63,7 @@ def warn_about_steps(
     Raises
     ------
     ScriptError
-        See `foresight.warn`.
+        See `known_failures.warn`.
     """
     present = step_of(hub, halves)
     _warn_about_step(hub, simulation, present, again=again)
@@ -74,7 +74,7 @@ def warn_about_steps(
 
 
 def duration_of_later(hub: Hub, simulation: Simulation) -> float:
-    """How long the runs behind the next one are that have the same scene, as far as is known."""
+    """Duration of the runs behind the next one that have the same scene, as far as is known."""
     present = step_of(hub, False).scene
     later = [step for step in hub.later[len(hub.runs) :] if step.scene == present]
     spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
@@ -107,7 +107,5 @@ def _warn_about_step(
         if step.fixed_dt and asked > MIXED * limit and limit != of_heat:
             words += f"; {mixed_units(hub, simulation)}"
             hint = f"{UNITS}. If they are as they should be, {hint}"
-    told = hub.update.foreseen
-    if again or step.name not in told:
-        told += [step.name] * (step.name not in told)
+    if hub.update.first_time(step.name) or again:
         hub.warn(words, place=step.place, hint=hint)

@@ -10,7 +10,7 @@ from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.advice.known_failures import refuse_endless_speeds
-from karamelo_py.run.advice.savings import savings
+from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
 from karamelo_py.run.lower.sizes import memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines
@@ -72,13 +72,13 @@ def report(hub: Hub, end_time: float = inf) -> None:
     say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")
     for stage in stages(hub, simulation):
         say(f"  {stage}")
-    found = savings(hub, simulation)
+    found = suggestions(hub, simulation)
     if found:
         say("")
         say("could be left out")
-    for saving in found:
-        say(f"  {saving.cost}")
-        say(f"    instead: {saving.instead}")
+    for suggestion in found:
+        say(f"  {suggestion.reason}")
+        say(f"    instead: {suggestion.cure}")
 
 
 def _size(count: float) -> str:

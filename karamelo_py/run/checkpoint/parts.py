@@ -1,4 +1,4 @@
-"""What parts of a scene remember from state to state, to go back to and to write.
+"""States of the parts of a scene: what they remember, to go back to and to write.
 
 A part names the attributes in which it keeps what it has seen or added up::
 
@@ -32,7 +32,7 @@ Key = tuple[str, str, str]  # family, ID and style of a part
 
 
 class PartStates(NamedTuple):
-    """What parts remembered at one state, as JSON knows it, and the values published then."""
+    """The memories of parts at one state, as JSON knows them, and the values published then."""
 
     parts: dict[Key, dict[str, Any]]
     arrays: list[np.ndarray]  # by the numbers that they have in it

@@ -62,7 +62,7 @@ class Restarts(Rhythmic):
 
 
 def path_of(hub: Hub, file: Path) -> Path:
-    """The file of the present state."""
+    """Name the file of the present state."""
     return hub.folder / str(file).replace("*", str(hub.update.step), 1)
 
 
@@ -140,7 +140,7 @@ def _put(group: Any, found: Iterator[Stored]) -> None:
 
 
 def is_restart(path: Path) -> bool:
-    """Whether a file is one to go on from."""
+    """Tell whether a file is one to go on from."""
     import h5py
 
     try:
@@ -194,11 +194,11 @@ class Restart:
 
     @property
     def runs(self) -> list[dict[str, float]]:
-        """The values at the end of each run that was over."""
+        """Values at the end of each run that was over."""
         return self.content["runs"]
 
     def presets(self, given: dict[str, str]) -> dict[str, str]:
-        """Variables from the command line of the run that wrote the file; `given` ones are those.
+        """Return the variables of the command line that wrote the file; `given` ones are those.
 
         Raises
         ------
@@ -218,7 +218,7 @@ class Restart:
         return before
 
     def replay(self) -> Replay:
-        """What the script has to be, up to the state of the file."""
+        """Return what the script has to be, up to the state of the file."""
         values = {int(k): found for k, found in self.content["values of statements"]}
         record = Record(self.content["statements"], values)
         return Replay(record, self.content["within"], str(self.path))
@@ -270,7 +270,7 @@ def _latest(path: Path) -> Path:
 
 
 def _no_file(path: Path) -> ScriptError:
-    """What is said of a file that is not there: -out has put its like a folder below, perhaps."""
+    """Return the error for a file that is missing: -out has put its like below, perhaps."""
     below = sorted(path.parent.glob(f"*/{path.name}")) if path.parent.is_dir() else ()
     return ScriptError(
         f"there is no file {path}",
@@ -284,7 +284,7 @@ def _no_file(path: Path) -> ScriptError:
 
 
 def described(hub: Hub) -> dict[str, str]:
-    """What has to be the same for a state to fit, in words."""
+    """Describe what has to be the same for a state to fit."""
     update, domain = hub.update, hub.domain
     box = zip(domain.lo, domain.hi, strict=True)
     words = {

@@ -1,4 +1,4 @@
-"""What went wrong in a run: found, explained, and the last good state written."""
+"""Troubles of a run: found, explained, and the last good state written."""
 
 import os
 from collections.abc import Iterator
@@ -9,6 +9,7 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels import growth
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, STOPPED
 from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
 from karamelo_py.output.fields import Fields
@@ -40,14 +41,14 @@ class OthersWait(Exception):
 
 
 class Trouble(NamedTuple):
-    """What went wrong, what can be done, and the line of the script at fault where one is known."""
+    """Trouble of a run, what can be done, and the line of the script at fault, if known."""
 
     message: str
     hint: str
     place: Place | None = None
 
 
-class TooLarge(NamedTuple):
+class StepTooLarge(NamedTuple):
     """A step above the stable limit of the start of a run: nothing behind that is a good state."""
 
     smaller: str  # what to write instead, by that limit
@@ -55,7 +56,7 @@ class TooLarge(NamedTuple):
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
-    """What went wrong in a step, and what can be done."""
+    """Find what went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
         return Trouble(*_above_limit(hub, simulation), hub.update.dt_place)
     if status == SHRUNK:
@@ -78,7 +79,7 @@ def stop(
     simulation: Simulation,
     status: int,
     good: RollbackPoint,
-    start: TooLarge | None,
+    start: StepTooLarge | None,
     place: Place | None,
 ) -> NoReturn:
     """Return to the last good state, write it, and raise what the user should know.
@@ -99,7 +100,7 @@ def stop(
 
 
 def _keep_start(
-    hub: Hub, simulation: Simulation, status: int, good: RollbackPoint, start: TooLarge
+    hub: Hub, simulation: Simulation, status: int, good: RollbackPoint, start: StepTooLarge
 ) -> str:
     """Write the state that the run began with, end the outputs, and say how to begin anew."""
     step, path = simulation.step, None
@@ -137,9 +138,7 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, good: RollbackPoin
     if status not in (GAINED, HEATED) and step > simulation.step:
         before = simulation.energy()
         good.again(simulation.advance, step)
-        if path is None and simulation.energy() - before > energy.IN_ALL * max(
-            abs(before), float(simulation.control.clock[0].energy_floor)
-        ):
+        if path is None and energy.growth_since(simulation, before) > growth.WITHIN:
             # The watch looks at means of a hundred steps, and has not seen it yet.
             grown = True
             _return_before_growth(simulation, good, step)
@@ -175,7 +174,7 @@ def _return_before_growth(simulation: Simulation, good: RollbackPoint, end: int)
 
 
 def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
-    """Whether a step went wrong because points leave the domain, with no more energy than before.
+    """Tell whether a step went wrong since points leave the domain, at no more energy.
 
     No smaller step keeps these. Where nobody watches energy, who knows.
     """
@@ -187,9 +186,8 @@ def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
     before, steps = simulation.energy(), step - simulation.step
     if steps:
         simulation.advance(steps)
-    gain = simulation.energy() - before
-    floor = float(simulation.control.clock[0].energy_floor)
-    healthy = gain <= energy.IN_ALL * max(abs(before), floor) and not simulation.above_limit()
+    kept = energy.growth_since(simulation, before) <= growth.WITHIN
+    healthy = kept and not simulation.above_limit()
     simulation.advance(1)  # which goes wrong again, for others to look at
     return healthy
 
@@ -295,7 +293,7 @@ def _first_wrong(simulation: Simulation) -> Wrong | None:
 
 
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
-    """What is wrong with the first point that went wrong, and what can be done."""
+    """Find what is wrong with the first point that went wrong, and what can be done."""
     wrong = [one for one in simulation.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
         return no_number(
@@ -359,13 +357,13 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
 
 
 def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> bool:
-    """Whether a point has a solid of others, none of which is near."""
+    """Tell whether a point has a solid of others, none of which is near."""
     others, near = np.sum(simulation.seen(_others, number, x, reach), axis=0)
     return others > 0 and near == 0
 
 
 def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> tuple[int, int]:
-    """How many other points of the solid of a point are at hand, and how many are near it."""
+    """Count the other points of the solid of a point, at hand and near it."""
     solid, others, near = solid_with(simulation.hub, number), 0, 0
     for some in simulation.some(None):
         own = (some.solid_of == solid.index) & (some.ids != number)
@@ -375,7 +373,7 @@ def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) ->
 
 
 def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
-    """Whether the domain of a point, whose corners move, is folded over."""
+    """Tell whether the domain of a point, whose corners move, is folded over."""
     s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return False
@@ -383,7 +381,7 @@ def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
 
 
 def _smaller_step(hub: Hub, simulation: Simulation) -> str:
-    """How to take a smaller step, and whether the present one is too large for sure.
+    """Say how to take a smaller step, and that the present one is too large where it is.
 
     One that was so from the start on has ruined the state, and its limit with it.
     """
@@ -410,7 +408,7 @@ def _write_last_good(hub: Hub) -> Path | None:
     path = restart_file.path_of(hub, Path(LAST_GOOD))
     may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
     if hub.output.takes_part and may_be:
-        with _told(hub):
+        with _as_warnings(hub):
             written.append(restart_file.write(hub, Path(LAST_GOOD), within=True))
             # The files of restart(...) would hold the same once more.
             for item in hub.output.last:
@@ -419,13 +417,13 @@ def _write_last_good(hub: Hub) -> Path | None:
 
 
 def _end_outputs(hub: Hub) -> None:
-    with _told(hub):
+    with _as_warnings(hub):
         hub.output.write(last=True)
 
 
 @contextmanager
-def _told(hub: Hub) -> Iterator[None]:
-    """What prevents writing is told as a warning: another error is on its way."""
+def _as_warnings(hub: Hub) -> Iterator[None]:
+    """Warn of what prevents writing: another error is on its way."""
     try:
         yield
     except ScriptError as error:

@@ -53,7 +53,7 @@ def _one(setup: Any) -> Any:
 
 @contextmanager
 def _trial(hub: Hub, part: PartInUse) -> Iterator[None]:
-    """Faults are told; numbers that one point happens not to stand are not what this is about."""
+    """Tell of faults; numbers that one point happens not to stand are not what this is about."""
     with attributed(hub, part), np.errstate(all="ignore"):
         try:
             yield

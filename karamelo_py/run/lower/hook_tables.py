@@ -22,7 +22,7 @@ NO_PROGRAM = (-1, -1, -1, -1)
 def lower_hooks(
     hub: Hub, fixes: list, mode: Any = None, threads: int = 1
 ) -> arrays.Hooks | arrays.NoHooks:
-    """Tables of the compiled hooks of `fixes`, in their order; by one thread, or several."""
+    """Make the tables of the compiled hooks of fixes, in their order; by one thread, or several."""
     dimension = hub.domain.dimension
     count = sum(s.count for s in hub.solids.values())
     builder = _Builder(hub, count)
@@ -51,7 +51,7 @@ def lower_hooks(
 
 
 def _apart(threads: int, values: int) -> arrays.Apart:
-    """Room for what threads have of their own, with space between the values of two."""
+    """Make room for what threads have of their own, with space between the values of two."""
     return arrays.Apart(
         chosen=np.zeros((threads, BLOCK), np.int64),
         scratch=np.zeros((threads, STACK + ROWS, BLOCK)),
@@ -105,7 +105,7 @@ class _Builder:
             self.loaded_nodes = fix.group.total()
 
     def shared_nodes(self) -> int:
-        """The number of nodes, where hooks hold some of them in common; else 0."""
+        """Count the nodes, where hooks hold some of them in common; else 0."""
         fixes = self.holding
         if len(fixes) < 2:
             return 0

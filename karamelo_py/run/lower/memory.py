@@ -4,6 +4,7 @@ What is compared is the least that a run has to hold: of what would run nothing 
 """
 
 import gc
+from math import ceil
 
 import numpy as np
 
@@ -11,15 +12,11 @@ from karamelo_py.kernels.arrays import SUMS_WIDTH, UPDATE_WIDTH, VELOCITY_WIDTH,
 from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, part_of, point_kinds
 from karamelo_py.run.lower.sizes import point_fields
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.machine_memory import (
-    MemoryShortage,
-    machine_memory,
-    on_machine,
-    share_of_machine,
-)
+from karamelo_py.scene.machine_memory import machine_memory, on_machine, share_of_machine
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
 
+GIB = 2**30
 FEW = 100_000  # points; so many have room everywhere
 
 
@@ -50,17 +47,39 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         there = machine_memory(on_machine(hub)) or there
     if need <= there.free:
         return
-    found = MemoryShortage(
-        plural(count, "point"),
-        need,
-        hub.domain.dimension,
-        _largest(hub).place,
-        f" for {comm.on_machine} of {comm.size} processes" if share < 1 else "",
-        share * least_bytes(hub, np.float32, copied) if hub.settings.precision == "double" else 0.0,
+    place, beside = _largest(hub).place, ""
+    if share < 1:
+        beside = f" for {comm.on_machine} of {comm.size} processes"
+    message = (
+        f"the scene has {plural(count, 'point')}, which take at least {in_words(need)} of memory"
+        f"{beside}; this machine has "
     )
-    if need > there.whole:
-        raise found.error(there)
-    hub.warn(found.warning(there), place=found.place, hint=found.ways(there.free))
+    if need <= there.whole:  # who may have it the system knows alone
+        message += f"{in_words(there.free)} free: it may not fit"
+        hub.warn(message, place=place, hint=_ways(hub, need, there.free, copied))
+        return
+    hint = _ways(hub, need, there.whole, copied)
+    error = ScriptError(f"{message}{in_words(there.whole)} in all", place=place, hint=hint)
+    error.command = "solid"
+    raise error
+
+
+def in_words(count: float) -> str:
+    """Write a number of bytes."""
+    size = count / GIB
+    return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
+
+
+def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
+    """Write what would bring the need down to what is `there`."""
+    # Bytes go with that power of the number of cells along a side; two digits, rounded up.
+    larger = ceil(10 * (need / max(there, 1.0)) ** (1 / hub.domain.dimension)) / 10
+    ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
+    single = share_of_machine(hub) * least_bytes(hub, np.float32, copied)
+    if hub.settings.precision == "double" and single < there:
+        ways.append(f"precision(single), which needs at least {in_words(single)}")
+    ways.append("processes on several machines (mpiexec), which share the points out")
+    return "; ".join(ways)
 
 
 def least_bytes(hub: Hub, real: type, copied: bool) -> float:

@@ -16,7 +16,7 @@ from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, no_nodes, summe
 from karamelo_py.run.tiles.tiles import SHARES
 from karamelo_py.run.timestep import sparse
 from karamelo_py.scene.comm import SerialComm
-from karamelo_py.styles.fixes.pairs import SENT, PairContact
+from karamelo_py.styles.fixes.pairs import SENT
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 
@@ -182,7 +182,7 @@ def report_lines(simulation: Simulation, ranks: int) -> list[str]:
             f"gives back {moved >> 20} MiB, and has the memory of a single one"
         )
     for fix in simulation.hub.fixes.values():
-        if isinstance(fix, PairContact):
+        if hasattr(fix, "sent"):
             lines.append(
                 f"  fix {fix.style} '{fix.id}' has the first process look at all points that may "
                 f"touch ({fix.sent(simulation)} now), and needs {SENT} bytes there for each"

@@ -44,7 +44,7 @@ class Simplices:
         self.bins = Bins(corners.min(axis=1) - tolerance, corners.max(axis=1) + tolerance)
 
     def contain(self, x: np.ndarray) -> np.ndarray:
-        """Which positions (n, d) lie in one of the simplices: (n,) bool."""
+        """Test which positions (n, d) lie in one of the simplices: (n,) bool."""
         inside = np.zeros(len(x), bool)
         for rows, items in self.bins.candidates(x, done=inside):
             local = x[rows] - self.origin[items]

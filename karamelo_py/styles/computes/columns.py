@@ -1,4 +1,4 @@
-"""What computes that compare fields of points have in common: fields by name, curves in files."""
+"""Base of computes that compare fields of points: fields by name, curves in files."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Norm:
         self.largest = 0.0
 
     def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """What is to be added up of sizes (2, n) of differences and exact values, and weights."""
+        """Return the terms of a norm from the sizes (2, n) of differences and exact values."""
         return np.vstack([weight * sizes ** (2 if self.kind == "L2" else 1), weight])
 
     def moment(self, sums: np.ndarray, largest: list[np.ndarray]) -> np.ndarray:
@@ -155,7 +155,7 @@ class Compared:
         return self.norm.moment(sums, largest), sums[3:]
 
     def terms(self, points: Fields) -> np.ndarray:
-        """What is to be added up of points."""
+        """Return the terms of the points for sums."""
         sizes, weight, *rest = self.sizes(points)
         return np.vstack([self.norm.terms(sizes, weight), *rest])
 

@@ -49,7 +49,7 @@ class Dump(Rhythmic):
         return "*" in str(self.file)
 
     def path(self) -> Path:
-        """The file of the present state."""
+        """Name the file of the present state."""
         folder, file = folder_of_discarded(), self.file
         folder, file = (self.hub.folder, file) if folder is None else (folder, file.name)
         return folder / str(file).replace("*", str(self.hub.update.step), 1)

@@ -197,7 +197,7 @@ def _reported(path: Path) -> Iterator[None]:
 
 
 def _opened_to_append(path: Path) -> Any:
-    """The file, such that whatever happens to the program what was written before stays readable.
+    """Open the file such that what was written stays readable, whatever happens to the program.
 
     h5py's swmr=True also opens a file that a killed program has left, if it was opened for that at
     once (`h5py.File.swmr_mode` does it a moment later).

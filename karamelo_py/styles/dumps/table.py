@@ -74,15 +74,15 @@ class TableDump(Dump):
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:
-        """Names of the columns that can be written."""
+        """List names of the columns that can be written."""
         raise NotImplementedError
 
     def extent(self) -> tuple[int, int]:
-        """Number of rows, and the largest id."""
+        """Count number of rows, and the largest id."""
         raise NotImplementedError
 
     def tables(self) -> Iterator[TableRows]:
-        """All rows in the order of their ids, in pieces whose columns fit into memory."""
+        """Give all rows in the order of their ids, in pieces whose columns fit into memory."""
         raise NotImplementedError
 
     def take_part(self) -> None:
@@ -96,7 +96,7 @@ class TableDump(Dump):
             pass
 
     def table(self) -> TableRows:
-        """All rows."""
+        """Give all rows."""
         ids, types, columns = zip(*self.tables(), strict=True)
         joined = (np.concatenate(same) for same in zip(*columns, strict=True))
         return TableRows(np.concatenate(ids), np.concatenate(types), list(joined))
@@ -115,7 +115,7 @@ class OfPoints:
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:
-        """Names of the columns that can be written."""
+        """List names of the columns that can be written."""
         return hub.fields.particle_names()
 
     @property
@@ -124,13 +124,13 @@ class OfPoints:
         return self.hub.fields.absent_at_points()
 
     def extent(self) -> tuple[int, int]:
-        """Number of the points that there are, and the last of them."""
+        """Count number of the points that there are, and the last of them."""
         present = self.hub.fields.present
         count = int(np.count_nonzero(present))
         return count, len(present) - int(present[::-1].argmax()) if count else 0
 
     def tables(self) -> Iterator[TableRows]:
-        """Number and solid of each point, and its columns."""
+        """Give number and solid of each point, and its columns."""
         for fields in self.hub.fields.pieces(to_first=self.to_first):
             ids, types = (fields.particle(name).astype(np.int64) for name in ("id", "type"))
             yield TableRows(ids, types, [fields.particle(name) for name in self.columns])
@@ -170,18 +170,18 @@ class OfNodes:
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:
-        """Names of the columns that can be written."""
+        """List names of the columns that can be written."""
         return hub.fields.node_names()
 
     def extent(self) -> tuple[int, int]:
-        """Number of the nodes that are written, and the last of them."""
+        """Count number of the nodes that are written, and the last of them."""
         fields = self.hub.fields
         return (
             fields.occupied_nodes if self.occupied else (fields.node_count, fields.node_count - 1)
         )
 
     def tables(self) -> Iterator[TableRows]:
-        """Number and grid of each node, and its columns."""
+        """Give number and grid of each node, and its columns."""
         for nodes in self.hub.fields.node_pieces(self.columns, to_first=self.to_first):
             rows = np.flatnonzero(nodes.node("mass") > 0) if self.occupied else slice(None)
             yield TableRows(

@@ -33,8 +33,9 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
     """Find the fixes that give way to this one, with what to say of them."""
     fixes = list(simulation.hub.fixes.values())
     first = [one for one in simulation.beginning if isinstance(one, tuple(_styles))]
-    earlier = fixes[: fixes.index(fix)]
-    led = [one for one in earlier if one.leads_points]
+    if not (fix.leads_points or fix in first):
+        return
+    led = [one for one in fixes[: fixes.index(fix)] if one.leads_points]
     for other in led if fix.leads_points else ():
         axes, shared = _unlike(other, fix), _shared(simulation, other, fix)
         if axes and len(shared):
@@ -42,11 +43,10 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
     # What begins with one velocity for all and has another for some is meant so.
     for other in first[: first.index(fix)] if fix in first else first:
         axes, shared = _unlike(other, fix), _shared(simulation, other, fix)
-        if not (axes and 0 < len(shared) == len(simulation.members(other.group))):
-            continue
-        axes = [k for k in axes if _differ(simulation, other, fix, k, shared)]
-        if axes and (fix.leads_points or fix in first):
-            yield _said(other, axes, shared)
+        if axes and 0 < len(shared) == len(simulation.members(other.group)):
+            axes = [k for k in axes if _differ(simulation, other, fix, k, shared)]
+            if axes:
+                yield _said(other, axes, shared)
     for other in fixes if fix.leads_points else ():
         axes = _unlike(other, fix) if other.prescribes_velocity else []
         caught = _within(simulation, other, fix) if axes else ()

@@ -1,4 +1,4 @@
-"""What fixes between two solids share."""
+"""Base of fixes between two solids."""
 
 from functools import partial
 from typing import Any, NamedTuple
@@ -80,7 +80,7 @@ class PairContact(Fix):
         self.publish_components(total)
 
     def sent(self, simulation: Any) -> int:
-        """How many points may touch others as they lie now: one process looks at all of them."""
+        """Count the points that may touch others now: one process looks at all of them."""
         corners = self._where_both_are(simulation)
         blocks = simulation.blocks if corners is not None else ()
         return sum(len(self._picked(simulation, block, *corners)) for block in blocks)

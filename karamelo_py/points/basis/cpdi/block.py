@@ -9,11 +9,11 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import (
+    all_lanes,
     beside,
     define,
     first_lane,
     fma,
-    in_all,
     is_one,
     real,
     shared,
@@ -76,7 +76,7 @@ def block_of(kin, grid, stencil):
 @shared
 def is_whole(block):
     """Whether all that the points in all lanes see lies in their blocks."""
-    return len(block) > 0 and in_all(block.holds)
+    return len(block) > 0 and all_lanes(block.holds)
 
 
 @shared

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import inf, prod
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, beside, choose, define, index, real, shared
+from karamelo_py.compiler.compile import Weighted, beside, define, index, real, shared, where
 from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant, written
 from karamelo_py.compiler.tuples import add_row, add_scaled, scale
 from karamelo_py.points.basis import (
@@ -83,7 +83,7 @@ def _corner(kin, grid: Number, x: Vector):
 
 @shared
 def _side(far, fraction):
-    return choose(far > 0, fraction, real(1, fraction) - fraction)
+    return where(far > 0, fraction, real(1, fraction) - fraction)
 
 
 @formula()
@@ -245,7 +245,7 @@ def register_carried(basis: type) -> None:
     for k in range(d + 1, d + d * corners):
         far = call(max, abs(place[k] - place[k % d]), far)
     far = call(max, far * grid.inv_h, LEAST[d])
-    reached = call(choose, call(upright, basis_, kin, place), far, inf)
+    reached = call(where, call(upright, basis_, kin, place), far, inf)
     extent.on(basis)(written("basis, kin, grid, place", reached, "place[0]"))
 
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import choose, in_any, point_function, real
+from karamelo_py.compiler.compile import any_lane, point_function, real, where
 from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws import column, damage, damage_initiation
@@ -104,7 +104,7 @@ def _initial_damage_johnson_cook_damage(damage, like):
 @damage_after.on(JohnsonCookDamage)
 def _damage_after_johnson_cook_damage(damage, memory, strain, triaxiality, heat, dt):
     grows = (strain > 0) & (triaxiality > real(_CLOSED, strain))
-    if not in_any(grows):
+    if not any_lane(grows):
         return memory
     one = real(1, strain)
     failure = damage.d1 + damage.d2 * exponential(min(damage.d3 * triaxiality, real(50, strain)))
@@ -112,7 +112,7 @@ def _damage_after_johnson_cook_damage(damage, memory, strain, triaxiality, heat,
     failure *= one + damage.d4 * logarithm(rate)
     failure *= warmed(heat, damage, one)
     further = strain / max(failure, real(_SMALLEST_FAILURE_STRAIN, strain))
-    return (choose(grows, memory[0] + further, memory[0]),)
+    return (where(grows, memory[0] + further, memory[0]),)
 
 
 @integrity.on(JohnsonCookDamage)

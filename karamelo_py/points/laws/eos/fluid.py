@@ -48,7 +48,7 @@ class Tait(NamedTuple):
 
     in_lanes = True
     any_speed = True
-    one_by_one = ("compression_energy",)
+    scalarised = ("compression_energy",)
 
     specific_volume: float  # reference volume per mass
     K: float  # reference pressure; K gamma is the bulk modulus

@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import choose, point_function, real, shared
+from karamelo_py.compiler.compile import point_function, real, shared, where
 from karamelo_py.compiler.powers import logarithm
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative, Positive
@@ -66,7 +66,7 @@ class Shock(NamedTuple):
     """
 
     in_lanes = True
-    one_by_one = ("ratio_at_pressure",)
+    scalarised = ("ratio_at_pressure",)
 
     specific_volume: float  # reference volume per mass
     modulus: float  # rho0 c0^2
@@ -112,7 +112,7 @@ known_failure(
 def tangent_from(eos, j):
     """The compression 1 - J beyond which pressure is a straight line."""
     limit = real(_STEEPEST, j)
-    return choose(limit < eos.S, limit / max(eos.S, limit), limit)
+    return where(limit < eos.S, limit / max(eos.S, limit), limit)
 
 
 @shared
@@ -124,10 +124,10 @@ def cold_pressure(eos, j):
     y = eos.S * inside
     flat = one - y
     in_tension = closed < 0
-    inverse = one / choose(in_tension, j, flat)
+    inverse = one / where(in_tension, j, flat)
     slope = (one + y) * inverse
     curve = (inside + slope * (closed - inside)) * (inverse * inverse)
-    return eos.modulus * choose(in_tension, closed * inverse, curve)
+    return eos.modulus * where(in_tension, closed * inverse, curve)
 
 
 @point_function(otherwise=True)
@@ -152,9 +152,9 @@ def _bulk_modulus_shock(eos, j, memory, heat):
     closed = one - j
     y = eos.S * min(closed, tangent_from(eos, j))
     in_tension = closed < 0
-    inverse = one / choose(in_tension, j, one - y)
+    inverse = one / where(in_tension, j, one - y)
     curve = j * (one + y) * (inverse * inverse)
-    return eos.modulus * choose(in_tension, inverse, curve * inverse)
+    return eos.modulus * where(in_tension, inverse, curve * inverse)
 
 
 @compression_energy.on(Shock)
@@ -165,15 +165,15 @@ def _compression_energy_shock(eos, j, memory):
     y = eos.S * inside
     flat = one - y
     in_tension, near = closed < 0, y < real(1e-3, j)
-    log_of = logarithm(choose(in_tension, j, flat))
+    log_of = logarithm(where(in_tension, j, flat))
     # From J to 1 rho0 c0^2 (1 - J) / J in tension; the closed form is a small difference near 1.
     few = inside * inside * (half + y * (real(2 / 3, j) + real(0.75, j) * y))
     log_of_flat = log_of + ((one - flat) - y) / flat  # y is not what 1 - y is rounded to
-    energy = choose(near, few, (y / flat + log_of_flat) / choose(near, one, eos.S * eos.S))
+    energy = where(near, few, (y / flat + log_of_flat) / where(near, one, eos.S * eos.S))
     slope = (one + y) / (flat * flat * flat)
     further = closed - inside
     line = further * (inside / (flat * flat) + half * slope * further)
-    return eos.modulus * choose(in_tension, -(closed + log_of), energy + line)
+    return eos.modulus * where(in_tension, -(closed + log_of), energy + line)
 
 
 @ratio_at_pressure.on(Shock)

@@ -72,7 +72,7 @@ class DruckerPrager(NamedTuple):
 
     in_lanes = True
     flows = True
-    one_by_one = ("respond",)
+    scalarised = ("respond",)
 
     G: float  # shear modulus
     cohesion: float

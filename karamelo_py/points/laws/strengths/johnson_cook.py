@@ -3,16 +3,16 @@
 from typing import Annotated, Any, NamedTuple
 
 from karamelo_py.compiler.compile import (
-    choose,
+    all_lanes,
     fma,
-    in_all,
     point_function,
     real,
     round_off,
     shared,
+    where,
 )
 from karamelo_py.compiler.powers import logarithm, power
-from karamelo_py.language.rules import saving
+from karamelo_py.language.rules import suggestion
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
@@ -93,7 +93,7 @@ class JohnsonCook(NamedTuple):
         return cls(G, A, B, n, rate, Softening(m, Tr, Tm) if m > 0 else Absent())
 
 
-saving(
+suggestion(
     JohnsonCook,
     when=lambda s, scene: s.B == 0 and all(isinstance(f, Absent) for f in (s.rate, s.softening)),
     cost="the strength of {owner.id} neither hardens nor depends on rate or heat",
@@ -131,8 +131,8 @@ _NEAR, _TERMS = 1 / 32, 9
 def power_of_strain(factor, exponent, strain):
     """factor strain^exponent, 0 at no strain."""
     some = strain > 0
-    base = choose(some, strain, real(1, strain))
-    return choose(some, factor * power(base, exponent), real(0, strain))
+    base = where(some, strain, real(1, strain))
+    return where(some, factor * power(base, exponent), real(0, strain))
 
 
 @shared
@@ -143,15 +143,15 @@ def power_law(factor, exponent, strain, value, increment):
     """
     one = real(1, strain)
     near = max(exponent, one) * increment <= real(_NEAR, strain) * strain
-    x = increment / choose(strain > 0, strain, one)
+    x = increment / where(strain > 0, strain, one)
     series = one
     for k in range(_TERMS, 0, -1):
         series = fma(x * ((exponent - real(k - 1, x)) * real(1 / k, x)), series, one)
     after = strain + increment
     value = value * series
-    if not in_all(near):
-        value = choose(near, value, power_of_strain(factor, exponent, after))
-    return value, value * (exponent / choose(after > 0, after, one))
+    if not all_lanes(near):
+        value = where(near, value, power_of_strain(factor, exponent, after))
+    return value, value * (exponent / where(after > 0, after, one))
 
 
 @shared
@@ -163,7 +163,7 @@ def power_law_guess(exponent, strain, hard, excess, slope):
     """
     zero, one = real(0, strain), real(1, strain)
     some = strain > round_off(strain)
-    inverse = choose(some, one / choose(some, strain, one), zero)
+    inverse = where(some, one / where(some, strain, one), zero)
     steeper = hard * exponent * inverse
     flatter = one / (slope + steeper)
     curved = real(0.5, strain) * (one - exponent) * steeper * inverse * flatter
@@ -193,8 +193,8 @@ def _quickened_rate_factor(rate, flow, slope, increment, dt):
     one = real(1, increment)
     relative = increment / (dt * rate.epsdot0)
     faster = relative > one
-    factor = one + choose(faster, rate.C * logarithm(choose(faster, relative, one)), real(0, one))
-    steeper = choose(faster, flow * rate.C / choose(faster, increment, one), real(0, one))
+    factor = one + where(faster, rate.C * logarithm(where(faster, relative, one)), real(0, one))
+    steeper = where(faster, flow * rate.C / where(faster, increment, one), real(0, one))
     return flow * factor, slope * factor + steeper
 
 

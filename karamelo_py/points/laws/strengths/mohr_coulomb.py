@@ -53,7 +53,7 @@ class MohrCoulomb(NamedTuple):
 
     in_lanes = True
     flows = True
-    one_by_one = ("respond",)
+    scalarised = ("respond",)
 
     G: float  # shear modulus
     cohesion: float  # c cos(phi)

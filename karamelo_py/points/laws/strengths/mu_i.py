@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import choose, real
+from karamelo_py.compiler.compile import real, where
 from karamelo_py.compiler.tuples import plus, scale
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import contract
@@ -99,7 +99,7 @@ def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
     trial = elastic_trial(strength.G, s, strain)
     shear = sqrt(real(0.5, j) * contract(kin, trial, trial))
     flows = together & (shear > strength.mu_s * p)
-    p = choose(together, p, one)
+    p = where(together, p, one)
     slow, fast = strength.mu_s * p, strength.mu_2 * p
     # (shear - tau)/(G dt) is the shear rate that tau = mu(I) p asks for: a quadratic equation.
     grain = strength.d * sqrt(strength.rho_s / p)
@@ -107,7 +107,7 @@ def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
     b = fast + shear + viscous
     c = fast * shear + slow * viscous
     tau = real(2, c) * c / (b + sqrt(b * b - real(4, c) * c))
-    slip = choose(flows, (shear - tau) / strength.G, zero)
-    share = choose(flows, tau / choose(flows, shear, one), choose(together, one, zero))
+    slip = where(flows, (shear - tau) / strength.G, zero)
+    share = where(flows, tau / where(flows, shear, one), where(together, one, zero))
     ep = memory[0] + slip * sqrt(real(1 / 3, slip))
     return scale(share, trial), (ep, slip / dt * grain), tau * slip

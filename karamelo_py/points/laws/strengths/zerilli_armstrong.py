@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import choose, real
+from karamelo_py.compiler.compile import real, where
 from karamelo_py.compiler.powers import exponential
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.strengths.hardening import flow_stress, foreseen, hardening
@@ -108,7 +108,7 @@ def _flow_stress_zerilli_armstrong(strength, memory, increment, heat, dt):
     rate = increment / (dt * strength.epsdot0)
     at_rate = power_of_strain(one, power, rate)
     rate, rate_slope = power_law(one, power, rate, at_rate, increment - increment)
-    rate = choose(power > 0, rate, one)
+    rate = where(power > 0, rate, one)
     factor = strength.C1 + root
     slope += thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
     return strength.C0 + thermal * rate * factor + athermal, slope

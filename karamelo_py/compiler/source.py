@@ -20,7 +20,7 @@ def _last_line(code: python.CodeType) -> int:
 
 
 def _lines(function: Callable) -> Iterator[str]:
-    """The text of a function; longer and longer, until it can be parsed."""
+    """Yield the text of a function; longer and longer, until it can be parsed."""
     text = vars(function).get("text")
     if text is not None:
         yield text
@@ -38,7 +38,7 @@ _began = time.time()
 
 
 def _is_read(file: str) -> bool:
-    """Whether a file is as it was when Python read it; what was typed in lies in no file."""
+    """Tell whether a file is as Python has read it; what was typed in lies in no file."""
     try:
         about = os.stat(file)
     except OSError:
@@ -47,15 +47,15 @@ def _is_read(file: str) -> bool:
 
 
 def _is_in(text: str, code: python.CodeType) -> bool:
-    """Whether a text has a function with this code."""
+    """Tell whether a text has a function with this code."""
     ahead: list = [compile(text, code.co_filename, "exec", dont_inherit=True)]
     while ahead and ahead[-1] != code:
         ahead += [c for c in ahead.pop().co_consts if isinstance(c, python.CodeType)]
     return bool(ahead)
 
 
-def text_of(function: Callable) -> ast.FunctionDef:
-    """The text of a function, parsed."""
+def source_of(function: Callable) -> ast.FunctionDef:
+    """Parse the text of a function."""
     for text in _lines(function):
         try:
             (definition,) = ast.parse(text).body

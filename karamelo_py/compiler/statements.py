@@ -2,7 +2,7 @@
 
 What asks what only a run can know cannot be run by Python (:mod:`karamelo_py.compiler.trace`): here
 its statements are gone through one by one. What only concerns Python is done; where a number
-decides, code is written for all ways, and where ways meet, a variable is what it was on the way
+decides, code is written for all edges, and where edges meet, a variable is what it was on the way
 that was taken. A loop over a range that is known is written out, any other one becomes a loop.
 """
 
@@ -17,23 +17,23 @@ from typing import Any
 
 from numba import types
 
-from karamelo_py.compiler.flow import Counter, Flow, Grows, Range, Way, is_value
-from karamelo_py.compiler.terms import BINARY, CHANGING, ON_ALL_WAYS, Terms
-from karamelo_py.compiler.texts import text_of
+from karamelo_py.compiler.expressions import BINARY, CHANGING, ON_ALL_WAYS, ExpressionCompiler
+from karamelo_py.compiler.flow import Counter, Edge, Flow, Grows, Range, is_value
+from karamelo_py.compiler.source import source_of
 from karamelo_py.compiler.values import LONG, DataDependentBranch, Untraceable
 
 
 @functools.cache
 def _stored(node: ast.AST) -> frozenset[str]:
-    """The names that a statement gives something to."""
+    """List the names that a statement gives something to."""
     return frozenset(
         n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
     )
 
 
 def place_in_text(frame: python.FrameType) -> tuple[str, int] | None:
-    """The file and line of the statement that a frame is about, if it is about one."""
-    if frame.f_code is not _Walk.block.__code__ or "statement" not in frame.f_locals:
+    """Find the file and line of the statement that a frame is about, if it is about one."""
+    if frame.f_code is not AstCompiler.block.__code__ or "statement" not in frame.f_locals:
         return None
     walk, statement = frame.f_locals["self"], frame.f_locals["statement"]
     return walk.walked.__code__.co_filename, statement.lineno
@@ -42,22 +42,20 @@ def place_in_text(frame: python.FrameType) -> tuple[str, int] | None:
 # --- the walk -------------------------------------------------------------------------------------
 
 
-class Walked:
-    """A function that is walked through where it is called.
+class AstFunction:
+    """Compile a function from its text, statement by statement, where it is called.
 
     Parameters
     ----------
     function
         With the globals that it is to see.
     flow
-        Makes what writes the code of ways, when a call begins.
-    rolled
-        Whether loops are left to the compiler to unroll.
+        Makes what writes the code of edges, when a call begins.
     """
 
-    def __init__(self, function: Callable, flow: Callable[[], Flow], rolled: bool):
-        self.function, self.flow, self.rolled = function, flow, rolled
-        self.definition = text_of(function)
+    def __init__(self, function: Callable, flow: Callable[[], Flow]):
+        self.function, self.flow = function, flow
+        self.definition = source_of(function)
         self.unrolled: set[ast.For] = set()  # loops that must be
         self.grown: dict[tuple, dict] = {}  # types of literals that loops begin with, by place
         self.signature = inspect.signature(function)
@@ -69,11 +67,11 @@ class Walked:
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         bound = self.signature.bind(*arguments, **keywords)
         bound.apply_defaults()
-        return _Walk(self, self.flow(), dict(bound.arguments)).result()
+        return AstCompiler(self, self.flow(), dict(bound.arguments)).result()
 
 
-class _Walk(Terms):
-    """One call of a function.
+class AstCompiler(ExpressionCompiler):
+    """Compile one call of a function.
 
     Attributes
     ----------
@@ -83,45 +81,45 @@ class _Walk(Terms):
         Whether anything is done after the statement before.
     """
 
-    def __init__(self, walked: Walked, flow: Flow, names: dict[str, Any]):
+    def __init__(self, walked: AstFunction, flow: Flow, names: dict[str, Any]):
         self.walked, self.flow, self.names = walked, flow, names
         self.function, self.free = walked.function, walked.free
         self.goes = True
-        self.returns: list[Way] = []
-        self.breaks: list[Way] = []
-        self.continues: list[Way] = []
+        self.returns: list[Edge] = []
+        self.breaks: list[Edge] = []
+        self.continues: list[Edge] = []
 
     def result(self) -> Any:
-        """What the function returns."""
+        """Compile the body; return what the function returns."""
         self.block(self.walked.definition.body)
         if self.goes:
             self.names = {"": None}
-            self.returns.append(self.way())
+            self.returns.append(self.edge())
         self.meet(self.returns)
         if "" not in self.names:
-            raise Untraceable("what it returns is not of one kind on all ways")
+            raise Untraceable("what it returns is not of one kind on all edges")
         return self.names[""]
 
     # --- ways
 
-    def way(self) -> Way:
-        """The way up to here."""
-        return self.flow.way(self.names)
+    def edge(self) -> Edge:
+        """End a way here."""
+        return self.flow.edge(self.names)
 
-    def leave(self, ways: list[Way]) -> None:
+    def leave(self, edges: list[Edge]) -> None:
         """End this way here: it goes on where `ways` meet."""
-        ways.append(self.way())
+        edges.append(self.edge())
         self.goes = False
 
-    def meet(self, ways: list[Way]) -> None:
+    def meet(self, edges: list[Edge]) -> None:
         """Go on where ways meet."""
-        self.goes = bool(ways)
-        if ways:
-            self.names = self.flow.meet(ways)
+        self.goes = bool(edges)
+        if edges:
+            self.names = self.flow.meet(edges)
 
     def branch(self, condition: Any, then: Callable, otherwise: Callable) -> None:
         """Go both ways, and on from where they meet."""
-        ways: list[Way] = []
+        edges: list[Edge] = []
         before = self.names
         for begin, do in zip(self.flow.part(condition), (then, otherwise), strict=True):
             self.names = dict(before)
@@ -129,13 +127,13 @@ class _Walk(Terms):
             self.flow.start(begin)
             do()
             if self.goes:
-                ways.append(self.way())
-        self.meet(ways)
+                edges.append(self.edge())
+        self.meet(edges)
 
     # --- statements
 
     def block(self, statements: list[ast.stmt]) -> None:
-        """Statements one after another."""
+        """Compile statements one after another."""
         for statement in statements:
             if not self.goes:
                 return
@@ -179,7 +177,7 @@ class _Walk(Terms):
             given = defaults | dict(zip(names, arguments, strict=False)) | keywords
             if len(arguments) > len(names) or given.keys() != set(names):
                 raise TypeError(f"{node.name} takes {len(names)} arguments")
-            return _Walk(inner, self.flow, given).result()
+            return AstCompiler(inner, self.flow, given).result()
 
         self.names[node.name] = call
 
@@ -259,9 +257,7 @@ class _Walk(Terms):
             self.unroll(node, through)
 
     def is_rolled(self, node: ast.For, through: range) -> bool:
-        """Whether a loop over a known range is left to the compiler: a long one, if it can be."""
-        if self.walked.rolled:
-            return True
+        """Tell whether a loop over a known range stays a loop: a long one, if it can be."""
         if len(through) <= LONG or node in self.walked.unrolled:
             return False
         if not self.flow.builder:
@@ -278,19 +274,19 @@ class _Walk(Terms):
         return node not in self.walked.unrolled
 
     def unroll(self, node: ast.For, through: Iterable) -> None:
-        """A loop that is written out."""
+        """Write a loop out."""
         outer = self.breaks, self.continues
         self.breaks, self.continues = [], []
         for item in through:
             self.give(node.target, item)
             self.block(node.body)
-            self.meet([*self.continues, *([self.way()] if self.goes else [])])
+            self.meet([*self.continues, *([self.edge()] if self.goes else [])])
             self.continues = []
             if not self.goes:
                 break
         breaks, (self.breaks, self.continues) = self.breaks, outer
         self.block(node.orelse)
-        self.meet([*breaks, *([self.way()] if self.goes else [])])
+        self.meet([*breaks, *([self.edge()] if self.goes else [])])
 
     def While(self, node: ast.While) -> None:
         self.roll(node, None)
@@ -298,7 +294,7 @@ class _Walk(Terms):
     def roll(
         self, node: ast.For | ast.While, counter: Counter | None, item: Callable | None = None
     ) -> None:
-        """A loop that ends when the run says so; `item` of a count is what it is about then.
+        """Compile a loop that ends when the run says so; `item` is what a count stands for.
 
         Types are found first: literals that it begins with become numbers of these types.
         """
@@ -333,10 +329,10 @@ class _Walk(Terms):
         head, self.names = self.flow.loop(self.names, changed, grown)
         count = self.names.get(_COUNT)
         condition = counter.goes_on(count) if counter else self.do(node.test)
-        ways = []
+        edges = []
         if is_value(condition):
             inside, outside = self.flow.part(condition)
-            ways.append(outside._replace(names=self.names))
+            edges.append(outside._replace(names=self.names))
             self.names = dict(self.names)
             self.flow.start(inside)
         elif not condition:
@@ -344,17 +340,17 @@ class _Walk(Terms):
         if counter:
             self.give(node.target, item(count))
         self.block(node.body)
-        self.meet([*self.continues, *([self.way()] if self.goes else [])])
+        self.meet([*self.continues, *([self.edge()] if self.goes else [])])
         if self.goes:
             if counter:
                 self.names[_COUNT] = counter.after(count)
             self.flow.close(head, self.names)
         breaks, (self.breaks, self.continues) = self.breaks, outer
-        if node.orelse and ways:
-            self.meet(ways)
+        if node.orelse and edges:
+            self.meet(edges)
             self.block(node.orelse)
-            ways = [self.way()] if self.goes else []
-        self.meet([*ways, *breaks])
+            edges = [self.edge()] if self.goes else []
+        self.meet([*edges, *breaks])
         self.names.pop(_COUNT, None)
 
 

@@ -1,4 +1,4 @@
-"""Expressions of functions that are walked through (`karamelo_py.compiler.walk`)."""
+"""Expressions of functions that are walked through (`karamelo_py.compiler.statements`)."""
 
 import ast
 import functools
@@ -20,8 +20,8 @@ BINARY = {
 }  # fmt: skip
 
 
-class Terms:
-    """What expressions are, by what the names in them stand for.
+class ExpressionCompiler:
+    """Compile expressions, by what the names in them stand for.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Terms:
         raise NotImplementedError
 
     def do(self, node: ast.AST) -> Any:
-        """A statement, or the value of an expression."""
+        """Compile a statement, or an expression to its value."""
         return getattr(self, type(node).__name__, self.unknown)(node)
 
     def unknown(self, node: ast.AST) -> None:
@@ -52,7 +52,7 @@ class Terms:
         raise Untraceable(f"kernels know no {_WORDS.get(kind, kind)}")
 
     def name(self, name: str) -> Any:
-        """What a name stands for."""
+        """Look a name up."""
         if name in self.names:
             return self.names[name]
         if name in self.free:
@@ -77,7 +77,7 @@ class Terms:
         return self.flow.item(self.do(node.value), self.do(node.slice))
 
     def items(self, nodes: list[ast.expr]) -> list:
-        """The items of a tuple, or arguments."""
+        """Compile the items of a tuple, or arguments."""
         out: list = []
         for node in nodes:
             if isinstance(node, ast.Starred):
@@ -126,7 +126,7 @@ class Terms:
         return result
 
     def compare(self, op: ast.cmpop, a: Any, b: Any) -> Any:
-        """One comparison."""
+        """Compile one comparison."""
         if isinstance(op, ast.Is | ast.IsNot):
             return (a is b) == isinstance(op, ast.Is)
         if isinstance(op, ast.In | ast.NotIn):
@@ -136,7 +136,7 @@ class Terms:
         return BINARY[type(op)](a, b)
 
     def among(self, a: Any, things: Any) -> Any:
-        """Whether `a` is one of some things."""
+        """Compile the question whether `a` is one of some things."""
         if is_value(things):
             raise Untraceable("kernels do not look for a number in an array")
         same = [operator.eq(a, b) for b in things] if is_value(a) else [a in things]
@@ -146,7 +146,7 @@ class Terms:
         return self.chain(node.values, isinstance(node.op, ast.And))
 
     def chain(self, nodes: list[ast.expr], every: bool) -> Any:
-        """The first value that decides, or the last one."""
+        """Compile `and` or `or`: the first value that decides, or the last one."""
         value = self.do(nodes[0])
         if len(nodes) == 1:
             return value
@@ -156,7 +156,7 @@ class Terms:
         return self.either(value, *((rest, stay) if every else (stay, rest)))
 
     def either(self, condition: Any, then: Callable, otherwise: Callable) -> Any:
-        """The value of one of two expressions."""
+        """Compile the choice of one of two expressions."""
 
         def of(do: Callable) -> Callable:
             def put() -> None:

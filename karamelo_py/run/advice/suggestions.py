@@ -1,12 +1,13 @@
-"""What a scene pays for and could leave out, each with the words to write instead."""
+"""Suggestions: what a scene pays for and could leave out, with the words to write instead."""
 
 import re
 from collections.abc import Callable, Iterator
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from karamelo_py.language.rules import Advice
 from karamelo_py.run.advice.facts import SceneFacts
 from karamelo_py.run.timestep import own_step
 from karamelo_py.scene.group import NodeGroup
@@ -18,37 +19,25 @@ NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lo
 MANY_POINTS = 4  # a cell and direction
 
 
-class Saving(NamedTuple):
-    """What could be left out.
-
-    Attributes
-    ----------
-    cost
-        What it costs and why it is not needed.
-    instead
-        What to write.
-    """
-
-    cost: str
-    instead: str
-
-
-def savings(hub: Hub, simulation: Any) -> list[Saving]:
+def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
     rules = (_step, _unread, _unused, _of_parts, _averaging, _flat, _round, _points)
-    return [saving for rule in rules for saving in rule(hub, simulation)]
+    return [suggestion for rule in rules for suggestion in rule(hub, simulation)]
 
 
-def _of_parts(hub: Hub, simulation: Any) -> Iterator[Saving]:
-    """What parts say by their rules."""
-    said = SceneFacts(hub, simulation, inf).advice("saving")
-    return (Saving(one.reason, one.cure) for one in said)
+def _of_parts(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    """Ask the rules of the parts."""
+    return SceneFacts(hub, simulation, inf).advice("suggestion")
+
+
+def _suggestion(cost: str, instead: str) -> Advice:
+    return Advice("", cost, instead)
 
 
 # --- the step ------------------------------------------------------------------------------------
 
 
-def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _step(hub: Hub, simulation: Any) -> Iterator[Advice]:
     share, limit = hub.update.dt_factor, simulation.limit
     if hub.update.fixed_dt is not None:
         dt = simulation.dt
@@ -61,9 +50,9 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
         return
     times = f"{best / dt:.3g} times as many steps as the program's own step asks for"
     if hub.update.fixed_dt is not None:
-        yield Saving(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
+        yield _suggestion(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
     else:
-        yield Saving(
+        yield _suggestion(
             f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
         )
 
@@ -71,7 +60,7 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Saving]:
 # --- what nobody reads ---------------------------------------------------------------------------
 
 
-def _unread(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _unread(hub: Hub, simulation: Any) -> Iterator[Advice]:
     text = _script(hub)
     for kind, catalogue in (("compute", hub.computes), ("fix", hub.fixes)):
         for ID, item in catalogue.items():
@@ -81,13 +70,13 @@ def _unread(hub: Hub, simulation: Any) -> Iterator[Saving]:
             defined = rf"\b{kind}\s*\(\s*{re.escape(ID)}\s*,"
             uses = len(re.findall(rf"\b{re.escape(ID)}(?:_\w+)?\b", text))
             if 0 < uses <= len(re.findall(defined, text)):
-                yield Saving(
+                yield _suggestion(
                     f"{kind} {ID} ({item.style}) is measured at each output and shown nowhere",
                     f"leave it out, or name {_published(ID, item)} in log_modify",
                 )
 
 
-def _unused(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _unused(hub: Hub, simulation: Any) -> Iterator[Advice]:
     """Groups whose names stand nowhere but where they are made."""
     text = _script(hub)
     if re.search(r"\binclude\s*\(", text):
@@ -95,7 +84,7 @@ def _unused(hub: Hub, simulation: Any) -> Iterator[Saving]:
     for ID in hub.groups:
         made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
         if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
-            yield Saving(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
+            yield _suggestion(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
 
 
 def _published(ID: str, item: Any) -> str:
@@ -110,7 +99,7 @@ def _script(hub: Hub) -> str:
     return "\n".join(line.partition("#")[0] for line in lines)
 
 
-def _averaging(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
     if not hub.update.anti_locking:
         return
     for solid in hub.solids.values():
@@ -118,7 +107,7 @@ def _averaging(hub: Hub, simulation: Any) -> Iterator[Saving]:
         moduli = (getattr(law, "lam", None), getattr(law, "G", None))
         if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
             return
-    yield Saving(
+    yield _suggestion(
         "anti_volumetric_locking(true): a visit of the points more, and nothing is nearly "
         "incompressible or flows",
         "leave it out",
@@ -151,7 +140,7 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Whether all points (or nodes) of a grid with one key are in the group of `fix`, or none.
+    """Tell whether all points (or nodes) of a grid with one key are in the group, or none.
 
     `key` makes one or two numbers of each of positions (n, 3).
     """
@@ -174,7 +163,7 @@ def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
     return True
 
 
-def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _flat(hub: Hub, simulation: Any) -> Iterator[Advice]:
     """Solids that are the same all along a direction in which nothing moves."""
     domain = hub.domain
     d = domain.dimension
@@ -187,7 +176,7 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
             given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             kept = " and ".join(AXES[axis] for axis in rest)
             named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
-            yield Saving(
+            yield _suggestion(
                 f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
                 f"the points of {'plane strain' if d == 3 else 'a line'}",
                 f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
@@ -196,7 +185,7 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Saving]:
 
 
 def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
-    """Whether fixes say nothing that is not 0 along direction k, nor what depends on it."""
+    """Tell whether fixes say nothing that is not 0 along direction k, nor depends on it."""
     for fix in _acting(hub):
         given = _given(fix)
         if len(given) <= len(rest) or not _is_zero(given[k]):
@@ -207,7 +196,7 @@ def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
 
 
 def _acts_alike(hub: Hub, rest: list[int]) -> bool:
-    """Whether fixes act on all that lies at one place in the directions `rest`, or on nothing."""
+    """Tell whether fixes act on all that lies at one place in the directions `rest`, or none."""
     for fix in _acting(hub):
         smooth_wall = fix.wall_friction is None and all(_given(fix)[j] is None for j in rest)
         if not smooth_wall and not _alike(hub, fix, lambda x: x[:, rest]):
@@ -238,7 +227,7 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
 
 
 def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
-    """Whether no node of the planes at `low` and `high` (in cells) moves along direction k."""
+    """Tell whether no node of the planes at `low` and `high` (in cells) moves along k."""
     lattice = hub.lattices[0]
     held = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
@@ -254,7 +243,7 @@ def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
     return inside and bool(held.take(numbers, axis=k).all())
 
 
-def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
     """Cylinders about one axis, along which all acts."""
     if hub.domain.dimension != 3:
         return
@@ -282,7 +271,7 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
     radius = max(region.radius for region in regions)
     lo, hi = hub.domain.lo[along], hub.domain.hi[along]
     h = hub.domain.h
-    yield Saving(
+    yield _suggestion(
         "cylinders about one axis, and nothing acts around it: about "
         f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
         f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
@@ -290,12 +279,12 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
     )
 
 
-def _points(hub: Hub, simulation: Any) -> Iterator[Saving]:
+def _points(hub: Hub, simulation: Any) -> Iterator[Advice]:
     for solid in hub.solids.values():
         ppc = getattr(solid, "ppc", 0)
         if ppc >= MANY_POINTS:
             each = ppc**hub.domain.dimension
-            yield Saving(
+            yield _suggestion(
                 f"solid {solid.id} has {each} points a cell; more than two a direction gain little "
                 "once points have moved",
                 f"2 or 3 points a direction, and finer cells for what {each} cost",

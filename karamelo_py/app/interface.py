@@ -45,7 +45,7 @@ class Quiet(Console):
 
 
 @contextmanager
-def told() -> Iterator[None]:
+def as_simulation_error() -> Iterator[None]:
     """Raise errors as those whose text is the whole message."""
     try:
         yield
@@ -57,7 +57,7 @@ def told() -> Iterator[None]:
 
 
 def refuse_copies() -> None:
-    """Of several processes that were started, the first tells that none shares a scene here."""
+    """Refuse several processes that were started: the first tells that none shares a scene here."""
     size, rank = launched()
     if size == 1:
         return
@@ -71,7 +71,7 @@ def refuse_copies() -> None:
 
 
 def threads_of(given: Any) -> int | None:
-    """The number of threads, as `--threads` takes it; None for auto."""
+    """Read the number of threads, as `--threads` takes it; None for auto."""
     try:
         return None if given is None else threads_option(str(given))
     except ArgumentTypeError:
@@ -81,7 +81,7 @@ def threads_of(given: Any) -> int | None:
         ) from None
 
 
-def said(value: Any) -> str:
+def as_script_text(value: Any) -> str:
     """Write a value of Python as a script would."""
     if value is None:
         return "NULL"
