@@ -445,6 +445,20 @@ def test_the_first_fails(tmp_path, line, says):
     assert not list((tmp_path / "run").glob("*.part"))
 
 
+@needs_mpi
+def test_a_run_that_goes_wrong(tmp_path):
+    """All processes know what is wrong: one message, and the files of one."""
+    (tmp_path / "sitecustomize.py").write_text(SMALL_TILES, encoding="utf-8")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    lines = "dump(d, all, movie, 5, d.gif, 2, 2, vx)", "set_dt(0.004)", "run(60)"
+    path = moving(tmp_path, "fix(w, initial_velocity_particles, all, 10+3*y0, 0)", *lines)
+    for ranks in (1, 2):
+        status, _, err = by_ranks(tmp_path / str(ranks), path, ranks, PYTHONPATH=folders)
+        assert status == 1 and err.count("error: ") == 1 and "leaves the domain" in err
+        assert "in process" not in err
+    same_files(tmp_path / "1", tmp_path / "2")
+
+
 ONE_FAILS = """
 import os
 from karamelo_py.styles.fixes.python import Python

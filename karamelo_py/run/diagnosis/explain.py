@@ -36,6 +36,10 @@ LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
 
 
+class Stopped(ScriptError):
+    """A run has ended at a fault; all processes know, and its last good state is written."""
+
+
 class OthersWait(Exception):
     """This process cannot write a file, and others go on to give it what belongs there."""
 
@@ -89,12 +93,14 @@ def stop(
     `start` on it is the state of the start.
     """
     message, hint, at_fault = trouble(hub, simulation, status)
+    kind = ScriptError
     with suppress(OthersWait):
         if start is None:
             hint += _keep_good(hub, simulation, status, good)
         else:
             hint += _keep_start(hub, simulation, status, good, start)
-    error = ScriptError(message, place=at_fault or place, hint=hint)
+        kind = Stopped
+    error = kind(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error
 
