@@ -12,7 +12,7 @@ from karamelo_py.kernels.loss import Lost
 from karamelo_py.points.basis import carried, support
 from karamelo_py.points.basis.cpdi.block import InBlock
 from karamelo_py.points.basis.cpdi.corners import AtCorners
-from karamelo_py.points.transfers import add_moment, add_momentum, gradient_weight
+from karamelo_py.points.transfers import add_moment, gradient_weight, nodal_momentum
 
 
 @point_function(otherwise=True)
@@ -27,7 +27,7 @@ def _always(part, w):
 
 def _without_moments(part, w):
     """Moments are of the velocities and places of nodes."""
-    asked = add_moment, add_momentum, gradient_weight
+    asked = add_moment, nodal_momentum, gradient_weight
     return not any(function.defined(type(w.transfer)) for function in asked)
 
 

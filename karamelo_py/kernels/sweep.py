@@ -26,7 +26,7 @@ from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import flat, nested_as, record
 from karamelo_py.kernels.arrays import Places
 from karamelo_py.kernels.clock import common_velocity
-from karamelo_py.kernels.g2p import empty_all, settled_all, zero_vector
+from karamelo_py.kernels.g2p import empty_all, settled_all
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all
 from karamelo_py.kernels.stencils import gathered_by, scatter_nodes
@@ -49,6 +49,7 @@ from karamelo_py.kernels.width import (
 from karamelo_py.points.basis import locate
 from karamelo_py.points.frames import Total, Updated, follows
 from karamelo_py.points.grid import inside, renumbered
+from karamelo_py.points.kinematics import zero_vector
 
 ROUNDING = 1e-3  # cells by which distances in cells may be rounded
 STRETCH = 64  # points: what they gather, and what they have, stays in the nearest cache

@@ -14,7 +14,7 @@ from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.tuples import count_in, record
 from karamelo_py.points.basis import blank, locate
 from karamelo_py.points.frames import DeformationGradient, Total
-from karamelo_py.points.kinematics import zero_tensor
+from karamelo_py.points.kinematics import zero
 from karamelo_py.points.laws import deformation, initial_state
 from karamelo_py.points.transfers import Moment, zero_moment
 
@@ -81,7 +81,7 @@ def ask_ahead_of_stretch(w, p, like):
         _ask(w.points.state, count_in(initial_state(law_of(w, p), w.kin, like)), p)
         f = field(w.points.fields, DeformationGradient)
         if f is not None:
-            _ask(f, len(zero_tensor(w.kin, like)), p)
+            _ask(f, w.kin.tensor_size, p)
 
 
 @shared
@@ -113,7 +113,7 @@ def deformation_of(frame, kin, law, state, points, p):
 
 @deformation_of.on(Total)
 def _deformation_of_total(frame, kin, law, state, points, p):
-    f = load(field(points.fields, DeformationGradient), p, zero_tensor(kin, points.mass[p]))
+    f = load(field(points.fields, DeformationGradient), p, zero(kin, points.mass[p]))
     return stored_or_own(f, law, kin, state)
 
 

@@ -2,8 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import choose, real
-from karamelo_py.compiler.tuples import add_scaled, subtract
+from karamelo_py.compiler.compile import choose
 from karamelo_py.language.kinds import In
 from karamelo_py.points.laws import jacobian
 from karamelo_py.points.transfers import Moment, affine, displacing_velocity, known_volume
@@ -55,9 +54,8 @@ def _known_volume_asflip(transfer, law, kin, state):
 
 @displacing_velocity.on(ASFLIP)
 def _displacing_velocity_asflip(transfer, v, v_pic, j):
-    one = real(1, j)
-    beta = choose(one - j < real(COMPRESSED, j), transfer.beta * one, j - j)
-    return add_scaled(v_pic, beta, subtract(v, v_pic))
+    beta = choose(1 - j < COMPRESSED, transfer.beta, 0)
+    return v_pic + beta * (v - v_pic)
 
 
 blended(ASFLIP)
