@@ -77,7 +77,7 @@ def at_wall(grid, a, last):
     r = a - real(first, a)
     if last == 1:  # both walls at once: what is left are the hat functions
         zero = real(0, a)
-        gradients = (-grid.inv_h, grid.inv_h, zero, zero)
+        gradients = (zero - grid.inv_h, zero + grid.inv_h, zero, zero)
         return Along(first, r, (1 - r, r, zero, zero), gradients, gradients)
     lower = cell == 0
     n, g, c = beside_wall(grid, choose(lower, a, real(last, a) - a))

@@ -79,12 +79,17 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
             after = laws.advance(law, kin, state, tensor(kin, dl), one)
             if len(flat(after)) != len(flat(state)):
                 what = (
-                    f"what a point remembers is {len(state)} numbers at first and {len(after)} "
+                    f"what a point remembers is {len(flat(state))} numbers at first and "
+                    f"{len(flat(after))} "
                     "after a step: their number must not change"
                 )
                 raise fault(part.name, what, part.place)
             for function in TENSORS:
-                _expect(part, function, function(law, kin, after), size)
+                found = function(law, kin, after)
+                _expect(part, function, found, size)
+                if not isinstance(found, kin.Symmetric):
+                    what = f"{function.__name__} has to return a symmetric tensor, not a tuple"
+                    raise fault(part.name, what, part.place)
             for function in NUMBERS:
                 function(law, kin, after)
             laws.specific_volume(law)

@@ -111,7 +111,7 @@ def arm(grid, first, far, centre):
 
 def pairs_of_spread(kin):
     """Rows and columns of D in the layout of :class:`CornerStencil`."""
-    return [pair for pair in kin.Symmetric.places if max(pair) < kin.dimension]
+    return [pair for pair in kin.Symmetric.places if max(*pair) < kin.dimension]
 
 
 def spread_of(kin, grid, weight, corner, centre):

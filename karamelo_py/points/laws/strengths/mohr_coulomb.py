@@ -94,7 +94,7 @@ def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
     """
     lam = K - 2 / 3 * G
     # n and m, normals of yield function and plastic potential, are (1 + sin, 0, sin - 1).
-    mean = 4 * G * lam * sin_phi * sin_psi
+    mean = 4 * lam * sin_phi * sin_psi
     up = 2 * G * (1 + sin_phi) * (1 + sin_psi)
     down = 2 * G * (1 - sin_phi) * (1 - sin_psi)
     f = s[0] - s[2] + (s[0] + s[2]) * sin_phi - 2 * k

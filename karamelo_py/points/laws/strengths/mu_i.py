@@ -103,7 +103,7 @@ def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
     viscous = strength.I0 * strength.G * dt / grain
     b = fast + shear + viscous
     c = fast * shear + slow * viscous
-    tau = 2 * c * c / (b + sqrt(b * b - 4 * c * c))
+    tau = 2 * c / (b + sqrt(b * b - 4 * c))
     slip = choose(flows, (shear - tau) / strength.G, 0)
     share = choose(together, choose(flows, tau / choose(flows, shear, 1), 1), 0)
     ep = memory.ep + slip * sqrt(1 / 3)
