@@ -125,7 +125,7 @@ def power_law(factor, exponent, strain, value, increment):
     """
     near = max(exponent, 1) * increment <= _NEAR * strain
     x = increment / choose(strain > 0, strain, 1)
-    series = 1
+    series = real(1, x)
     for k in range(_TERMS, 0, -1):
         series = fma(x * ((exponent - (k - 1)) * real(1 / k, x)), series, 1)
     after = strain + increment
