@@ -133,7 +133,8 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
     """``state_interpreted(script, *columns)``: the exact state at the end, or columns of it.
 
     With ``boxes=True`` points give to boxes of small tiles, as many points do, not to the nodes;
-    with ``ranks=N`` so many share them. Files are kept in `out`. Of a script that ``fails`` it is the message.
+    with ``ranks=N`` so many share them. Files are kept in `out`. Of a script that ``fails`` it is
+    the message.
     """
 
     def run(

@@ -18,7 +18,8 @@ from tensors import (
 
 from karamelo_py.app.cli import main
 from karamelo_py.compiler.compile import real
-from karamelo_py.compiler.tuples import flat, record
+from karamelo_py.compiler import tuples
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_table
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space, tr, von_mises
 from karamelo_py.points.laws import (
@@ -400,7 +401,7 @@ def test_parts_of_other_kinds_add_their_pressure(kin, law):
     plain = after(law, kin, initial_state(law, kin, 1.0), full, 4)
     state = after(swelling, kin, initial_state(swelling, kin, 1.0), full, 4)
     assert state.m.strength == plain.m.strength
-    t = flat(state.m.further)
+    t = tuples.flat(state.m.further)
     assert t[0] == t[1] > 0
     more = tr(cauchy_stress(law, kin, plain)) - tr(cauchy_stress(swelling, kin, state))
     assert more / 3 == pytest.approx((3 + 5) * t[0])

@@ -169,7 +169,7 @@ def test_no_viscosity_has_no_number():
     plain = EosStrength(COPPER, Elastic(0.4))
     law = plain._replace(viscosity=ArtificialViscosity(1.5, 0.3, 0.2))
     assert len(flat(initial_state(plain, Space(), 1.0))) == 7  # J and s
-    assert len(flat(initial_state(law, Space(), 1.0))) == 9  # viscous pressure, and what it dissipates
+    assert len(flat(initial_state(law, Space(), 1.0))) == 9
 
 
 @pytest.mark.parametrize("steps", [400, 800])

@@ -67,8 +67,8 @@ def support(basis, kin):
 def entry(basis, kin, grid, stencil, k):
     """(node number, weight N, gradient of N) of the k-th node of a stencil.
 
-    The gradient is a vector; axisymmetric with N / r behind (`Gradient` of the kinematics). A node may come
-    more than once: its parts add up.
+    The gradient is a vector; axisymmetric with N / r behind (`Gradient` of the kinematics). A node
+    may come more than once: its parts add up.
     """
 
 

@@ -53,7 +53,7 @@ def averaged_hats(cells, grid, first, lo, hi):
     lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
     behind = [length - share for length, share in zip(lengths, ahead, strict=True)]
     between = [a + b for a, b in zip(ahead[:-1], behind[1:], strict=True)]
-    falls = [a - b for a, b in zip(lengths[:-1], lengths[1:], strict=True)]
+    falls = [lengths[j] - lengths[j + 1] for j in range(cells - 1)]
     k = 1 / total(lengths)
     slope = k * grid.inv_h
     weights = tuple([k * w for w in (behind[0], *between, ahead[-1])])
